@@ -18,20 +18,20 @@ void add_choice(CLI::App& command, const std::string& flags, std::optional<bool>
 }
 
 void add_device_options(CLI::App& command, render::DeviceOptions& device) {
-  command.add_option("--device", device.name, "Vulkan device whose name contains this");
+  command.add_option("--device", device.name, "Vulkan device, by part of its name");
   command.add_flag("--validation", device.validation,
                    "Log the messages of Vulkan's validation layer");
 }
 
 void add_any_paths(CLI::App& command, bool& any_paths) {
   command.add_flag("--any-paths", any_paths,
-                   "Let the session's own set name files and folders outside of the session");
+                   "Allow the session's own set file to use paths outside the session");
 }
 
 void add_with(CLI::App& command, std::optional<std::filesystem::path>& with) {
   command.add_option(
       "--with", with,
-      "File of quality, estimator and lighting keys that replace the set's, as trade "
+      "File of quality, estimator and lighting keys that override the set file, as trade "
       "writes it");
 }
 
@@ -40,7 +40,7 @@ void add_render(CLI::App& app, post::RenderOptions& options,
   CLI::App& command = *app.add_subcommand("render", "Composite every frame of a recorded session");
   command
       .add_option("session", options.session,
-                  "Session directory; with --good or --all a folder of takes")
+                  "Session folder; with --good or --all, a folder of takes")
       ->required();
   CLI::Option* good = command.add_flag_callback(
       "--good", [&] { takes = post::WhichTakes::good; }, "Render every take that is marked good");
@@ -53,7 +53,7 @@ void add_render(CLI::App& app, post::RenderOptions& options,
   add_any_paths(command, options.any_paths);
   command.add_option_function<std::string>(
       "--frames", [&](const std::string& text) { options.frames = post::parse_frame_range(text); },
-      "Observer frames: 7, 3-9 or 3- (default: all)");
+      "Frames to render: 7, 3-9 or 3- (default: all)");
   command
       .add_option("--scale", options.scale,
                   "Size of the pictures, relative to the film camera's; smaller is quicker")
@@ -74,14 +74,14 @@ void add_render(CLI::App& app, post::RenderOptions& options,
   command
       .add_option(
           "--error", options.error,
-          "Add samples down to this error, as a share of the picture's brightness (default: "
+          "Add samples until the error is this fraction of the picture's brightness (default: "
           "quality.error)")
       ->check(CLI::Range(0.0, 1.0));
   command
       .add_option("--seconds", options.seconds,
-                  "Add samples for this long in each frame (default: quality.seconds)")
+                  "Add samples for this many seconds per frame (default: quality.seconds)")
       ->check(CLI::Range(0.0, 86400.0));
-  command.add_option("--seed", options.seed, "Seed of the random numbers (default: the set's)");
+  command.add_option("--seed", options.seed, "Random seed (default: the set file's)");
   command
       .add_option_function<std::string>(
           "--estimator",
@@ -89,19 +89,19 @@ void add_render(CLI::App& app, post::RenderOptions& options,
             options.estimator =
                 name == "paired" ? set::Estimator::paired : set::Estimator::difference;
           },
-          "Estimator (default: the set's)")
+          "Estimator (default: the set file's)")
       ->check(CLI::IsMember({"paired", "difference"}));
   command.add_option(
       "--out", options.directory,
-      "Directory for the pictures; with --good or --all for a folder a take (default: "
-      "by the set's output.directory, a folder a take)");
+      "Folder for the pictures; with --good or --all, one subfolder per take (default: "
+      "the set's output.directory, one subfolder per take)");
   command.add_flag_callback(
       "--no-exr", [&] { options.exr = false; }, "No EXR files");
   command.add_flag_callback(
       "--no-png", [&] { options.png = false; }, "No PNG files (they are still made for the video)");
   command.add_flag_callback(
       "--no-video", [&] { options.video = false; }, "No review video");
-  command.add_flag("--force", options.force, "Render frames again that exist already");
+  command.add_flag("--force", options.force, "Render finished frames again");
   add_device_options(command, options.device);
 }
 
@@ -112,16 +112,16 @@ void add_run(CLI::App& app, rig::LiveOptions& options) {
   add_with(command, options.with);
   command.add_option("--spp", options.samples, "Samples per pixel (default: quality.samples)")
       ->check(CLI::Range(1, 1'000'000));
-  command.add_option("--out", options.directory, "Directory for picture.png and metrics.json");
+  command.add_option("--out", options.directory, "Folder for picture.png and metrics.json");
   command.add_flag("--bus", options.bus, "Serve org.previz.Rig1 on the system bus (previzctl)");
-  command.add_flag("--loop", options.loop, "Replayed cameras start again at their end, forever");
+  command.add_flag("--loop", options.loop, "Loop replayed cameras forever");
   add_device_options(command, options.device);
 }
 
 void add_check(CLI::App& app, std::filesystem::path& set_or_session) {
   CLI::App& command =
-      *app.add_subcommand("check", "List the mistakes in a set file, or what the set needs");
-  command.add_option("set", set_or_session, "Set file or session directory")->required();
+      *app.add_subcommand("check", "List the mistakes in a set file or, if none, what it needs");
+  command.add_option("set", set_or_session, "Set file or session folder")->required();
 }
 
 void add_devices(CLI::App& app, bool& learn, bool& rules) {
@@ -136,14 +136,14 @@ void add_devices(CLI::App& app, bool& learn, bool& rules) {
 void add_import(CLI::App& app, exchange::ImportOptions& options) {
   CLI::App& command = *app.add_subcommand("import", "Make a take of your own footage");
   command.add_option("description", options.description, "FRAMES.json")->required();
-  command.add_option("session", options.session, "Session directory to make")->required();
+  command.add_option("session", options.session, "Session folder to create")->required();
 }
 
 void add_export(CLI::App& app, exchange::ExportOptions& options) {
   CLI::App& command =
       *app.add_subcommand("export", "Write a take's camera for USD and Nuke, with its scene");
-  command.add_option("session", options.session, "Session directory")->required();
-  command.add_option("directory", options.directory, "Directory for the files")->required();
+  command.add_option("session", options.session, "Session folder")->required();
+  command.add_option("directory", options.directory, "Folder for the files")->required();
   command.add_option("--set", options.set_file, "Set file, instead of the session's own");
   add_any_paths(command, options.any_paths);
 }
@@ -151,29 +151,29 @@ void add_export(CLI::App& app, exchange::ExportOptions& options) {
 void add_track(CLI::App& app, exchange::TrackOptions& options) {
   CLI::App& command =
       *app.add_subcommand("track", "Find the camera in every frame of a take, without rendering");
-  command.add_option("session", options.session, "Session directory")->required();
+  command.add_option("session", options.session, "Session folder")->required();
   command.add_option("--set", options.set_file, "Set file, instead of the session's own");
-  command.add_option("--out", options.out, "File for the poses, a line of JSON a frame");
+  command.add_option("--out", options.out, "File for the poses, one JSON line per frame");
   add_any_paths(command, options.any_paths);
 }
 
 void add_trade(CLI::App& app, trade::TradeOptions& options) {
   CLI::App& command =
-      *app.add_subcommand("trade", "Measure what time buys on a set: a table and a page");
+      *app.add_subcommand("trade", "Measure error against render time: a table and a page");
   command
       .add_option("set", options.source.set_or_session,
-                  "Session directory, or set file: the take in place of its cameras, or its newest")
+                  "Session folder, or set file (uses the take that it replays, or its newest)")
       ->required();
   command.add_option("--set", options.source.set_file, "Set file, instead of the session's own");
   add_any_paths(command, options.source.any_paths);
   command.add_option("--fps", options.fps,
-                     "Pictures a second that live is to hold (default: quality.fps, or 25)");
+                     "Frame rate for the live picture (default: quality.fps, or 25)");
   command.add_option_function<std::string>(
       "--error", [&](const std::string& text) { options.error = trade::parse_share(text); },
-      "Error that refining and rendering are to reach: 2% or 0.02 (default: 2%)");
+      "Target error for refine and render: 2% or 0.02 (default: 2%)");
   options.answers = true;
-  command.add_option("--frame", options.frame, "Observer frame (default: the first tracked)");
-  command.add_option("--out", options.directory, "Directory for trade.csv and trade.html");
+  command.add_option("--frame", options.frame, "Frame to use (default: the first tracked)");
+  command.add_option("--out", options.directory, "Folder for trade.csv and trade.html");
   std::string axes;
   for (const std::string& name : trade::axis_names()) add_to_list(axes, name);
   command.add_option("--axes", options.axes, "What to vary (default: everything): " + axes)
@@ -184,7 +184,7 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
                   "Time that it may take; what is not measured by then is named on the page")
       ->capture_default_str();
   command.add_flag("--anew", options.anew,
-                   "Measure everything, also what the last table in the directory has already");
+                   "Measure everything, also what the last table in the folder already has");
   command
       .add_option("--scale", options.scale, "Size of the pictures, relative to the film camera's")
       ->capture_default_str();
@@ -194,8 +194,7 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
   command.add_option(
       "--reference-samples", options.reference_samples,
       "Samples per pixel of the converged picture (default: 256 times the largest of --samples)");
-  command.add_option("--rounds", options.rounds, "How often each is measured")
-      ->capture_default_str();
+  command.add_option("--rounds", options.rounds, "Measurements per setting")->capture_default_str();
   add_device_options(command, options.device);
 }
 
@@ -204,7 +203,7 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
 void add_commands(CLI::App& app, CommandLine& said) {
   app.set_version_flag("--version", "previzd " PREVIZ_VERSION, "Print the version");
   app.require_subcommand(1);
-  app.add_option("--log-level", said.log_level, "The least severe of what goes to the log")
+  app.add_option("--log-level", said.log_level, "Lowest severity that is logged")
       ->check(CLI::IsMember({"info", "warning", "error"}))
       ->capture_default_str();
   add_render(app, said.render, said.render_takes);

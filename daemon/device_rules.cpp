@@ -90,8 +90,8 @@ void print_hid_rules(std::ostream& out, const fs::path& sysfs) {
   for (const auto& [ids, kind] : kinds) {
     out << "# " << kind.name;
     if (kind.is_keyboard)
-      out << ": a keyboard, or a pedal that acts as one. Whoever may open it reads all that is\n"
-             "# typed on it; take away the # in front of the rule if it is the rig's own\n#";
+      out << ": a keyboard, or a pedal that acts as one. Whoever can open it can read everything\n"
+             "# typed on it; uncomment the rule if the device belongs to the rig\n#";
     else
       out << '\n';
     out << R"(SUBSYSTEM=="hidraw", KERNELS=="*:)" << ids << R"(.*", )" << to_previz;

@@ -99,7 +99,7 @@ void learn_buttons(std::ostream& out, const std::stop_token& stop) {
       });
     }
   }
-  if (listeners.empty()) throw Error("there is no HID device to learn from");
+  if (listeners.empty()) throw Error("no HID device was found to learn from");
   const std::lock_guard lock(mutex);
   out << "press one button at a time; Ctrl-C ends" << std::endl;
 }

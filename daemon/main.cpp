@@ -55,7 +55,7 @@ int do_track(exchange::TrackOptions& options, const StopOnSignal& stop) {
 int do_import(const exchange::ImportOptions& options) {
   const exchange::ImportReport report = exchange::import_session(options);
   for (const std::string& note : report.notes) report::log({report::Severity::info, "", note});
-  std::cout << options.session.string() << ": " << report.observer_frames << " observer frames, "
+  std::cout << options.session.string() << ": " << report.observer_frames << " film camera frames, "
             << report.light_frames << " light frames, " << report.poses << " poses, "
             << report.assets << " assets, " << report.bytes / 1'000'000.0 << " MB" << std::endl;
   return 0;
@@ -66,7 +66,7 @@ int do_render_takes(const post::RenderOptions& options, post::WhichTakes which,
   const post::TakesReport report = post::render_takes(options, which, std::cout);
   std::cout << report.rendered.size() << " takes rendered";
   if (!report.failures.empty()) std::cout << ", " << report.failures.size() << " failed";
-  std::cout << (report.interrupted ? "; stopped, the same command goes on from here" : "")
+  std::cout << (report.interrupted ? "; stopped; run the same command to continue" : "")
             << std::endl;
   if (report.interrupted) return 128 + stop.received();
   return report.failures.empty() ? 0 : 1;
@@ -79,7 +79,7 @@ int do_render(post::RenderOptions& options, std::optional<post::WhichTakes> whic
   if (which) return do_render_takes(options, *which, stop);
   const post::RenderReport report = post::render_session(options, std::cout);
   std::cout << report.directory.string() << ": " << report.frames.size() << " frames"
-            << (report.interrupted ? "; stopped, the same command goes on from here" : "")
+            << (report.interrupted ? "; stopped; run the same command to continue" : "")
             << std::endl;
   return report.interrupted ? 128 + stop.received() : 0;
 }

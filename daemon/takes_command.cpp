@@ -8,7 +8,7 @@ namespace {
 CLI::App& add_takes_command(CLI::App& takes, const char* name, const char* about,
                             post::Paths& paths) {
   CLI::App& command = *takes.add_subcommand(name, about);
-  command.add_option("take", paths, "Directories of takes")->required();
+  command.add_option("take", paths, "Folders of takes")->required();
   return command;
 }
 
@@ -18,11 +18,11 @@ void add_takes(CLI::App& app, TakesCommands& commands) {
   CLI::App& takes =
       *app.add_subcommand("takes", "List, mark, check, copy and delete recorded takes");
   takes.require_subcommand(1);
-  takes.add_subcommand("list", "List the takes of a folder, and what each of them lacks")
+  takes.add_subcommand("list", "List the takes in a folder, and what each is missing")
       ->add_option("place", commands.listed, "Folders of takes, or set files that name them")
       ->required();
   add_takes_command(takes, "mark", "Mark takes as good", commands.marked)
-      .add_flag("--not", commands.not_good, "Take the mark away");
+      .add_flag("--not", commands.not_good, "Remove the mark");
   add_takes_command(takes, "check", "Read takes from end to end and list what is damaged",
                     commands.checked)
       .add_option("--repair", commands.repaired,

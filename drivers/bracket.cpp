@@ -22,13 +22,13 @@ class Bracket final : public Camera {
 
   void start() override {
     next_ = 0;
-    if (!advance()) throw Error(name() + ": its exposure cannot be driven; remove bracket_s");
+    if (!advance()) throw Error(name() + ": its exposure cannot be controlled; remove bracket_s");
     camera_->start();
   }
 
   CameraEvent next(std::chrono::milliseconds timeout) override {
     if (std::exchange(refused_, false))
-      return DeviceTrouble{name(), "does not take an exposure of its bracket"};
+      return DeviceTrouble{name(), "rejects an exposure of its bracket"};
     CameraEvent event = camera_->next(timeout);
     if (std::holds_alternative<FramePtr>(event) && !advance() && !std::exchange(reported_, true))
       refused_ = true;

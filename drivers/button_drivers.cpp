@@ -69,7 +69,7 @@ void check_button_name(const std::string& name) {
   std::string forms;
   for (const ButtonDriver& driver : all_button_drivers)
     forms += (forms.empty() ? "" : " | ") + std::string(driver.form);
-  throw Error("no driver takes the name \"" + name + "\"; allowed: " + forms +
+  throw Error("no button driver matches \"" + name + "\"; allowed: " + forms +
               ", as `previzd devices` prints it");
 }
 

@@ -46,12 +46,12 @@ class PressLimit {
 };
 
 // The name of the counter of such presses.
-inline constexpr const char* presses_babbled = "presses left out, more than a hand makes";
+inline constexpr const char* presses_babbled = "presses ignored, faster than any hand";
 
 // Returns the trouble to report when a button begins to babble.
 inline DeviceTrouble babbling(const std::string& device, const std::string& button) {
   return {device, "\"" + button +
-                      "\" is pressed more often than a hand can; it is left out until it is quiet "
+                      "\" is pressed faster than any hand can; it is ignored until it is quiet "
                       "for a second"};
 }
 

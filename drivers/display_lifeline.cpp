@@ -59,7 +59,7 @@ std::optional<DisplayEvent> DisplayLifeline::open() {
   } catch (const Error& error) {
     state_ = DeviceState::absent;
     backoff_.failed(clock_.now());
-    return trouble(std::string(error.what()) + "; tried again until it is there");
+    return trouble(std::string(error.what()) + "; retrying until it is available");
   }
 }
 

@@ -94,7 +94,7 @@ class FaultyCamera final : public Camera {
     switch (fault->kind) {
       case Kind::corrupt:
         return DeviceTrouble{
-            name(), "frame " + std::to_string(frame->sequence) + " is damaged and left out"};
+            name(), "frame " + std::to_string(frame->sequence) + " is damaged and skipped"};
       case Kind::disconnect:
         device_->back = device_->clock.now() + fault->absent;
         lost_ = true;
@@ -133,7 +133,7 @@ class FaultyCamera final : public Camera {
 [[noreturn]] void refuse(const std::string& text) {
   throw Error("fault \"" + text +
               "\": allowed are drop@FRAME+COUNT, corrupt@FRAME+COUNT, late@FRAME+COUNT (COUNT 1 if "
-              "left out), stall@FRAME and disconnect@FRAME+SECONDSs");
+              "omitted), stall@FRAME and disconnect@FRAME+SECONDSs");
 }
 
 // Parses the whole of `text` as a number.

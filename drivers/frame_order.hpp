@@ -32,10 +32,10 @@ class FrameOrder {
   // stamp of a driver that has no monotonic stamps, whose stamps stand still, or who stamps a frame
   // with a time long ago.
   std::int64_t time_of(std::optional<std::int64_t> stamp_ns, std::int64_t arrival_ns) {
-    if (!stamp_ns) ++counters_["frames without a time stamp of the kernel"];
+    if (!stamp_ns) ++counters_["frames without a kernel time stamp"];
     const bool cannot_be =
         stamp_ns && (*stamp_ns == last_stamp_ns_ || *stamp_ns < arrival_ns - oldest_ns);
-    if (cannot_be) ++counters_["frames whose time stamp cannot be"];
+    if (cannot_be) ++counters_["frames with an impossible time stamp"];
     if (stamp_ns) last_stamp_ns_ = stamp_ns;
     const std::int64_t time_ns =
         std::min(arrival_ns, cannot_be ? arrival_ns : stamp_ns.value_or(arrival_ns));

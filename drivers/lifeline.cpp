@@ -98,7 +98,7 @@ std::optional<CameraEvent> Lifeline::not_opened(const std::string& why) {
   ++counters_["back-offs"];
   if (why == last_refusal_) return std::nullopt;
   last_refusal_ = why;
-  return DeviceTrouble{name_, why + "; tried again until it is there"};
+  return DeviceTrouble{name_, why + "; retrying until it is available"};
 }
 
 // Returns the event to pass on; nothing for NoFrame.

@@ -38,8 +38,8 @@ const auto& driver_named(const Drivers& drivers, std::string_view name, const ch
     if (name == driver.name) return driver;
     add_to_list(known, driver.name);
   }
-  throw Error("this build drives no \"" + std::string(name) + "\" " + of_what + "; it has " +
-              (known.empty() ? "none" : known));
+  throw Error("this build supports no \"" + std::string(name) + "\" " + of_what +
+              "; supported: " + (known.empty() ? "none" : known));
 }
 
 }  // namespace previz

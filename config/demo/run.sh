@@ -2,7 +2,7 @@
 # The main job on the bundled take: installs what is missing, builds, and renders the path-traced
 # composite of every frame to out/demo. Needs no GPU. Options of `previzd render` may be given:
 #   config/demo/run.sh --spp 256 --frames 0
-# Called again it goes on where it was stopped; after a change of options or of the set, add --force.
+# Run again, it continues where it was stopped; after changing options or the set, add --force.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 out=out/demo

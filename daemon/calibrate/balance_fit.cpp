@@ -140,7 +140,7 @@ void mark_references(const SurfacePixels& seen, const std::vector<std::string>& 
     });
     if (found == surfaces.end())
       throw Error("reference surface \"" + name +
-                  "\" is not seen well enough; seen are: " + listed(seen, surfaces));
+                  "\" is not visible enough; visible: " + listed(seen, surfaces));
     found->reference = true;
   }
 }
@@ -151,8 +151,8 @@ Balance fit_balance(const SurfacePixels& seen, const std::vector<std::string>& r
   Balance balance;
   balance.surfaces = ratios(seen);
   if (balance.surfaces.empty())
-    throw Error("no diffuse real surface is seen on " + std::to_string(least_pixels) +
-                " pixels of a sixteenth of the picture, unclipped: is there a phantom in the set, "
+    throw Error("no diffuse real surface covers " + std::to_string(least_pixels) +
+                " unclipped pixels in any 1/16 of the picture: does the set have a phantom, "
                 "and is it in the picture?");
   mark_references(seen, references, balance.surfaces);
   for (int c = 0; c < 3; ++c) {

@@ -27,7 +27,7 @@ class BoardText {
     return parts_[i];
   }
   void ends_after(std::size_t count) const {
-    if (parts_.size() > count) fail("has \"" + parts_[count] + "\" too many");
+    if (parts_.size() > count) fail("has an extra field \"" + parts_[count] + "\"");
   }
   [[noreturn]] void fail(const std::string& what) const {
     throw Error("board \"" + text_ + "\" " + what + "; allowed: " + board_grammar);
@@ -39,7 +39,7 @@ class BoardText {
   void size(std::size_t i, int least, Board& board) const {
     const std::string& size = part(i, "size");
     const std::size_t cross = size.find('x');
-    if (cross == std::string::npos) fail("has size \"" + size + "\"");
+    if (cross == std::string::npos) fail("has an invalid size \"" + size + "\"");
     board.columns = whole_number(size.substr(0, cross), "number of columns", least);
     board.rows = whole_number(size.substr(cross + 1), "number of rows", least);
   }
@@ -57,7 +57,7 @@ class BoardText {
     if (read.ec != std::errc{} || read.ptr != text.data() + text.size() || number < least ||
         number > most)
       fail("has " + what + " \"" + text + "\" (" + std::to_string(least) + " to " +
-           std::to_string(most) + " are possible)");
+           std::to_string(most) + " are allowed)");
     return number;
   }
 
@@ -100,7 +100,7 @@ Board parse_board(const std::string& text) {
     board.marker_m = parts.length_m(3, "marker");
     board.dictionary = parts.part(4, "dictionary");
     parts.ends_after(5);
-    if (board.marker_m >= board.square_m) parts.fail("has markers that do not fit its squares");
+    if (board.marker_m >= board.square_m) parts.fail("needs markers smaller than its squares");
     add_lattice(board.columns - 1, board.rows - 1, board.square_m, board);
   } else if (kind == "aprilgrid") {
     board.kind = Board::Kind::aprilgrid;
@@ -111,13 +111,13 @@ Board parse_board(const std::string& text) {
     board.is_kalibr = family == "kalibr";
     board.dictionary = board.is_kalibr ? "tag36h11" : family;
     if (std::ranges::count(set::tag_families, board.dictionary) == 0)
-      parts.fail(fmt::format("has tags of the family \"{}\", which is not known (known: {})",
-                             family, fmt::join(set::tag_families, ", ")));
+      parts.fail(fmt::format("has tags of the family \"{}\", which is unknown (known: {})", family,
+                             fmt::join(set::tag_families, ", ")));
     board.first_id = parts.has(5) ? parts.whole(5, "first id") : 0;
     parts.ends_after(6);
     add_tags(board);
   } else {
-    parts.fail("is of kind \"" + kind + "\"");
+    parts.fail("is of unknown kind \"" + kind + "\"");
   }
   return board;
 }

@@ -152,7 +152,7 @@ std::string other_aprilgrid(const Pictures& pictures, const Board& board,
     return words +
            ": name that family after the gap, --board aprilgrid:COLUMNSxROWS:TAG:GAP:" + most.name;
   if (board.is_kalibr && !is_wide)
-    return words + " with a border of one cell: leave the word kalibr out";
+    return words + " with a border of one cell: remove the word kalibr";
   const int last = board.first_id + board.columns * board.rows - 1;
   if (*most.ids.begin() >= board.first_id && *most.ids.rbegin() <= last) return "";
   return words + fmt::format(

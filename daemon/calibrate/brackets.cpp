@@ -54,7 +54,7 @@ std::map<std::string, double> read_exposures(const fs::path& file) {
     const auto value = seconds(time);
     if (!value)
       throw Error(file.string() + ":" + std::to_string(number) + ": \"" + time +
-                  "\" is no exposure time; allowed: a picture's name and its seconds, like "
+                  "\" is not an exposure time; allowed: file name and seconds, like "
                   "window_03.jpg 1/250");
     times[name] = *value;
   }
@@ -67,7 +67,7 @@ double exif_exposure(const fs::path& file) {
   const PhotoData photo = read_exif(file);
   if (!photo.exposure_s)
     throw Error(file.string() +
-                ": says no exposure time (EXIF); give --exposures, a file of lines NAME SECONDS");
+                ": has no EXIF exposure time; give --exposures, a file of lines NAME SECONDS");
   const double f = photo.f_number.value_or(1);
   return *photo.exposure_s * photo.iso.value_or(100) / 100 / (f * f);
 }
@@ -106,7 +106,7 @@ std::vector<BracketPicture> read_session(const fs::path& directory, const std::s
   for (auto named = source->next(); named; named = source->next()) {
     const double exposure = named->frame->exposure_s * named->frame->gain;
     if (!(exposure > 0))
-      throw Error(named->name + ": its shutter time is not known; the response curve needs it");
+      throw Error(named->name + ": unknown shutter time; the response curve needs it");
     if (!has_exposure(pictures, exposure)) pictures.push_back(picture_of(*named, exposure));
   }
   return pictures;
@@ -119,10 +119,10 @@ void check(const std::vector<BracketPicture>& pictures) {
   for (std::size_t i = 1; i < pictures.size(); ++i)
     if (pictures[i].exposure <= pictures[i - 1].exposure * (1 + same_exposure))
       throw Error(pictures[i].name + ": has the same exposure as " + pictures[i - 1].name +
-                  "; each once");
+                  "; give each exposure once");
   for (const BracketPicture& picture : pictures)
     if (picture.width != pictures[0].width || picture.height != pictures[0].height)
-      throw Error(picture.name + ": has another size than " + pictures[0].name);
+      throw Error(picture.name + ": differs in size from " + pictures[0].name);
 }
 
 }  // namespace

@@ -264,7 +264,7 @@ cv::Mat1d covariance(const Problem& problem, const BundleFit& fit) {
   const cv::Mat1d scale = scales(information);
   if (!cv::invert(information.mul(scale * scale.t()), inverse, cv::DECOMP_CHOLESKY))
     throw Error(
-        "the views do not determine the lens: show the board tilted, near, and all over the "
+        "the views are too alike to fit a lens: film the board tilted, close, and all over the "
         "picture");
   return inverse.mul(scale * scale.t()) * (fit.sigma_px * fit.sigma_px);
 }
@@ -295,7 +295,7 @@ BundleFit fit_bundle(const std::vector<View>& views, Bundle start, const Project
   }
   const double freedom =
       2.0 * double(fit.corners_used) - double(fit.bundle.lens.size()) - 6.0 * double(views_used);
-  if (!(freedom > 0)) throw Error("there are fewer corners than the lens has unknowns; more views");
+  if (!(freedom > 0)) throw Error("fewer corners than lens parameters; film more views");
   fit.used = used;
   fit.rms_px = rms(fit.residuals, &used);
   fit.rms_all_px = rms(fit.residuals, nullptr);

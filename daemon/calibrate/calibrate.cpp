@@ -74,12 +74,12 @@ std::string calibrate_fisheye(const LightOptions& options, LightCameraCalibratio
   Views views = gather(options, "light", {}, out);
   FisheyeFit fisheye = fitted(views, options, "light", out, fit_fisheye);
   if (needs_lens(parse_board(options.board))) {
-    out << "once more, through the lens found:\n";
+    out << "second pass, with the lens found:\n";
     views = gather(options, "light", fisheye.intrinsics, out);
     fisheye = fit_fisheye(views);
   }
   print_fit(views, fisheye.fit, fisheye_parameters, fisheye.picture, out);
-  fmt::print(out, "widest corner {:.1f} degrees off axis; trusted to {:.1f} degrees\n",
+  fmt::print(out, "widest corner {:.1f} degrees off axis; valid to {:.1f} degrees\n",
              fisheye.widest_corner_rad / degree, fisheye.intrinsics.max_angle_rad / degree);
   plot(options, views, fisheye.fit, fisheye.picture, out);
   camera.intrinsics = fisheye.intrinsics;
@@ -90,8 +90,8 @@ std::string calibrate_fisheye(const LightOptions& options, LightCameraCalibratio
 // Replaces a fit by one with as few parameters as little footage determines.
 void fit_by_few(const Views& views, ObserverFit& observer, std::ostream& out) {
   observer = fit_observer_by_few(views);
-  out << "so few views determine one focal length and one coefficient of distortion at most; with "
-         "these alone:\n";
+  out << "too few views for more than one focal length and one distortion coefficient; with "
+         "only these two:\n";
   print_fit(views, observer.fit, few_observer_parameters, observer.picture, out);
   if (const std::string why = why_useless(observer); !why.empty()) throw Error(why);
 }
@@ -101,13 +101,13 @@ std::string pose_by_tags(const LightOptions& options, const set::Set& set,
   const auto source = open_source(options.footage, "light");
   const LightPose pose = find_light_pose(*source, camera.intrinsics, camera.response, set.tracking);
   fmt::print(out,
-             "pose by the tags {} in {} pictures: rms {:.3f} px; certain to {:.1f} mm and {:.2f} "
+             "pose from tags {} in {} pictures: rms {:.3f} px; accurate to {:.1f} mm and {:.2f} "
              "degrees{}\n",
              fmt::join(pose.tags, ", "), pose.pictures, pose.rms_px, 1000 * pose.position_sigma_m,
              pose.rotation_sigma_rad / degree,
-             pose.left_out.empty()
-                 ? ""
-                 : fmt::format("; not where the set says: {}", fmt::join(pose.left_out, ", ")));
+             pose.left_out.empty() ? ""
+                                   : fmt::format("; not where the set file says: {}",
+                                                 fmt::join(pose.left_out, ", ")));
   return set::light_pose_toml(pose.world_from_camera);
 }
 
@@ -120,10 +120,10 @@ std::string statistics_of(const ObserverFit& observer) {
 }
 
 constexpr auto pose_by_hand =
-    "# Where it stands, by hand (or by calibrate light --tags SET):\n"
+    "# Its pose: fill in by hand, or use calibrate light --tags SET:\n"
     "#[light_camera.pose]\n"
     "#position_m = [0.0, 0.0, 0.0]\n"
-    "#rotation_deg = [0.0, 0.0, 0.0]  # unturned it looks straight up, picture down = Y\n";
+    "#rotation_deg = [0.0, 0.0, 0.0]  # zeros: looks straight up, picture bottom is +Y\n";
 
 }  // namespace
 
@@ -131,7 +131,7 @@ void calibrate_observer(const LensOptions& options, std::ostream& out) {
   Views views = gather(options, "observer", {}, out);
   ObserverFit observer = fitted(views, options, "observer", out, fit_observer);
   if (needs_lens(parse_board(options.board))) {
-    out << "once more, through the lens found:\n";
+    out << "second pass, with the lens found:\n";
     views = gather(options, "observer", observer.intrinsics, out);
     observer = fit_observer(views);
   }
@@ -151,7 +151,7 @@ void calibrate_observer(const LensOptions& options, std::ostream& out) {
 
 void calibrate_light(const LightOptions& options, std::ostream& out) {
   if (options.board.empty() && !options.tags_set)
-    throw Error("nothing to calibrate by: give --board for the lens, --tags for the pose, or both");
+    throw Error("nothing to calibrate: give --board for the lens, --tags for the pose, or both");
   std::string tables;
   std::optional<set::Set> set;
   if (options.tags_set) set = set::load_set(*options.tags_set);

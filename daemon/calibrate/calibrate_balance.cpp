@@ -29,8 +29,8 @@ std::string doubt(const Balance& balance) {
   const double sigma = exposure_error_sigma_stops(balance);
   if (sigma < certain_stops) return {};
   return fmt::format(
-      "THE BALANCE IS UNCERTAIN by {:.1f} stops, because the surfaces contradict each other: name "
-      "those whose colour is known with --reference, or put a grey card into the set and the model",
+      "THE BALANCE IS UNCERTAIN by {:.1f} stops, because the surfaces disagree: list "
+      "those of known colour with --reference, or put a grey card into the set and the model",
       sigma);
 }
 
@@ -38,7 +38,7 @@ void print_exposure(const Balance& balance, bool has_light_camera, std::ostream&
   const double stops = exposure_error_stops(balance), sigma = exposure_error_sigma_stops(balance);
   if (std::abs(stops) < stated_well_stops || std::abs(stops) < 3 * sigma) {
     fmt::print(out, "{} to {:+.2f} +- {:.2f} stops\n",
-               has_light_camera ? "the exposures that the cameras state agree"
+               has_light_camera ? "the cameras' exposures agree"
                                 : "the environment and the camera's exposure agree",
                stops, sigma);
     return;
@@ -46,7 +46,7 @@ void print_exposure(const Balance& balance, bool has_light_camera, std::ostream&
   fmt::print(out,
              "{} by {:.2f} +- {:.2f} stops: the light of the {} comes out too {}. Check {}; the "
              "balance below makes up for it.\n",
-             has_light_camera ? "THE EXPOSURES THAT THE CAMERAS STATE DISAGREE"
+             has_light_camera ? "THE CAMERAS' EXPOSURES DISAGREE"
                               : "THE ENVIRONMENT DOES NOT FIT THE CAMERA'S EXPOSURE",
              std::abs(stops), sigma, has_light_camera ? "light camera" : "environment",
              stops > 0 ? "dark" : "bright",
@@ -67,7 +67,7 @@ std::string suggestion(const SurfaceRatio& surface, const KnownSurface& known,
       surface.pixels);
   for (int c = 0; c < 3; ++c)
     if (estimate.albedo[c] > 1)
-      return words + "# (no surface reflects more than all light: not suggested)\n";
+      return words + "# (an albedo above 1 is impossible: not suggested)\n";
   return words + set::surface_toml({known.material, estimate.albedo});
 }
 
@@ -75,11 +75,10 @@ void print_balance(const SurfacePixels& seen, const Balance& balance, std::ostre
   fmt::print(out, "{} frames, {} pixels of diffuse real surfaces\n", seen.frames,
              seen.pixels.size());
   for (const SurfaceRatio& surface : balance.surfaces)
-    fmt::print(out,
-               "  {}: camera over model {:.3f} {:.3f} {:.3f} (+- {}), {} pixels in {} tiles{}\n",
+    fmt::print(out, "  {}: camera / model {:.3f} {:.3f} {:.3f} (+- {}), {} pixels in {} tiles{}\n",
                seen.surfaces[surface.surface].material, surface.ratio.r, surface.ratio.g,
                surface.ratio.b, percent(surface.sigma), surface.pixels, surface.tiles,
-               surface.reference ? "" : ", no reference");
+               surface.reference ? "" : ", not a reference");
   fmt::print(out, "balance {:.4f} {:.4f} {:.4f} (+- {})\n", balance.scale.r, balance.scale.g,
              balance.scale.b, percent(balance.sigma));
 }

@@ -45,11 +45,11 @@ std::string report_refit(const Refit<Intrinsics>& refit, const char* role, bool 
   if (refit.worst_px > most_refit_px && !force)
     throw Error(
         fmt::format("{}; allowed: {:g} px; use the other of --as observer and --as light, "
-                    "or --force to take it as it is",
+                    "or --force to accept it anyway",
                     how, most_refit_px));
   fmt::print(out, "{}\n", how);
   return refit.worst_px > most_refit_px
-             ? as_comment(fmt::format("{}: taken with --force although {}; allowed: {:g} px",
+             ? as_comment(fmt::format("{}: accepted with --force although {}; allowed: {:g} px",
                                       not_to_be_relied_on, how, most_refit_px))
              : as_comment(how);
 }

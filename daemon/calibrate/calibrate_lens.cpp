@@ -33,7 +33,7 @@ void calibrate_lens(const ThinLensOptions& options, std::ostream& out) {
   for (const std::string& note : found.notes) out << note << '\n';
   if (facts.intrinsics) {
     const SharpRange sharp = sharp_range(found.lens, facts.intrinsics->fx, 1);
-    fmt::print(out, "sharp to a pixel from {:.3f} m to {:.3f} m\n", sharp.near_m, sharp.far_m);
+    fmt::print(out, "sharp to within 1 px from {:.3f} m to {:.3f} m\n", sharp.near_m, sharp.far_m);
   }
   write_tables(set::lens_toml(found.lens), options.table_file, out);
 }

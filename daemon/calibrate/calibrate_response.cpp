@@ -22,7 +22,7 @@ std::string codes(double error) {
 
 void print_response(const ResponseFit& fit, std::ostream& out) {
   fmt::print(out,
-             "{}: an exposure left out is predicted to {:.2f} codes of 255 (mean of medians); the "
+             "{}: a held-out exposure is predicted to {:.2f} codes of 255 (mean of medians); the "
              "curve does not rise at {} of {} steps\n",
              to_string(fit.method), fit.error_codes, fit.flat_steps, fit.brightest - fit.darkest);
   for (const LeftOut& one : fit.left_out)
@@ -98,7 +98,7 @@ void calibrate_response(const ResponseOptions& options, std::ostream& out) {
       print_response(fits.back(), out);
     }
   const ResponseFit& best = better_fit(fits);
-  fmt::print(out, "taken: {}; codes {} to {} were seen\n", to_string(best.method), best.darkest,
+  fmt::print(out, "chosen: {}; codes {} to {} observed\n", to_string(best.method), best.darkest,
              best.brightest);
   const ClipFit clip = fit_clip(bracket, best.curve);
   out << describe(clip);

@@ -15,23 +15,23 @@ namespace {
 constexpr double most_uneven = 0.03;
 
 void print_vignetting(const VignettingFit& fit, double max_angle_rad, std::ostream& out) {
-  out << "light that comes through, by angle off axis:";
+  out << "transmission by angle off axis:";
   for (int angle = 0; angle * degree <= max_angle_rad; angle += 15)
     fmt::print(out, " {} deg {:.3f}", angle, relative_illumination(fit.vignetting, angle * degree));
-  fmt::print(out, "\nleft unexplained: {:.2f} % (rms)\n", 100 * fit.rms);
+  fmt::print(out, "\nunexplained: {:.2f} % (rms)\n", 100 * fit.rms);
 }
 
 std::vector<std::string> missing_light(const VignettingFit& fit, double max_angle_rad) {
   std::vector<std::string> missing;
   if (fit.widest_rad < 0.95 * max_angle_rad)
     missing.push_back(
-        fmt::format("even light beyond {:.0f} degrees off axis (the lens is trusted "
+        fmt::format("even light beyond {:.0f} degrees off axis (the lens is valid "
                     "to {:.0f})",
                     fit.widest_rad / degree, max_angle_rad / degree));
   if (fit.rms > most_uneven)
     missing.push_back(
-        fmt::format("a light that is even: {:.1f} % are unexplained, at most {:.0f} % "
-                    "are noise",
+        fmt::format("even light: {:.1f} % is unexplained, at most {:.0f} % "
+                    "is noise",
                     100 * fit.rms, 100 * most_uneven));
   return missing;
 }

@@ -38,7 +38,7 @@ StatedDistance parse_distance(const std::string& text) {
       }
   }
   throw Error("distance \"" + text +
-              "\" is not understood; allowed: 0-3:1.234m, the middles of tags 0 and 3 apart, in "
+              "\" is not valid; allowed: 0-3:1.234m, from centre of tag 0 to centre of tag 3, in "
               "mm, cm, m or in");
 }
 
@@ -76,62 +76,60 @@ void print_sizes(const TagSurvey& survey, std::ostream& out) {
     if (std::abs(size_m / tag.stated_size_m - 1) > 1e-9)
       fmt::print(
           out,
-          "tag {} measures {:.2f} mm (certain to {:.2f} mm) beside the others, not {:.2f} mm "
-          "as stated: it is taken as measured\n",
+          "tag {} measures {:.2f} mm (accurate to {:.2f} mm) relative to the others, not {:.2f} mm "
+          "as given: using the measured size\n",
           tag.id, 1000 * size_m, 1000 * tag.size_sigma * size_m, 1000 * tag.stated_size_m);
   }
   if (std::abs(survey.size_factor - 1) > worth_a_word_of_size)
     fmt::print(out,
-               "by the stated distance all tags are {:.2f} % of their stated size; were they "
+               "by the given distance all tags are {:.2f} % of their given size; were they "
                "printed at 100 %?\n",
                100 * survey.size_factor);
 }
 
 void print_survey(const TagSurvey& survey, const set::Set& set, std::ostream& out) {
   for (const SurveyedTag& tag : survey.tags) {
-    fmt::print(out, "  tag {}: {} pictures from within {:.0f} degrees, rms {:.3f} px", tag.id,
+    fmt::print(out, "  tag {}: {} pictures spanning {:.0f} degrees, rms {:.3f} px", tag.id,
                tag.pictures, tag.views_rad / degree, tag.rms_px);
     if (tag.position_sigma_m > 0)
-      fmt::print(out, "; certain to {:.2f} mm and {:.3f} degrees", 1000 * tag.position_sigma_m,
+      fmt::print(out, "; accurate to {:.2f} mm, {:.3f} degrees", 1000 * tag.position_sigma_m,
                  tag.rotation_sigma_rad / degree);
     const auto before = std::ranges::find(set.tracking.tags, tag.id, &set::Tag::id);
     if (before != set.tracking.tags.end()) {
       const double moved_m =
           glm::distance(glm::dvec3(before->world_from_tag[3]), glm::dvec3(tag.world_from_tag[3]));
       if (moved_m > worth_a_word_m)
-        fmt::print(out, "; {:.1f} mm from where the set had it", 1000 * moved_m);
+        fmt::print(out, "; {:.1f} mm from its place in the set file", 1000 * moved_m);
     }
     out << '\n';
   }
   fmt::print(out,
-             "rms {:.3f} px over {} tags in {} pictures; {} of {} sightings left out; beside the "
+             "rms {:.3f} px over {} tags in {} pictures; {} of {} sightings rejected; beyond the "
              "pictures' noise, corners are off by {:.3f} px\n",
              survey.rms_px, survey.tags.size(), survey.pictures,
              survey.sightings - survey.sightings_used, survey.sightings, survey.model_error_px);
   print_sizes(survey, out);
   for (const MovedTag& moved : survey.moved)
-    fmt::print(out, "tag {} did not stay in one place and is left out: {}\n", moved.id,
-               words_of(moved));
+    fmt::print(out, "tag {} did not stay in place and is ignored: {}\n", moved.id, words_of(moved));
 }
 
 void print_refined(const RefinedLens& refined, std::ostream& out) {
-  if (!refined.is_refined) return fmt::print(out, "the lens stays as it is: {}\n", refined.why_not);
+  if (!refined.is_refined) return fmt::print(out, "the lens is not changed: {}\n", refined.why_not);
   fmt::print(
       out,
       "the lens is refined by boards and tags together: rms {:.3f} px, {}; it moves by {:.2f} "
-      "px in the corner of the picture, and is certain to {:.3f} px at worst ({:.3f} px by "
+      "px in the corner of the picture, and is accurate to {:.3f} px at worst ({:.3f} px by "
       "the boards alone)\n",
       refined.survey.rms_px,
       refined.rms_before_px > 0 ? fmt::format("before {:.3f} px", refined.rms_before_px)
                                 : "before no map fitted the pictures",
       refined.corner_moved_px, refined.sigma_px, refined.sigma_before_px);
   if (refined.boards_factor > 1)
-    fmt::print(
-        out,
-        "warning: tags and boards disagree about the lens by more than their noise explains, "
-        "so the boards count for less (deviations times {:.1f}): check that zoom and focus "
-        "are the same, boards and tags flat, and tags as large as stated\n",
-        std::sqrt(refined.boards_factor));
+    fmt::print(out,
+               "warning: tags and boards disagree about the lens by more than their noise, "
+               "so the boards count for less (deviations times {:.1f}): check that zoom and focus "
+               "are the same, boards and tags flat, and tags as large as given\n",
+               std::sqrt(refined.boards_factor));
 }
 
 // Refines the lens where the set has the statistics of its boards.
@@ -140,13 +138,13 @@ TagSurvey surveyed_with_lens(const TagWalk& walk, const PinholeIntrinsics& lens,
   const set::LensFit& table = set.observer.lens_fit;
   std::string why_not =
       table.values.empty()
-          ? "the set has no [observer.lens_fit], which calibrate observer prints; nothing says how "
-            "certain the lens is"
+          ? "the set has no [observer.lens_fit], which calibrate observer prints; the accuracy of "
+            "the lens is unknown"
           : why_not_of(lens_prior(table), lens);
   if (!why_not.empty()) {
     if (!table.values.empty())
       why_not = "[observer.lens_fit] is not of [observer.intrinsics]: " + why_not;
-    fmt::print(out, "the lens stays as it is: {}\n", why_not);
+    fmt::print(out, "the lens is not changed: {}\n", why_not);
     return survey_tags(walk, lens, how);
   }
   const RefinedLens refined = survey_tags_and_lens(walk, lens, how, lens_prior(table));
@@ -158,7 +156,7 @@ TagSurvey surveyed_with_lens(const TagWalk& walk, const PinholeIntrinsics& lens,
 
 void calibrate_tags(const TagsOptions& options, std::ostream& out) {
   if (options.write && !options.set_file)
-    throw Error("--write changes the set file that --set names; there is none");
+    throw Error("--write needs --set: it changes that set file");
   set::Set set;
   if (options.set_file) set = set::load_set(*options.set_file);
   const ObserverCalibration camera = known_observer(options.set_file, options.footage);
@@ -180,7 +178,8 @@ void calibrate_tags(const TagsOptions& options, std::ostream& out) {
     set::parse_set(text, *options.set_file);
     const auto old = set::keep_beside(*options.set_file);
     session::replace_file(*options.set_file, text);
-    fmt::print(out, "written into {}; as it was: {}\n", options.set_file->string(), old.string());
+    fmt::print(out, "written to {}; previous version: {}\n", options.set_file->string(),
+               old.string());
   }
   write_tables(lens_table(camera.intrinsics, survey.lens) + doubts + tag_tables(survey),
                options.table_file, out);

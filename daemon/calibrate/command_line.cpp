@@ -12,11 +12,11 @@ void add_lens_options(CLI::App& command, LensOptions& options) {
   command.add_option("footage", options.footage, "Session, folder of pictures, or video")
       ->required();
   command.add_option("--board", options.board, board_grammar);
-  command.add_option("--every", options.every, "Look at every Nth picture only")
+  command.add_option("--every", options.every, "Use only every Nth picture")
       ->check(CLI::Range(1, 1'000'000));
-  command.add_option("--out", options.table_file, "File for the set file's tables");
+  command.add_option("--out", options.table_file, "Write the tables to this file");
   command.add_option("--plot", options.residual_plot, "SVG file for the residuals");
-  command.add_flag("--force", options.force, "Accept the calibration although views are missing");
+  command.add_flag("--force", options.force, "Accept the calibration even if views are missing");
 }
 
 void add_observer(CLI::App& calibrate, LensOptions& options) {
@@ -27,10 +27,10 @@ void add_observer(CLI::App& calibrate, LensOptions& options) {
 
 void add_light(CLI::App& calibrate, LightOptions& options) {
   CLI::App& command =
-      *calibrate.add_subcommand("light", "The light camera's fisheye, and where it stands");
+      *calibrate.add_subcommand("light", "The light camera's fisheye lens and its pose");
   add_lens_options(command, options);
   command.add_option("--tags", options.tags_set,
-                     "Set file with the tags that it sees, to find where it stands");
+                     "Set file with the tags in view, to find its pose");
 }
 
 void add_response(CLI::App& calibrate, ResponseOptions& options) {
@@ -45,29 +45,29 @@ void add_response(CLI::App& calibrate, ResponseOptions& options) {
   command.add_option("--method", options.method, "debevec or robertson (default: the better one)")
       ->transform(CLI::CheckedTransformer(std::map<std::string, ResponseMethod>{
           {"debevec", ResponseMethod::debevec}, {"robertson", ResponseMethod::robertson}}));
-  command.add_option("--out", options.table_file, "File for the set file's table");
+  command.add_option("--out", options.table_file, "Write the table to this file");
 }
 
 void add_dark(CLI::App& calibrate, DarkOptions& options) {
   CLI::App& command = *calibrate.add_subcommand(
-      "dark", "The light camera's dark level, from pictures of the covered lens");
+      "dark", "The light camera's dark level, from pictures with the lens capped");
   command.add_option("footage", options.footage, "Session, folder of pictures, or video")
       ->required();
   command.add_option("--set", options.set_file,
                      "Set file with the camera's response (default: the session's)");
-  command.add_option("--out", options.table_file, "File for the set file's table");
+  command.add_option("--out", options.table_file, "Write the table to this file");
 }
 
 void add_vignetting(CLI::App& calibrate, VignettingOptions& options) {
   CLI::App& command = *calibrate.add_subcommand(
       "vignetting",
-      "How much light the fisheye loses towards its edge, from pictures of something evenly lit");
+      "The fisheye's light falloff towards its edge, from pictures of an evenly lit surface");
   command.add_option("footage", options.footage, "Session, folder of pictures, or video")
       ->required();
   command.add_option("--set", options.set_file, "Set file with its lens, response and dark level")
       ->required();
-  command.add_option("--out", options.table_file, "File for the set file's table");
-  command.add_flag("--force", options.force, "Accept the result although the light was not even");
+  command.add_option("--out", options.table_file, "Write the table to this file");
+  command.add_flag("--force", options.force, "Accept the result even if the light was uneven");
 }
 
 void add_lens(CLI::App& calibrate, ThinLensOptions& options) {
@@ -77,11 +77,11 @@ void add_lens(CLI::App& calibrate, ThinLensOptions& options) {
   command.add_option("--f-number", options.f_number, "The f-stop, as on the ring");
   command.add_option("--focus", options.focus_distance_m, "Focus distance, m");
   command.add_option("--sensor-width", options.sensor_width_mm,
-                     "Width of the sensor that the picture shows, mm");
+                     "Width of the sensor area in the picture, mm");
   command.add_option("--photo", options.photo,
-                     "Photograph whose EXIF data has what is not given here");
-  command.add_option("--set", options.set_file, "Set file with the observer's intrinsics");
-  command.add_option("--out", options.table_file, "File for the set file's table");
+                     "Photograph whose EXIF supplies the values not given");
+  command.add_option("--set", options.set_file, "Set file with the film camera's intrinsics");
+  command.add_option("--out", options.table_file, "Write the table to this file");
 }
 
 void add_from(CLI::App& calibrate, FromOptions& options) {
@@ -102,19 +102,19 @@ void add_from(CLI::App& calibrate, FromOptions& options) {
                      "Name or index (from 0) of a camera, if the file has several");
   command.add_option("--size", options.size,
                      "Size of the calibrated picture if the file does not have it: 1920x1080");
-  command.add_option("--out", options.table_file, "File for the set file's table");
+  command.add_option("--out", options.table_file, "Write the table to this file");
   command.add_flag("--force", options.force,
                    "Accept the lens although the camera's model is more than 0.1 px off");
 }
 
 void add_balance(CLI::App& calibrate, BalanceOptions& options) {
   CLI::App& command = *calibrate.add_subcommand(
-      "balance", "One scale and white balance between the cameras, and the colours of surfaces");
-  command.add_option("session", options.session, "Session directory")->required();
+      "balance", "Scale and white balance between the two cameras, and the colours of surfaces");
+  command.add_option("session", options.session, "Session folder")->required();
   command.add_option("--set", options.set_file, "Set file, instead of the session's own");
   command
       .add_option("--reference", options.references,
-                  "Materials of real objects whose colour is known (default: all count alike)")
+                  "Materials of real objects of known colour (default: all weigh the same)")
       ->delimiter(',');
   command.add_option("--frames", options.frames, "Pictures to compare")
       ->check(CLI::Range(1, 100))
@@ -122,42 +122,41 @@ void add_balance(CLI::App& calibrate, BalanceOptions& options) {
   command.add_option("--spp", options.samples, "Samples per pixel")
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
-  command.add_option("--device", options.device.name, "Vulkan device whose name contains this");
-  command.add_option("--out", options.table_file, "File for the set file's tables");
+  command.add_option("--device", options.device.name, "Vulkan device, by part of its name");
+  command.add_option("--out", options.table_file, "Write the tables to this file");
 }
 
 void add_tags(CLI::App& calibrate, TagsOptions& options) {
   CLI::App& command = *calibrate.add_subcommand(
-      "tags", "Where the tags are, from a walk with the film camera past all of them");
+      "tags", "Tag positions, from a walk past all tags with the film camera");
   command.add_option("footage", options.footage, "Session, folder of pictures, or video")
       ->required();
   command.add_option("--set", options.set_file,
-                     "Set file with the film camera's lens, and with the tags that are known");
+                     "Set file with the film camera's lens and any known tags");
   command.add_option("--size", options.sizes,
-                     "Side of the tags' black border, as measured: 80mm, or with those that "
-                     "differ 80mm,7:120mm (default: the set's)");
+                     "Side of the tags' black border, as measured: 80mm, or with exceptions "
+                     "80mm,7:120mm (default: the set file's)");
   command.add_option(
       "--origin", options.origin,
-      "Tag that defines the world: where the set has it, or else at the origin, face "
-      "up, X to its right (default: the set's first tag that is seen, or the lowest)");
-  command.add_option(
-      "--distance", options.distance,
-      "Distance between the middles of two tags, which gives all lengths: 0-3:1.234m "
-      "(default: the tags' sizes do)");
+      "Tag that defines the world: as in the set file, or else at the origin, face "
+      "up, X to its right (default: the set file's first visible tag, or the lowest id)");
+  command.add_option("--distance", options.distance,
+                     "Distance between the centres of two tags, which sets the scale: 0-3:1.234m "
+                     "(default: by the tags' sizes)");
   command.add_option("--family", options.family, "Tag family (default: the set's, or tag36h11)");
-  command.add_option("--every", options.every, "Look at every Nth picture only")
+  command.add_option("--every", options.every, "Use only every Nth picture")
       ->check(CLI::Range(1, 1'000'000));
-  command.add_option("--out", options.table_file, "File for the set file's tables");
+  command.add_option("--out", options.table_file, "Write the tables to this file");
   command.add_flag("--write", options.write,
-                   "Write the tags into the set file; the old file is kept beside it");
-  command.add_flag("--force", options.force, "Accept the map although pictures are missing");
+                   "Write the tags to the set file; keeps the old file beside it");
+  command.add_flag("--force", options.force, "Accept the map even if pictures are missing");
 }
 
 }  // namespace
 
 void add_calibrate(CLI::App& app, Commands& commands) {
   CLI::App& command = *app.add_subcommand(
-      "calibrate", "Measure a camera, or where the tags are; prints set file tables");
+      "calibrate", "Measure a camera or the tag positions; prints set file tables");
   command.require_subcommand(1);
   add_observer(command, commands.observer);
   add_light(command, commands.light);

@@ -47,8 +47,8 @@ std::string field_name(int column, int row) {
 void miss_number(const Views& views, const BundleFit& fit, std::vector<std::string>& missing) {
   const auto used = int(views.views.size() - fit.views_left_out.size());
   if (used < least_views)
-    missing.push_back("more views: " + std::to_string(used) + " different ones can be used, " +
-                      std::to_string(least_views) + " are needed and 20 are good");
+    missing.push_back("more views: " + std::to_string(used) + " different ones are usable, " +
+                      std::to_string(least_views) + " are needed, 20 recommended");
 }
 
 void miss_picture(const Views& views, const BundleFit& fit, std::vector<std::string>& missing) {
@@ -64,7 +64,7 @@ void miss_picture(const Views& views, const BundleFit& fit, std::vector<std::str
   for (int row = 0; row < cover_rows; ++row)
     for (int column = 0; column < cover_columns; ++column)
       if (!seen[row][column]) add_to_list(empty, field_name(column, row));
-  if (!empty.empty()) missing.push_back("the board in these fields of the picture: " + empty);
+  if (!empty.empty()) missing.push_back("the board in these areas of the picture: " + empty);
 }
 
 void miss_tilt(const BundleFit& fit, std::vector<std::string>& missing) {
@@ -79,8 +79,7 @@ void miss_tilt(const BundleFit& fit, std::vector<std::string>& missing) {
       high[axis] = std::max(high[axis], tilt);
     }
   }
-  constexpr const char* how[] = {"turned to the left and to the right",
-                                 "tipped forwards and backwards"};
+  constexpr const char* how[] = {"turned left and right", "tipped forwards and backwards"};
   for (int axis = 0; axis < 2; ++axis)
     if (const double spread = high[axis] - low[axis]; spread < least_tilt_spread)
       missing.push_back(std::string("the board ") + how[axis] + ": all views lie within " +
@@ -105,9 +104,9 @@ void miss_distance(const Views& views, const BundleFit& fit, std::vector<std::st
   }
   if (near < least_near_views)
     missing.push_back(
-        "the board from nearer: it must reach across a third of the picture in at "
+        "the board from closer: it must span a third of the picture in at "
         "least " +
-        std::to_string(least_near_views) + " views (the largest reaches " +
+        std::to_string(least_near_views) + " views (the largest spans " +
         number("%.0f", 100 * largest) + " %)");
 }
 
@@ -117,9 +116,9 @@ void miss_certainty(std::vector<UncertainPixel> picture, std::vector<std::string
   std::ranges::nth_element(picture, middle, {}, &UncertainPixel::sigma_px);
   if (middle->sigma_px > certain_px)
     missing.push_back(
-        "more views, or sharper and flatter ones: over half of the picture the lens "
-        "is certain to " +
-        number("%.1f", middle->sigma_px) + " px only");
+        "more views, or sharper ones of a flatter board: over half the picture the lens "
+        "is accurate only to " +
+        number("%.1f", middle->sigma_px) + " px");
 }
 
 // Says where the picture is least certain and why.
@@ -128,7 +127,7 @@ std::string worst_words(const ObserverFit& observer) {
   return number("%.1f", worst->sigma_px) + " px near " + number("%.0f", worst->pixel.x) + ", " +
          number("%.0f", worst->pixel.y) + " (the farthest corner of the board was seen " +
          number("%.0f", 100 * observer.reach) +
-         " % of the way from the picture's middle to its corners)";
+         " % of the way from the picture's centre to its corners)";
 }
 
 void miss_worst(const ObserverFit& observer, std::vector<std::string>& missing) {
@@ -149,8 +148,8 @@ std::vector<std::string> doubts_of(const ObserverFit& observer) {
   else if (observer.reach < least_reach)
     doubts.push_back("no corner of the board was seen beyond " +
                      number("%.0f", 100 * observer.reach) +
-                     " % of the way from the picture's middle to its corners: farther out the lens "
-                     "is a guess, however certain it seems; film the board there, too");
+                     " % of the way from the picture's centre to its corners: farther out the lens "
+                     "is a guess, however accurate it seems; film the board there, too");
   return doubts;
 }
 
@@ -178,10 +177,9 @@ std::string why_useless(const ObserverFit& by_few) {
   const std::size_t used = fit.bundle.poses.size() - fit.views_left_out.size();
   const double f = fit.bundle.lens[0], sigma = lens_sigma(fit)[0];
   if (used > 1 && sigma < certain_focal_length * f) return {};
-  return "the focal length is not determined (" + number("%.0f", f) + " +- " +
-         number("%.0f", sigma) + " px, by " + std::to_string(used) +
-         (used == 1 ? " view" : " views") +
-         "), which --force does not change: film the board turned to the left and to the right, "
+  return "the focal length is undetermined (" + number("%.0f", f) + " +- " + number("%.0f", sigma) +
+         " px, from " + std::to_string(used) + (used == 1 ? " view" : " views") +
+         "), even with --force: film the board turned left and right, "
          "and "
          "tipped forwards and backwards";
 }
@@ -193,16 +191,16 @@ std::vector<std::string> missing_views(const Views& views, const FisheyeFit& fis
   for (const double reach : fisheye.sector_reach_rad)
     if (reach >= least_fisheye_reach_rad) ++reached;
   if (reached < least_fisheye_sectors)
-    missing.push_back(
-        "the board near the edge of the picture circle, all around: corners come to " +
-        number("%.0f", least_fisheye_reach_rad / coverage_degree) + " degrees off axis in " +
-        std::to_string(reached) + " of 8 directions around it, at least " +
-        std::to_string(least_fisheye_sectors) + " are needed (the widest is at " +
-        number("%.1f", fisheye.widest_corner_rad / coverage_degree) + ")");
+    missing.push_back("the board near the edge of the image circle, all around: corners reach " +
+                      number("%.0f", least_fisheye_reach_rad / coverage_degree) +
+                      " degrees off axis in " + std::to_string(reached) +
+                      " of 8 directions, at least " + std::to_string(least_fisheye_sectors) +
+                      " are needed (the widest is at " +
+                      number("%.1f", fisheye.widest_corner_rad / coverage_degree) + ")");
   if (missing.empty() && fisheye.uncertain_from_rad < least_fisheye_reach_rad)
     missing.push_back("more or sharper views: beyond " +
                       number("%.0f", fisheye.uncertain_from_rad / coverage_degree) +
-                      " degrees off axis the lens is not certain to 1 px");
+                      " degrees off axis the lens is not accurate to 1 px");
   return missing;
 }
 

@@ -77,7 +77,7 @@ struct Parts {
     }
     if (brightest - darkest > std::max(0.1 * level, 1.0 / 255))
       throw Error(
-          fmt::format("light gets in: a part of the pictures shows {:.4f} of white, another "
+          fmt::format("light leak: part of the pictures is at {:.4f} of white, another at "
                       "{:.4f}; cover the lens",
                       brightest, darkest));
   }
@@ -88,7 +88,7 @@ DarkSums sums_of(PictureSource& source, const ResponseCurve& response) {
   while (const std::optional<NamedFrame> next = source.next()) {
     const SignalPicture picture = read_signals(next->frame, response);
     if (sums.pictures > 0 && (picture.width != sums.width || picture.height != sums.height))
-      throw Error(fmt::format("{}: has {}x{} pixels, those before {}x{}", next->name, picture.width,
+      throw Error(fmt::format("{}: has {}x{} pixels, earlier ones {}x{}", next->name, picture.width,
                               picture.height, sums.width, sums.height));
     sums.add(picture);
   }
@@ -122,7 +122,7 @@ DarkFit fit_dark(PictureSource& source, const ResponseCurve& response) {
   parts.insist_on_darkness((fit.level.r + fit.level.g + fit.level.b) / 3);
   if (std::max({fit.level.r, fit.level.g, fit.level.b}) > max_dark_level)
     throw Error(
-        fmt::format("the pictures show {:.3f} of white, more than {:g}: the lens is not "
+        fmt::format("the pictures are at {:.3f} of white, above {:g}: the lens is not "
                     "covered",
                     std::max({fit.level.r, fit.level.g, fit.level.b}), max_dark_level));
   return fit;

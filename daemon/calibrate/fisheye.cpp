@@ -68,7 +68,7 @@ Bundle started(const Views& views) {
     if (start.error_px < best.error_px) best = std::move(start);
   }
   if (best.bundle.poses.empty())
-    throw Error("no fisheye lens explains the corners: is the board the one that --board says?");
+    throw Error("no fisheye lens fits the corners: does the board match --board?");
   return best.bundle;
 }
 

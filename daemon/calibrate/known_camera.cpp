@@ -31,9 +31,10 @@ ObserverCalibration known_observer(const std::optional<std::filesystem::path>& s
     if (const auto calibration = set::load_set(*set_file).observer.calibration) return *calibration;
   if (is_session(footage))
     if (const auto calibration = session::open_session(footage).info.observer) return *calibration;
-  throw Error((set_file ? set_file->string() : footage.string()) +
-              ": observer.intrinsics: the film camera's lens is not known; name a set file by "
-              "--set that has the table, which `previzd calibrate observer` prints");
+  throw Error(
+      (set_file ? set_file->string() : footage.string()) +
+      ": observer.intrinsics: the film camera has no lens calibration; give a set file with "
+      "--set that has this table, as `previzd calibrate observer` prints it");
 }
 
 LightCameraCalibration known_light_camera(const set::Set& set,
@@ -44,8 +45,8 @@ LightCameraCalibration known_light_camera(const set::Set& set,
   if (!calibration)
     throw Error(
         set.file.string() +
-        ": light_camera.intrinsics: the light camera's lens is not known; it needs the table "
-        "in the set, which `previzd calibrate light --board` prints");
+        ": light_camera.intrinsics: the light camera has no lens calibration; put this table "
+        "in the set file, as `previzd calibrate light --board` prints it");
   return *calibration;
 }
 

@@ -159,7 +159,7 @@ void note_region(const Tree& map, std::vector<std::string>& notes) {
   if (is_set(map.find("binning_x")) || is_set(map.find("binning_y")) ||
       (roi && is_set(roi->find("width"))))
     notes.push_back(
-        "warning: the file states binning or a region of interest (roi), which are ignored: the "
+        "warning: the file gives binning or a region of interest (roi), which are ignored: the "
         "lens is that of the camera's full picture");
 }
 

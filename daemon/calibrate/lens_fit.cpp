@@ -21,7 +21,7 @@ Found one_of(const std::optional<double>& stated, const std::optional<double>& f
              const std::string& what) {
   if (stated) return {*stated, "stated"};
   if (from_photo) return {*from_photo, "the photograph's EXIF"};
-  throw Error("the lens's " + what + " is not known; state it, or give a photograph that does");
+  throw Error("the lens's " + what + " is unknown; give it, or a photograph with EXIF data");
 }
 
 // Computes the focal length from the calibrated image distance; returns nothing without the
@@ -46,8 +46,8 @@ LensFound find_lens(const LensFacts& facts) {
                           : Found{*computed, "the calibration and the sensor's width"};
   found.lens = {focal.value, stop.value, focus.value};
   if (!(found.lens.focus_distance_m > found.lens.focal_length_m))
-    throw Error(fmt::format("the focus at {} m is not beyond the focal length of {} mm",
-                            focus.value, 1000 * focal.value));
+    throw Error(fmt::format("focus distance {} m must exceed the focal length {} mm", focus.value,
+                            1000 * focal.value));
   found.notes = {fmt::format("focal length {:.2f} mm: {}", 1000 * focal.value, focal.source),
                  fmt::format("f-number {:g}: {}", stop.value, stop.source),
                  fmt::format("focus distance {:g} m: {}", focus.value, focus.source)};

@@ -50,7 +50,7 @@ Sighting look(PictureSource& source, const FisheyeIntrinsics& intrinsics,
     const Frame& frame = *picture->frame;
     if (frame.width != intrinsics.width || frame.height != intrinsics.height)
       throw Error(picture->name + ": has " + std::to_string(frame.width) + "x" +
-                  std::to_string(frame.height) + " pixels, the light camera's lens is known for " +
+                  std::to_string(frame.height) + " pixels, the light camera is calibrated for " +
                   std::to_string(intrinsics.width) + "x" + std::to_string(intrinsics.height));
     const std::size_t before = sighting.ids.size();
     for (const auto& seen : detect_in_fisheye(frame, intrinsics, response, settings)) {
@@ -152,18 +152,17 @@ LightPose find_light_pose(PictureSource& source, const FisheyeIntrinsics& intrin
   const Sighting sighting = look(source, intrinsics, response, tracking);
   const std::vector<int> ids = different(sighting.ids);
   if (ids.size() < 2)
-    throw Error(ids.empty()
-                    ? "the light camera sees no tag of the set"
-                    : "the light camera sees only tag " + std::to_string(ids[0]) +
-                          " of the set; two are needed, a single one is explained by two poses");
+    throw Error(ids.empty() ? "the light camera sees none of the set's tags"
+                            : "the light camera sees only tag " + std::to_string(ids[0]) +
+                                  " of the set; it needs two, because one tag fits two poses");
   LightPose pose;
   pose.pictures = sighting.pictures;
   pose.tags = consistent_tags(sighting, ids, intrinsics);
   std::ranges::set_difference(ids, pose.tags, std::back_inserter(pose.left_out));
   if (pose.tags.size() < 2)
     throw Error(
-        "the tags that the light camera sees contradict each other: is one of them not "
-        "where the set says?");
+        "the tags that the light camera sees disagree: is one of them not "
+        "where the set file says?");
   const BundleFit fit = *fit_to(sighting, pose.tags, intrinsics);
   pose.world_from_camera = tracking::world_from_camera(fit.bundle.poses[0]);
   pose.rms_px = fit.rms_px;

@@ -24,7 +24,7 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_by_name(const std::string& name) {
     if (name == entry.name) return cv::aruco::getPredefinedDictionary(entry.id);
     add_to_list(names, entry.name);
   }
-  throw Error("board: \"" + name + "\" is not a dictionary of markers; known are " + names);
+  throw Error("board: \"" + name + "\" is not a marker dictionary; known: " + names);
 }
 
 }  // namespace

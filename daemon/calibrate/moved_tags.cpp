@@ -218,7 +218,7 @@ std::optional<MovedTag> most_moved_tag(const TagWalk& walk, const PinholeIntrins
 
 std::string words_of(const MovedTag& moved) {
   if (moved.until.empty())
-    return fmt::format("no place explains its pictures, some are off by {:.1f} px", moved.off_px);
+    return fmt::format("no position fits its pictures, some are off by {:.1f} px", moved.off_px);
   return fmt::format("moved by {:.1f} mm and {:.1f} degrees between {} and {}",
                      1000 * moved.distance_m, moved.angle_rad / degree, moved.until, moved.since);
 }

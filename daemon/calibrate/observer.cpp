@@ -61,7 +61,7 @@ Bundle started_lens(const Views& views) {
     cv::Mat turn, shift;
     if (!cv::solvePnP(all[v].points, all[v].pixels, camera, cv::noArray(), turn, shift, false,
                       cv::SOLVEPNP_IPPE))
-      throw Error(views.views[v].name + ": no pose of the board explains its corners");
+      throw Error(views.views[v].name + ": no board pose fits its corners");
     start.poses.push_back(from_opencv(turn, shift));
   }
   return start;

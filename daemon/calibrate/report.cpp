@@ -17,11 +17,11 @@ void print_views(const Views& views, const BundleFit& fit, std::ostream& out) {
   for (std::size_t v = 0; v < views.views.size(); ++v) {
     const auto left_out = std::ranges::count(fit.used[v], false);
     if (std::ranges::find(fit.views_left_out, v) != fit.views_left_out.end())
-      fmt::print(out, "  {}: left out, most of its corners do not fit\n", views.views[v].name);
+      fmt::print(out, "  {}: rejected, most of its corners do not fit\n", views.views[v].name);
     else
       fmt::print(out, "  {}: rms {:.3f} px, {} corners{}\n", views.views[v].name,
                  view_rms_px(fit, v), fit.used[v].size() - std::size_t(left_out),
-                 left_out ? fmt::format(", {} left out", left_out) : "");
+                 left_out ? fmt::format(", {} rejected", left_out) : "");
   }
 }
 
@@ -30,7 +30,7 @@ void print_certainty(std::vector<UncertainPixel> picture, std::ostream& out) {
   std::ranges::sort(picture, {}, &UncertainPixel::sigma_px);
   const UncertainPixel& worst = picture.back();
   fmt::print(out,
-             "projection certain to {:.3f} px over half of the picture, {:.3f} px at worst "
+             "projection accurate to {:.3f} px over half the picture, {:.3f} px at worst "
              "(near {:.0f}, {:.0f})\n",
              picture[picture.size() / 2].sigma_px, worst.sigma_px, worst.pixel.x, worst.pixel.y);
 }
@@ -41,7 +41,7 @@ void print_fit(const Views& views, const BundleFit& fit, std::span<const char* c
                std::vector<UncertainPixel> picture, std::ostream& out) {
   print_views(views, fit, out);
   fmt::print(out,
-             "rms {:.3f} px over {} corners of {} views; {} of {} corners left out (farther off "
+             "rms {:.3f} px over {} corners of {} views; {} of {} corners rejected (farther off "
              "than 4.5 robust standard deviations and 1 px)\n",
              fit.rms_px, fit.corners_used, views.views.size() - fit.views_left_out.size(),
              fit.corners - fit.corners_used, fit.corners);
@@ -74,9 +74,10 @@ std::string insist(const std::vector<std::string>& missing, bool force, std::ost
   if (missing.empty()) return {};
   std::string text = "these views are missing:";
   for (const std::string& what : missing) text += "\n  " + what;
-  if (!force) throw Error(text + "\n(--force takes the calibration as it is)");
+  if (!force) throw Error(text + "\n(--force accepts the calibration anyway)");
   fmt::print(out, "{}\n", text);
-  return as_comment(fmt::format("{}: taken with --force although {}", not_to_be_relied_on, text));
+  return as_comment(
+      fmt::format("{}: accepted with --force although {}", not_to_be_relied_on, text));
 }
 
 std::string warn(const std::vector<std::string>& doubts, std::ostream& out) {

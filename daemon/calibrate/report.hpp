@@ -23,7 +23,7 @@ void print_fit(const Views& views, const BundleFit& fit, std::span<const char* c
                std::vector<UncertainPixel> picture, std::ostream& out);
 
 // How the comment of a calibration that was forced begins.
-inline constexpr const char* not_to_be_relied_on = "NOT TO BE RELIED ON";
+inline constexpr const char* not_to_be_relied_on = "UNRELIABLE";
 
 // Throws previz::Error naming what is missing. With `force` it prints that on `out` instead, and
 // returns it as a comment for the table, which is empty if nothing is missing.

@@ -48,7 +48,7 @@ std::string certainty_svg(const std::vector<UncertainPixel>& picture, double sca
   for (const UncertainPixel& at : picture)
     svg += fmt::format(
         "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"12\" fill=\"#e8a33d\" fill-opacity=\"{:.2f}\">"
-        "<title>certain to {:.3f} px</title></circle>\n",
+        "<title>accurate to {:.3f} px</title></circle>\n",
         at.pixel.x * scale, at.pixel.y * scale, std::min(0.9, at.sigma_px), at.sigma_px);
   return svg;
 }
@@ -113,7 +113,7 @@ std::string residual_plot_svg(const Views& views, const BundleFit& fit,
              "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
              "<g transform=\"translate({} {})\">\n"
              "<text x=\"0\" y=\"-14\">{}: rms {:.3f} px, residuals {:g} times enlarged, "
-             "{} of {} corners left out (red); shades: uncertainty, dark is 1 px</text>\n",
+             "{} of {} corners rejected (red); shades: uncertainty, dark is 1 px</text>\n",
              plot_width + 2 * margin, bars_top + bar_height + 2 * margin, style, margin, margin,
              escaped(title), fit.rms_px, enlarged, fit.corners - fit.corners_used, fit.corners) +
          certainty_svg(picture, scale) + residuals_svg(views, fit, scale, enlarged) +

@@ -72,8 +72,8 @@ Samples choose(std::span<const BracketPicture> bracket) {
   }
   if (usable.size() < least_samples)
     throw Error("only " + std::to_string(usable.size()) +
-                " pixels get brighter with the exposure and are seen in two of them; did camera "
-                "and scene stand still, and are the exposures what the pictures were taken with?");
+                " pixels brighten with exposure and are usable in two pictures; did the camera "
+                "and the scene stay still, and are the given exposures right?");
   Samples samples(bracket.size());
   for (const std::size_t p : spread(bracket, usable, most_pixels))
     for (std::size_t e = 0; e < bracket.size(); ++e)
@@ -255,7 +255,7 @@ std::vector<std::string> doubts_of(const ResponseFit& fit, std::optional<int> cl
   std::vector<std::string> doubts;
   if (fit.error_codes > certain_codes)
     doubts.push_back(fmt::format(
-        "an exposure left out is predicted only to {:.1f} codes: the light changed, something "
+        "a held-out exposure is predicted only to {:.1f} codes: the light changed, something "
         "moved, or the camera changed more than the time (its aperture, gain or white balance was "
         "automatic, or it sharpens and lifts shadows)",
         fit.error_codes));

@@ -80,7 +80,7 @@ std::vector<fs::path> picture_files(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder))
     if (entry.is_regular_file() && is_picture(entry.path())) files.push_back(entry.path());
   if (files.empty())
-    throw Error(folder.string() + ": there is no picture in it; allowed: PNG, JPEG, TIFF");
+    throw Error(folder.string() + ": contains no pictures; allowed: PNG, JPEG, TIFF");
   std::ranges::sort(files);
   return files;
 }
@@ -94,8 +94,7 @@ std::unique_ptr<PictureSource> open_source(const fs::path& path, const std::stri
   }
   if (fs::is_regular_file(path))
     return std::make_unique<FootagePictures>(exchange::open_video(path), std::nullopt);
-  throw Error(path.string() +
-              ": there is no such thing; allowed: a session, a folder of pictures, a video");
+  throw Error(path.string() + ": not found; allowed: a session, a folder of pictures, a video");
 }
 
 }  // namespace previz::calibrate

@@ -152,7 +152,7 @@ class Probe {
     }
     if (found_.frames == 0)
       throw Error(take_.session.directory.string() +
-                  ": no frame has both a pose and light: there is nothing to balance by");
+                  ": no frame has both a pose and light: nothing to balance");
     return std::move(found_);
   }
 

@@ -332,7 +332,7 @@ cv::Mat1d reduced_inverse(const TagProblem& problem, const TagEquations& all) {
     scale(r) = matrix(r, r) > 0 ? 1 / std::sqrt(matrix(r, r)) : 1;
   const cv::Mat1d scales_of_both = scale * scale.t();
   if (!cv::invert(matrix.mul(scales_of_both), inverse, cv::DECOMP_CHOLESKY))
-    throw Error("the pictures do not determine where the tags are: film them from more sides");
+    throw Error("the pictures do not fix the tags' positions: film them from more sides");
   inverse = inverse.mul(scales_of_both);
   for (int r = 0; r < matrix.rows; ++r)
     if (problem.diagonal(all, r) == 0) {

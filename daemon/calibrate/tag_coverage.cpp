@@ -29,22 +29,22 @@ void miss_unseen(const TagSurvey& survey, const std::vector<int>& wanted,
   }
   if (!unseen.empty())
     missing.push_back(tracking::tags_in_words(unseen) +
-                      ", in pictures that show another tag as well: the set has them, and no "
-                      "picture does");
+                      ", together with another tag: they are in the set file, but in no "
+                      "picture");
 }
 
 void miss_links(const TagSurvey& survey, int origin, std::vector<std::string>& missing) {
   for (const std::vector<int>& group : survey.apart)
     missing.push_back(tracking::tags_in_words(group) +
-                      " together with others: step back, or stick a tag halfway, until a picture "
-                      "shows one of them and one that is linked to tag " +
+                      " together with others: step back, or add a tag halfway, until a picture "
+                      "shows one of them and one already linked to tag " +
                       std::to_string(origin));
 }
 
 void miss_moved(const TagSurvey& survey, std::vector<std::string>& missing) {
   for (const MovedTag& moved : survey.moved)
     missing.push_back("tag " + std::to_string(moved.id) +
-                      " once more, when it is fastened: " + words_of(moved));
+                      " again, once it is fixed in place: " + words_of(moved));
 }
 
 // Adds what a single tag lacks; returns whether that is nothing.
@@ -53,14 +53,14 @@ bool miss_of_tag(const SurveyedTag& tag, std::vector<std::string>& missing) {
   const std::size_t before = missing.size();
   if (tag.pictures < least_pictures_of_tag)
     missing.push_back(
-        fmt::format("{} in more pictures: {} can be used, {} are needed and 10 are "
-                    "good",
+        fmt::format("{} in more pictures: {} are usable, {} are needed and 10 are "
+                    "recommended",
                     name, tag.pictures, least_pictures_of_tag));
   else if (tag.views_rad < least_views_of_tag)
-    missing.push_back(fmt::format(
-        "{} from further to the side: walk around it; all its pictures are from within {:.0f} "
-        "degrees, at least {:.0f} are needed",
-        name, tag.views_rad / degree, least_views_of_tag / degree));
+    missing.push_back(
+        fmt::format("{} from further to the side: walk around it; its pictures span only {:.0f} "
+                    "degrees, at least {:.0f} are needed",
+                    name, tag.views_rad / degree, least_views_of_tag / degree));
   return missing.size() == before;
 }
 
@@ -87,8 +87,8 @@ void miss_certainty(const TagSurvey& survey, const std::vector<const SurveyedTag
   }
   for (const SurveyedTag* tag : uncertain)
     missing.push_back(fmt::format(
-        "tag {} from nearer, with others beside it: it is certain to {:.1f} mm and {:.2f} "
-        "degrees only",
+        "tag {} from closer, with others beside it: accurate only to {:.1f} mm and {:.2f} "
+        "degrees",
         tag->id, 1000 * tag->position_sigma_m, tag->rotation_sigma_rad / degree));
 }
 

@@ -26,8 +26,8 @@ constexpr double size_gate = 0.015, size_gate_sigmas = 4;
 std::size_t index_of(const TagWalk& walk, int id) {
   const auto found = std::ranges::find(walk.ids, id);
   if (found == walk.ids.end())
-    throw Error("tag " + std::to_string(id) + " is in no picture; seen are " +
-                tracking::tags_in_words(walk.ids));
+    throw Error("tag " + std::to_string(id) +
+                " is in no picture; visible: " + tracking::tags_in_words(walk.ids));
   return std::size_t(found - walk.ids.begin());
 }
 
@@ -171,8 +171,8 @@ std::vector<double> settle_sizes(Surveying& state) {
 void insist_that_it_stays(const Surveying& state, const MovedTag& moved) {
   if (moved.id == state.walk.ids[state.origin])
     throw Error("tag " + std::to_string(moved.id) +
-                ", which defines the world, did not stay in one place (" + words_of(moved) +
-                "); fasten it and film again, or choose another by --origin");
+                ", which defines the world, did not stay in place (" + words_of(moved) +
+                "); fix it in place and film again, or choose another with --origin");
 }
 
 // Returns how a tag that was taken out moved, seen by cameras that the other tags place: before
@@ -199,8 +199,8 @@ std::vector<MovedTag> take_out_moved(Surveying& state, std::vector<std::vector<i
     const TagWalk before = state.walk;
     if (tags >= 3 && 2 * all.size() > tags)
       throw Error(
-          "most of the tags seem not to stay in one place: is the lens's calibration that "
-          "of this camera, at this zoom and focus?");
+          "most of the tags seem to move: is the lens calibration the one "
+          "for this camera, at this zoom and focus?");
     keep_sightings(state.walk,
                    [&](const TagSighting& seen) { return state.walk.ids[seen.tag] != moved->id; });
     for (std::vector<int>& group : take_out_unlinked(state.walk, state.origin))
@@ -350,8 +350,8 @@ void measure_lens(const Surveying& state, TagSurvey& survey) {
 void insist_on_lens(const TagSurvey& survey, const PinholeIntrinsics& lens) {
   if (survey.rms_px <= tracking::consistency_gate_px(lens)) return;
   throw Error(
-      fmt::format("no map explains the pictures: at best, corners are off by {:.1f} px; is "
-                  "the lens's calibration that of this camera, at this zoom and focus?",
+      fmt::format("no map fits the pictures: at best, corners are off by {:.1f} px; is "
+                  "the lens calibration the one for this camera, at this zoom and focus?",
                   survey.rms_px));
 }
 
@@ -359,7 +359,7 @@ const SurveyedTag& tag_by_id(const TagSurvey& survey, int id) {
   const auto found = std::ranges::find(survey.tags, id, &SurveyedTag::id);
   if (found == survey.tags.end())
     throw Error("tag " + std::to_string(id) +
-                " of the stated distance has no place: it was not seen, moved, or is not linked "
+                " of --distance has no position: it was not seen, moved, or is not linked "
                 "to the others");
   return *found;
 }
@@ -389,7 +389,7 @@ TagSurvey survey_tags(const TagWalk& walk, const PinholeIntrinsics& lens,
   survey.apart = take_out_unlinked(state.walk, state.origin);
   if (count_of_tags(state.walk) < 2)
     throw Error("no picture shows another tag together with tag " + std::to_string(options.origin) +
-                "; seen are " + tracking::tags_in_words(walk.ids));
+                "; visible: " + tracking::tags_in_words(walk.ids));
   state.places = start_of_tags(state.walk, lens, state.origin);
   const std::vector<double> size_sigma = settle_sizes(state);
   state.adjust_robustly();

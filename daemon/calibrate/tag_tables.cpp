@@ -107,7 +107,7 @@ std::string tag_tables(const TagSurvey& survey) {
   for (const SurveyedTag& tag : survey.tags) {
     if (!text.empty()) text += '\n';
     text += tag.position_sigma_m > 0
-                ? fmt::format("# certain to {:.2f} mm and {:.3f} degrees, from {} pictures\n",
+                ? fmt::format("# accurate to {:.2f} mm, {:.3f} degrees, from {} pictures\n",
                               1000 * tag.position_sigma_m, tag.rotation_sigma_rad / degree,
                               tag.pictures)
                 : fmt::format("# defines the world; in {} pictures\n", tag.pictures);

@@ -25,7 +25,7 @@ void insist_on_size(const NamedFrame& picture, const PinholeIntrinsics& lens) {
   const Frame& frame = *picture.frame;
   if (frame.width == lens.width && frame.height == lens.height) return;
   throw Error(picture.name + ": has " + std::to_string(frame.width) + "x" +
-              std::to_string(frame.height) + " pixels, the film camera's lens is known for " +
+              std::to_string(frame.height) + " pixels, the film camera is calibrated for " +
               std::to_string(lens.width) + "x" + std::to_string(lens.height));
 }
 
@@ -67,7 +67,7 @@ void number_tags(const std::vector<SeenTag>& seen, const TagSizes& sizes, TagWal
   }
   if (!unknown.empty())
     throw Error("the size of " + tracking::tags_in_words(unknown) +
-                " is not known: give --size 80mm (the side of the black border, measured), or "
+                " is unknown: give --size 80mm (the side of the black border, measured), or "
                 "--size " +
                 std::to_string(unknown.front()) + ":80mm for one of them");
   for (const SeenTag& tag : seen) {
@@ -97,8 +97,8 @@ TagSizes parse_tag_sizes(const std::string& text) {
     const bool has_id = colon != std::string::npos;
     if (!length || (has_id && (read.ec != std::errc{} || read.ptr != end || id < 0)))
       throw Error("size \"" + part +
-                  "\" is not understood; allowed: 80mm (of all tags) or 7:80mm "
-                  "(of tag 7), in mm, cm, m or in, with commas between");
+                  "\" is not valid; allowed: 80mm (all tags) or 7:80mm "
+                  "(tag 7), in mm, cm, m or in, separated by commas");
     if (has_id)
       sizes.by_id_m[id] = *length;
     else
@@ -128,10 +128,10 @@ TagWalk gather_walk(PictureSource& source, const PinholeIntrinsics& lens,
     walk.pictures.push_back(picture->name);
   }
   if (seen.empty())
-    throw Error("none of the " + std::to_string(looked_at) + " pictures looked at shows a tag of " +
+    throw Error("none of the " + std::to_string(looked_at) + " pictures examined shows a tag of " +
                 options.detector.family + " that can be measured");
   number_tags(seen, options.sizes, walk);
-  report(std::to_string(looked_at) + " of " + std::to_string(index) + " pictures looked at, " +
+  report(std::to_string(looked_at) + " of " + std::to_string(index) + " pictures examined, " +
          std::to_string(walk.pictures.size()) + " show tags: " + tracking::tags_in_words(walk.ids));
   for (const std::string& note : source.notes()) report(note);
   return walk;

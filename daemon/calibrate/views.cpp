@@ -53,9 +53,10 @@ std::vector<View> thinned(std::vector<View> views, std::size_t count) {
 std::string why_nowhere(const Views& gathered, const Board& board, const ResponseCurve& response) {
   if (const std::string other = other_board(gathered.sampled, board, response); !other.empty())
     return ": " + other;
-  return ", and nothing like it: it must be wholly in view, sharp, evenly lit, and large (a square "
-         "or a tag's cell of ten pixels or more). A chessboard with tags at a few places only is "
-         "none of the boards that are known";
+  return ", and nothing like it: it must be entirely in view, sharp, evenly lit, and large (a "
+         "square "
+         "or a tag's cell of ten pixels or more). A chessboard with tags in only a few places is "
+         "not a supported board";
 }
 
 }  // namespace
@@ -75,9 +76,9 @@ Views gather_views(PictureSource& source, BoardFinder& finder, const Board& boar
       gathered.height = frame.height;
     } else if (frame.width != gathered.width || frame.height != gathered.height) {
       throw Error(picture->name + ": has " + std::to_string(frame.width) + "x" +
-                  std::to_string(frame.height) + " pixels, the pictures before it " +
+                  std::to_string(frame.height) + " pixels, earlier pictures " +
                   std::to_string(gathered.width) + "x" + std::to_string(gathered.height) +
-                  "; a calibration holds for one size");
+                  "; a calibration is for one size");
     }
     if (std::has_single_bit(looked_at) && gathered.sampled.size() < most_sampled)
       gathered.sampled.push_back(picture->frame);
@@ -87,9 +88,8 @@ Views gather_views(PictureSource& source, BoardFinder& finder, const Board& boar
         taken, [&](const BoardCorners& other) { return largest_move(corners, other) < same; });
     if (corners.ids.size() < least_corners) {
       report(picture->name + ": " +
-             (corners.ids.empty()
-                  ? "no board"
-                  : std::to_string(corners.ids.size()) + " corners only, left out"));
+             (corners.ids.empty() ? "no board"
+                                  : std::to_string(corners.ids.size()) + " corners only, skipped"));
     } else if (!is_new) {
       ++alike;
     } else {
@@ -99,15 +99,14 @@ Views gather_views(PictureSource& source, BoardFinder& finder, const Board& boar
     }
   }
   if (gathered.views.empty())
-    throw Error("the board is in none of the " + std::to_string(looked_at) + " pictures looked at" +
+    throw Error("the board is in none of the " + std::to_string(looked_at) + " pictures examined" +
                 why_nowhere(gathered, board, options.response));
   const std::size_t found = gathered.views.size();
   gathered.views = thinned(std::move(gathered.views), std::size_t(options.at_most));
   std::string said = std::to_string(looked_at) + " of " + std::to_string(index) +
-                     " pictures looked at, " + std::to_string(found) + " different views";
-  if (alike) said += ", " + std::to_string(alike) + " like another";
-  if (gathered.views.size() < found)
-    said += ", " + std::to_string(gathered.views.size()) + " taken";
+                     " pictures examined, " + std::to_string(found) + " different views";
+  if (alike) said += ", " + std::to_string(alike) + " too similar to another";
+  if (gathered.views.size() < found) said += ", " + std::to_string(gathered.views.size()) + " used";
   report(said);
   return gathered;
 }

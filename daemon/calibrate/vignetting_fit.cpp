@@ -102,7 +102,7 @@ std::vector<FlatPicture> read_flat_pictures(PictureSource& source,
   while (const std::optional<NamedFrame> next = source.next()) {
     const SignalPicture seen = read_signals(next->frame, camera.response);
     if (seen.width != camera.intrinsics.width || seen.height != camera.intrinsics.height) {
-      notes.push_back(fmt::format("{} is left out: it has {}x{} pixels, the calibration {}x{}",
+      notes.push_back(fmt::format("{} is skipped: it has {}x{} pixels, the calibration {}x{}",
                                   next->name, seen.width, seen.height, camera.intrinsics.width,
                                   camera.intrinsics.height));
       continue;
@@ -126,7 +126,7 @@ std::vector<FlatPicture> read_flat_pictures(PictureSource& source,
       }
     if (2 * picture.samples.size() < looked_at)
       notes.push_back(
-          fmt::format("{} is left out: more than half of it is black or white", next->name));
+          fmt::format("{} is skipped: more than half of it is black or white", next->name));
     else
       pictures.push_back(std::move(picture));
   }
@@ -134,7 +134,7 @@ std::vector<FlatPicture> read_flat_pictures(PictureSource& source,
 }
 
 VignettingFit fit_vignetting(std::vector<FlatPicture>& pictures, double max_angle_rad) {
-  if (pictures.empty()) throw Error("no picture that an even light fills can be used");
+  if (pictures.empty()) throw Error("no usable picture is filled with even light");
   VignettingFit fit;
   std::vector<glm::dvec3> lights(pictures.size());
   for (int turn = 0; turn < most_turns; ++turn) {
@@ -150,7 +150,7 @@ VignettingFit fit_vignetting(std::vector<FlatPicture>& pictures, double max_angl
   const double least = least_illumination(fit.vignetting, max_angle_rad);
   if (!(least >= min_illumination))
     throw Error(
-        fmt::format("the fit leaves {:.3f} of the light at some angle up to {:.0f} degrees, "
+        fmt::format("the fit drops to {:.3f} of the light at some angle up to {:.0f} degrees, "
                     "less than {:g}: the pictures are not evenly lit, or the angle is too "
                     "wide",
                     least, max_angle_rad * 180 / std::numbers::pi, min_illumination));

@@ -71,7 +71,7 @@ int failed(sd_bus_error* error, const char* why) noexcept {
   try {
     return sd_bus_error_set(error, failed_error, on_the_bus(why).c_str());
   } catch (...) {
-    return sd_bus_error_set(error, failed_error, "there is no memory left");
+    return sd_bus_error_set(error, failed_error, "out of memory");
   }
 }
 
@@ -84,7 +84,7 @@ int guarded(sd_bus_error* error, Handler&& handler) noexcept {
   } catch (const std::exception& thrown) {
     return failed(error, thrown.what());
   } catch (...) {
-    return failed(error, "something was thrown that is no error");
+    return failed(error, "unknown exception");
   }
 }
 
@@ -160,7 +160,7 @@ int on_action(sd_bus_message* call, Verbs& verbs) {
   const char* name = nullptr;
   if (const int result = sd_bus_message_read(call, "s", &name); result < 0) return result;
   const set::Action* action = set::find_action(name);
-  if (!action) return invalid(call, std::string("there is no action \"") + name + "\"");
+  if (!action) return invalid(call, std::string("unknown action \"") + name + "\"");
   return answer_with(call, verbs.perform(*action));
 }
 
@@ -177,8 +177,8 @@ int on_set_mode(sd_bus_message* call, Verbs& verbs) {
   if (const int result = sd_bus_message_read(call, "s", &wanted); result < 0) return result;
   for (const auto& [name, mode] : set::names(set::Mode{}))
     if (std::strcmp(name, wanted) == 0) return answer_with(call, verbs.go(mode));
-  return invalid(call, std::string("there is no mode \"") + wanted +
-                           "\"; allowed: standby, live, refine, review");
+  return invalid(
+      call, std::string("unknown mode \"") + wanted + "\"; allowed: standby, live, refine, review");
 }
 
 int on_record(sd_bus_message* call, Verbs& verbs) {
@@ -250,9 +250,9 @@ struct Bus::Impl {
       check(sd_bus_open_system(&bus), "the system bus cannot be reached");
       check(
           sd_bus_add_object_vtable(bus, nullptr, object_path, interface_name, table.data(), &verbs),
-          "the interface is not accepted");
+          "the interface cannot be registered");
       request_name();
-      check(sd_bus_attach_event(bus, loop, SD_EVENT_PRIORITY_NORMAL), "no event loop");
+      check(sd_bus_attach_event(bus, loop, SD_EVENT_PRIORITY_NORMAL), "cannot join the event loop");
     } catch (...) {
       sd_bus_close_unref(bus);
       throw;
@@ -276,7 +276,7 @@ struct Bus::Impl {
       if (worked > 0) continue;
       const auto left =
           std::chrono::ceil<std::chrono::microseconds>(end - std::chrono::steady_clock::now());
-      if (left.count() <= 0) throw Error("D-Bus: the bus does not answer");
+      if (left.count() <= 0) throw Error("D-Bus: the bus does not respond");
       const int waited = sd_bus_wait(bus, static_cast<std::uint64_t>(left.count()));
       if (waited != -EINTR) check(waited, what);
     }

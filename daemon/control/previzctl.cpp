@@ -36,7 +36,7 @@ class ErrorText {
     if (result >= 0) return;
     if (sd_bus_error_has_name(&error_, SD_BUS_ERROR_SERVICE_UNKNOWN) != 0 ||
         sd_bus_error_has_name(&error_, SD_BUS_ERROR_NAME_HAS_NO_OWNER) != 0)
-      throw Error("previzd does not answer: it is not running, or it is loading a set just now");
+      throw Error("previzd does not respond: it is not running, or is still loading a set");
     throw Error(error_.message ? error_.message : std::strerror(-result));
   }
 

@@ -8,9 +8,9 @@ void add_requests(CLI::App& app, Request& asked) {
   app.set_version_flag("--version", "previzctl " PREVIZ_VERSION, "Print the version");
   app.require_subcommand(1);
   app.add_subcommand("status", "What the rig is doing");
-  app.add_subcommand("watch", "The same, and every change as it happens");
+  app.add_subcommand("watch", "Status, then every change as it happens");
   app.add_subcommand("metrics", "Frame rates, drops and latency, as JSON");
-  app.add_subcommand("mode", "Go to a mode")
+  app.add_subcommand("mode", "Switch to a mode")
       ->add_option("mode", asked.mode)
       ->required()
       ->check(CLI::IsMember({"standby", "live", "refine", "review"}));
@@ -18,7 +18,7 @@ void add_requests(CLI::App& app, Request& asked) {
       ->add_option("on", asked.record)
       ->required()
       ->check(CLI::IsMember({"on", "off"}));
-  app.add_subcommand("action", "Do what a button could do")
+  app.add_subcommand("action", "Do an action, as a button would")
       ->add_option("name", asked.action)
       ->required()
       ->type_name("ACTION");

@@ -99,7 +99,7 @@ std::string timecode_words(const CameraTrack& track) {
 // Says how far the picture's middle is from the optical axis.
 std::string chan_offset_words(const PinholeIntrinsics& i) {
   std::array<char, 96> text{};
-  std::snprintf(text.data(), text.size(), "which is %+.1f, %+.1f px off the picture's middle",
+  std::snprintf(text.data(), text.size(), "which is %+.1f, %+.1f px off the picture's centre",
                 i.cx + 0.5 - 0.5 * i.width, i.cy + 0.5 - 0.5 * i.height);
   return text.data();
 }
@@ -138,8 +138,7 @@ void solve_missing(pipeline::Take& take, std::ostream& out, const std::stop_toke
   const auto is_missing = [&](std::uint64_t frame) { return !known.contains(frame); };
   const auto solved = track_frames(
       take, is_missing, [](const std::string&) {}, stop);
-  if (stop.stop_requested())
-    throw Error(take.session.directory.string() + ": was not exported, because it is to end");
+  if (stop.stop_requested()) throw Error(take.session.directory.string() + ": export interrupted");
   std::erase_if(track, [&](const auto& record) { return is_missing(record.frame); });
   for (const TrackedFrame& frame : solved) track.push_back(frame.record);
   std::ranges::sort(track, {}, &session::TrackRecord::frame);
@@ -174,8 +173,8 @@ void export_scene(const pipeline::Take& take, const std::filesystem::path& direc
     const set::Object& object = take.set.objects[i];
     const ObjectPlaces places = places_of(object, take.session.track);
     if (!places.first) {
-      out << "object \"" << object.name << "\" is left out: its carrier, \"" << object.carrier
-          << "\", is nowhere in the take" << std::endl;
+      out << "object \"" << object.name << "\" is skipped: its carrier, \"" << object.carrier
+          << "\", is never found in the take" << std::endl;
       continue;
     }
     std::string content = session::read_file(object.file);
@@ -186,9 +185,9 @@ void export_scene(const pipeline::Take& take, const std::filesystem::path& direc
       throw Error(object.file.string() + ": " + error.what());
     }
     session::replace_file(directory / names[i], content);
-    out << "  " << names[i] << ": object \"" << object.name << "\", in its place"
-        << (places.moves ? " at the take's beginning (it moves later)" : "")
-        << (object.nodes.empty() ? "" : "; with the nodes that the set leaves out") << std::endl;
+    out << "  " << names[i] << ": object \"" << object.name << "\", at its position"
+        << (places.moves ? " at the start of the take (it moves later)" : "")
+        << (object.nodes.empty() ? "" : "; includes nodes that the set file omits") << std::endl;
   }
 }
 
@@ -206,9 +205,9 @@ CameraTrack camera_track(const session::Session& session,
   if (track.keys.empty())
     throw Error(
         session.directory.string() +
-        ": no frame has a pose, so that there is no camera to export; `previzd track` says why, "
-        "and the set needs [[tag]] tables (`previzd calibrate tags` measures them; --set names "
-        "another set file than the take's own), or the take's import a track");
+        ": no frame has a pose, so there is no camera to export; `previzd track` says why; "
+        "the set file needs [[tag]] tables (`previzd calibrate tags` measures them; --set names "
+        "another set file than the take's own), or the import a track");
   return track;
 }
 
@@ -270,7 +269,7 @@ void export_take(const ExportOptions& options, std::ostream& out) {
   std::error_code code;
   std::filesystem::create_directories(options.directory, code);
   if (!std::filesystem::is_directory(options.directory))
-    throw Error(options.directory.string() + ": cannot be made: " + code.message());
+    throw Error(options.directory.string() + ": cannot be created: " + code.message());
   session::replace_file(options.directory / "camera.usda", to_usda(track));
   session::replace_file(options.directory / "camera.chan", to_chan(track));
   out << options.directory.string() << ": camera.usda, camera.chan, " << track.keys.size()
@@ -280,7 +279,7 @@ void export_take(const ExportOptions& options, std::ostream& out) {
   out << "  " << session::words_of(track.rate);
   if (track.timecode) out << "; timecode of frame 0: " << track.timecode->first;
   out << std::endl;
-  out << "  camera.chan: rotation order ZXY (set it in Blender, whose own is XYZ); it holds "
+  out << "  camera.chan: rotation order ZXY (set it in Blender, which uses XYZ); it holds "
          "neither "
          "the distortion nor the principal point, "
       << chan_offset_words(track.calibration.intrinsics) << std::endl;

@@ -29,7 +29,7 @@ fs::path without_slash(const fs::path& folder) {
 
 void check_target(const fs::path& target) {
   if (fs::exists(target) && !(fs::is_directory(target) && fs::is_empty(target)))
-    throw Error(target.string() + ": is there already; a session needs a name of its own");
+    throw Error(target.string() + ": already exists; choose another name for the session");
   std::error_code seen_later;
   fs::create_directories(target.parent_path(), seen_later);
 }
@@ -147,7 +147,7 @@ class FootageImport {
       imported.timecode = session::Timecode{session::words_of(*digits), of_file.fps};
     else
       notes.push_back(footage_.source + ": its timecode, " + set::printable(*first) +
-                      ", is none at this rate, and left out");
+                      ", does not fit this rate and is skipped");
   }
 
   // Returns how many frames the lists are for; 0 if there are no lists.
@@ -160,8 +160,8 @@ class FootageImport {
 
   void check_count(std::size_t i, const Picture& picture) const {
     if (listed() > 0 && i >= listed())
-      throw Error(picture.name + ": is one more than the " + std::to_string(listed()) +
-                  " frames that " + file_.string() + " describes under " + footage_.source);
+      throw Error(picture.name + ": exceeds the " + std::to_string(listed()) + " frames that " +
+                  file_.string() + " describes under " + footage_.source);
   }
 
   void check(const Picture& picture) {
@@ -189,7 +189,7 @@ class FootageImport {
                   "292 years; check " + footage_.source + ".start_ns and fps in " + file_.string() +
                   ", or give timestamps_ns");
     if (footage_.fps > 0) return footage_.start_ns + static_cast<std::int64_t>(since_start);
-    if (!picture.container_ns) throw Error(picture.name + ": its container gives it no time");
+    if (!picture.container_ns) throw Error(picture.name + ": has no time stamp in its container");
     const std::int64_t time = footage_.start_ns + *picture.container_ns;
     if (time < 0 || (!before.empty() && time <= before.back().timestamp_ns))
       throw Error(picture.name +
@@ -242,7 +242,7 @@ std::uint64_t write_track(const ImportDescription& description, const fs::path& 
     notes.push_back(
         file.string() + ": " + std::to_string(unused) +
         (unused == 1 ? " pose belongs to a lost frame" : " poses belong to lost frames") +
-        ", and left out");
+        ", and is skipped");
   return poses;
 }
 

@@ -38,8 +38,7 @@ glm::dmat4 read_rigid(const Members& m, const std::string& key) {
 void needs_intrinsics(const Members& camera, std::initializer_list<const char*> keys) {
   for (const char* key : keys)
     if (camera.has(key))
-      camera.fail(key,
-                  "needs intrinsics beside it; a calibration is given as a whole or not at all");
+      camera.fail(key, "needs intrinsics too; give a complete calibration or none");
 }
 
 // A camera's calibration, in members that are named as the set file's tables.
@@ -106,7 +105,7 @@ struct CameraMembers {
   }
   void exclude_both(const std::string& key) const {
     if (members.has(key) && in_table(key))
-      members.fail(key, "is also a column of " + table->file.string() + "; one of them is allowed");
+      members.fail(key, "is also a column of " + table->file.string() + "; give only one of them");
   }
 };
 
@@ -122,7 +121,7 @@ void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
   if (m.has("read_as") && !m.has("video"))
     m.fail("read_as", "stands for the tags of a video; pictures are read as they are");
   if (m.has("pictures") && m.has("video"))
-    m.fail("video", "contradicts pictures; one of them is allowed");
+    m.fail("video", "conflicts with pictures; give only one");
   if (m.has("video")) {
     footage.video = camera.folder / m.read<std::string>("video");
     if (std::error_code none; !fs::is_regular_file(footage.video, none))
@@ -130,7 +129,7 @@ void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
     footage.read_as = read_read_as(m);
   } else if (m.has("pictures") && m.value("pictures").is_string() &&
              is_video_name(m.read<std::string>("pictures"))) {
-    m.fail("pictures", "names a video; write \"video\" in place of \"pictures\"");
+    m.fail("pictures", "is a video; use \"video\" instead of \"pictures\"");
   } else if (m.has("pictures") && m.value("pictures").is_string()) {
     footage.pictures = matching_files(camera.folder / m.read<std::string>("pictures"));
   } else if (m.has("pictures")) {
@@ -156,11 +155,11 @@ void read_times(const CameraMembers& camera, FootageDescription& footage) {
   const bool is_in_video = ways == 0 && !footage.video.empty();  // as "container"
   if (ways == 0 && !is_in_video)
     m.fail("fps",
-           "is missing: when the pictures were taken is not known; allowed: fps, timestamps_ns, or "
+           "is missing: the pictures have no times; allowed: fps, timestamps_ns, or "
            "a csv with a column timestamp_ns");
   if (ways > 1)
     m.fail(m.has("timestamps_ns") ? "timestamps_ns" : "fps",
-           "contradicts another member: the times must be given in exactly one way, by "
+           "conflicts with another member: give the times in exactly one way, by "
            "timestamps_ns, fps, or a csv with a column timestamp_ns");
   if (m.has("start_ns"))
     footage.start_ns =
@@ -179,7 +178,7 @@ void read_times(const CameraMembers& camera, FootageDescription& footage) {
     if (footage.timestamps_ns.empty()) m.fail("timestamps_ns", "is empty");
   }
   if (m.has("start_ns") && !footage.timestamps_ns.empty())
-    m.fail("start_ns", "belongs to fps or \"container\" only");
+    m.fail("start_ns", "needs fps or \"container\"");
   const std::size_t pictures = footage.pictures.size(), times = footage.timestamps_ns.size();
   if (pictures > 0 && times > 0 && pictures != times)
     m.fail("timestamps_ns", "has " + std::to_string(times) + " entries; there are " +
@@ -234,8 +233,8 @@ void read_exposures(const CameraMembers& camera, double responsivity, FootageDes
   if (footage.exposure_s.empty())
     camera.members.fail("exposure",
                         "is missing; allowed: exposure, or exposure_s and gain; each a "
-                        "number above 0, a list with one a frame, or a csv column (if nobody knows "
-                        "it: 1, and the light of the set is then in units of the camera's white)");
+                        "number above 0, a list with one per frame, or a csv column (if unknown, "
+                        "give 1: the set's light is then in units of the camera's white)");
   const std::vector<double> gain = footage.gain.empty() ? std::vector{1.0} : footage.gain;
   const std::size_t count = std::max(footage.exposure_s.size(), gain.size());
   for (std::size_t i = 0; i < count; ++i) {
@@ -308,7 +307,8 @@ std::vector<session::TrackRecord> read_track(const Members& top) {
     session::TrackRecord record;
     record.frame = static_cast<std::uint64_t>(m.read<std::int64_t>("frame", not_negative));
     if (!track.empty() && record.frame <= track.back().frame)
-      m.fail("frame", "must be more than the frame before, " + std::to_string(track.back().frame));
+      m.fail("frame",
+             "must be greater than the previous frame, " + std::to_string(track.back().frame));
     record.tracked = true;
     record.world_from_camera = read_rigid(m, "world_from_camera");
     if (m.has("covariance")) record.covariance = m.read<std::array<double, 36>>("covariance");

@@ -135,7 +135,7 @@ Table read_csv(const std::filesystem::path& file) {
     table.rows.push_back(std::move(cells));
   }
   if (table.rows.empty())
-    throw Error(file.string() + ": holds no rows; allowed: a header line and one line a frame");
+    throw Error(file.string() + ": has no rows; allowed: a header line and one line per frame");
   return table;
 }
 
@@ -148,7 +148,7 @@ std::vector<std::filesystem::path> matching_files(const std::filesystem::path& p
     names = wildcard_files(pattern);
   else
     names = {name};
-  if (names.empty()) throw Error(pattern.string() + ": there is no such file");
+  if (names.empty()) throw Error(pattern.string() + ": file not found");
   std::vector<std::filesystem::path> files;
   for (const std::string& found : names) files.push_back(pattern.parent_path() / found);
   return files;

@@ -52,7 +52,7 @@ Members::Members(const std::filesystem::path& file, const Json& object, std::str
     const std::string& key = item.key();
     if (key.starts_with("//") || std::ranges::find(allowed, key) != allowed.end()) continue;
     const std::string meant = set::nearest(key, allowed);
-    fail(key, "is not known; " +
+    fail(key, "is unknown; " +
                   (meant.empty() ? "allowed: " + joined(allowed) : "did you mean " + meant + "?"));
   }
 }

@@ -54,7 +54,7 @@ class PictureFiles final : public Footage {
     const bool known_depth = image.depth() == CV_8U || image.depth() == CV_16U;
     if (!known_depth || image.channels() == 2 || image.channels() > 4)
       throw Error(name +
-                  ": has samples or channels that no camera delivers; allowed: grey or RGB "
+                  ": unsupported sample type or channels; allowed: grey or RGB "
                   "of 8 or 16 bits");
     if (image.channels() == 4 && !is_opaque(image))
       throw Error(name + ": is transparent in places; allowed: grey or RGB, opaque");

@@ -35,7 +35,7 @@ std::string place_json(const std::string& text, const std::string& name,
   const auto scene = json.is_object() ? json.value("scene", std::size_t{0}) : 0;
   if (!json.is_object() || !json.contains("scenes") || !json["scenes"].is_array() ||
       scene >= json["scenes"].size() || !json["scenes"][scene].contains("nodes"))
-    throw Error("has no scene of glTF 2 that could be placed");
+    throw Error("has no glTF 2 scene to place");
   const glm::dmat4 placed =
       glm::transpose(scene::z_up_from_y_up) * world_from_file * scene::z_up_from_y_up;
   GltfJson matrix = GltfJson::array();
@@ -55,7 +55,7 @@ std::string placed_model(const std::string& content, const std::string& name,
     if (!content.starts_with("glTF")) return place_json(content, name, world_from_file);
     if (content.size() < header + chunk_header ||
         content.size() - header - chunk_header < word_at(content, header))
-      throw Error("is cut off before its end");
+      throw Error("is truncated");
     const std::size_t length = word_at(content, header), begin = header + chunk_header;
     std::string json = place_json(content.substr(begin, length), name, world_from_file);
     while (json.size() % word) json += ' ';

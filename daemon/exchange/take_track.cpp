@@ -109,8 +109,8 @@ void print_reasons(const std::vector<TrackedFrame>& frames, std::ostream& out) {
     if (alike.count++ == 0) alike.first = &frame;
   }
   for (const auto& [wording, alike] : lost)
-    out << "  " << alike.count << " without a pose, as frame " << alike.first->record.frame << ": "
-        << alike.first->reason << '\n';
+    out << "  " << alike.count << " without a pose, e.g. frame " << alike.first->record.frame
+        << ": " << alike.first->reason << '\n';
 }
 
 }  // namespace
@@ -177,7 +177,7 @@ int track_take(const TrackOptions& options, std::ostream& out) {
       },
       options.stop);
   if (options.stop.stop_requested())
-    throw Error(options.session.string() + ": tracking was stopped; nothing was written");
+    throw Error(options.session.string() + ": tracking interrupted; nothing written");
   if (options.out) {
     std::string lines;
     for (const TrackedFrame& frame : frames) lines += to_json(frame) + "\n";

@@ -98,7 +98,7 @@ class VideoFile final : public Footage {
     probe(*context);
     const AVCodec* codec = nullptr;
     track_ = av::check(av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0), file,
-                       "holds no video that can be decoded");
+                       "has no decodable video");
     decoder_.reset(av::made(avcodec_alloc_context3(codec)));
     av::check(avcodec_parameters_to_context(decoder_.get(), stream().codecpar), file,
               "cannot be decoded");
@@ -162,7 +162,7 @@ class VideoFile final : public Footage {
     if (!end_fault_.empty()) notes.push_back(end_fault_);
     for (unsigned i = 0; i < demuxer_->nb_streams; ++i)
       if (demuxer_->streams[i]->codecpar->codec_type == AVMEDIA_TYPE_AUDIO) {
-        notes.push_back(file_.string() + ": its sound is left out");
+        notes.push_back(file_.string() + ": its sound is ignored");
         break;
       }
     return notes;

@@ -69,7 +69,7 @@ VideoPictures::VideoPictures(const AVFrame& first, AVStream& stream, AVFormatCon
     notes_.push_back(
         fmt::format("{}: is {}, as it is to be shown", file_.string(), tags_.orientation.words()));
   if (tags_.pixel_aspect.num != tags_.pixel_aspect.den)
-    notes_.push_back(fmt::format("{}: its pixels, {}:{} wide to high, are made square",
+    notes_.push_back(fmt::format("{}: its pixels, {}:{} wide to high, are resampled to square",
                                  file_.string(), tags_.pixel_aspect.num, tags_.pixel_aspect.den));
   if (tags_.transfer == AVCOL_TRC_SMPTE2084 || tags_.transfer == AVCOL_TRC_ARIB_STD_B67)
     notes_.push_back(fmt::format(

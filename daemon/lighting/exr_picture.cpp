@@ -54,7 +54,7 @@ void note_primaries(const Imf::Header& header, std::vector<std::string>& notes) 
   const Imf::Chromaticities rec709, found = Imf::chromaticities(header);
   if (!same(found.red, rec709.red) || !same(found.green, rec709.green) ||
       !same(found.blue, rec709.blue))
-    notes.push_back("the file's primaries are not those of Rec. 709; its numbers are used as if");
+    notes.push_back("the file's primaries are not Rec. 709; its values are used unconverted");
 }
 
 // Walks the attributes of a file's first header (OpenEXR's "File Layout"), which OpenEXR itself
@@ -92,7 +92,7 @@ LinearPicture read(const std::filesystem::path& path, std::vector<std::string>& 
              std::int64_t{window.max.y} - window.min.y + 1);
   if (window != file.header().displayWindow())
     throw Error(path.string() +
-                ": the data window is not the display window; a whole picture is "
+                ": the data window is not the display window; a full picture is "
                 "needed");
   const auto names = choose_channels(file.header().channels(), path);
   LinearPicture picture;

@@ -32,7 +32,7 @@ std::vector<std::vector<std::uint32_t>> apply_mode(Lighting& lighting,
   tracker.follow(lighting.sources, timestamp_ns);
   if (extraction.left > 0)
     note += ", " + counted(static_cast<std::size_t>(extraction.left), "bright region") +
-            " not taken for lamps (too faint, too wide or too many)";
+            " not treated as lamps (too faint, too wide or too many)";
   if (settings.mode == set::LightMode::hybrid) {
     lighting.environment = std::move(extraction.residual);
   } else if (settings.sources.residual == set::Residual::blurred) {

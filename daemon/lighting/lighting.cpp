@@ -67,7 +67,7 @@ std::vector<std::string> describe(std::span<const FramePtr> frames, const Bracke
   for (const Disagreement& d : disagreements(bracket))
     notes.push_back(
         fmt::format("light frames {} and {} disagree by {:.1f} stops everywhere: an exposure is "
-                    "stated wrongly, "
+                    "reported wrongly, "
                     "or nearly all of the light changed between them; the newer one is used",
                     d.shorter, d.longer, std::abs(d.stops)));
   if (report.moved_sr > 0)

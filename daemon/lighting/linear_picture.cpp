@@ -11,7 +11,7 @@ namespace previz::lighting {
 void check_size(const std::filesystem::path& path, std::int64_t width, std::int64_t height) {
   if (width < 1 || height < 1 || width > most_pixels / height ||
       std::max(width, height) > most_side)
-    throw Error(fmt::format("{}: has {}x{} pixels; allowed: at most {}, and {} a side",
+    throw Error(fmt::format("{}: has {}x{} pixels; allowed: at most {}, and {} per side",
                             path.string(), width, height, most_pixels, most_side));
 }
 

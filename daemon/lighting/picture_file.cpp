@@ -49,7 +49,7 @@ std::string beginning_of(const std::filesystem::path& path) {
   std::string bytes(16, '\0');
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   if (file.bad() || std::filesystem::is_directory(path))
-    throw Error(path.string() + ": cannot be read: it is no file");
+    throw Error(path.string() + ": cannot be read: it is not a file");
   bytes.resize(static_cast<std::size_t>(file.gcount()));
   return bytes;
 }

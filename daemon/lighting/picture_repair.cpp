@@ -141,7 +141,7 @@ void repair(LinearPicture& picture, const PictureShape& shape, const std::filesy
   if (beyond.pixels > 0)
     notes.push_back(fmt::format(
         "{}: {} of {} pixels {} brighter than the file could store (infinite, or above 1e12) and "
-        "taken as {}; the first is at x = {}, y = {}. A sun or lamp there may be darker than it "
+        "set to {}; the first is at x = {}, y = {}. A sun or lamp there may be darker than it "
         "was",
         path.string(), beyond.pixels, used, beyond.pixels == 1 ? "is" : "are", largest,
         beyond.first.x, beyond.first.y));

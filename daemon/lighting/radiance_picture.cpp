@@ -101,7 +101,7 @@ class Reader {
       header.exposure *= factor;  // each program that scaled the picture has added its own line
       for (int c = 0; c < 3; ++c)
         if (!value || !(header.exposure[c] > 1e-30 && header.exposure[c] < 1e30))
-          fail(fmt::format("\"{}\" is no brightness factor", text.substr(0, 60)));
+          fail(fmt::format("\"{}\" is not a brightness factor", text.substr(0, 60)));
     } else if (name == "PRIMARIES") {
       // Those of Rec. 709 to three digits; Radiance's own are others.
       std::array<double, 6> found{};

@@ -71,7 +71,8 @@ Response::Response(const ResponseCurve& curve, int bits) : curve_(curve), bits_(
   for (int code = 0; code <= max; ++code) {
     if (forward(inverse_[static_cast<std::size_t>(code)]) != code)
       throw Error("response: the curve is too steep or too flat for " + std::to_string(bits) +
-                  "-bit samples: code " + std::to_string(code) + " does not come back as itself");
+                  "-bit samples: code " + std::to_string(code) +
+                  " does not survive the round trip");
   }
 }
 

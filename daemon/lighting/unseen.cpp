@@ -159,14 +159,14 @@ void fill_unseen(const HdrPicture& picture, const Fisheye& lens, const Viewpoint
   if (settings.unseen == set::UnseenRule::horizon || !elsewhere)
     fill_each(map, [&](int, int, const glm::vec3& direction) { return horizon(direction); });
   else if (const double left_sr = fill_from(*elsewhere, horizon, map); left_sr > 0)
-    notes.push_back(fmt::format(
-        "{} {}; the edge of the picture is continued there", area_words(left_sr),
-        settings.unseen == set::UnseenRule::mirror ? "is not in the mirrored picture either"
-                                                   : "was not seen by the film camera either"));
+    notes.push_back(fmt::format("{} {}; the picture's edge is extended there", area_words(left_sr),
+                                settings.unseen == set::UnseenRule::mirror
+                                    ? "is not in the mirrored picture either"
+                                    : "was not seen by the film camera either"));
   if (edge_used && edge.left_out > 0)
     notes.push_back(fmt::format(
         "{:.1f} % of the band at the picture's edge is more than {} times as bright as its median "
-        "and was not continued into the unseen part",
+        "and was not extended into the unseen part",
         100 * edge.left_out, outlier));
 }
 

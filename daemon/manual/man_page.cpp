@@ -110,7 +110,7 @@ std::string assignment(const set::Key& key) {
 std::string explanation(const set::Key& key) {
   using enum Need::Kind;
   const char* need = key.need.kind == required   ? "; required"
-                     : key.need.kind == optional ? "; may be left out, the value here is an example"
+                     : key.need.kind == optional ? "; optional, the value here is an example"
                                                  : "";
   return fmt::format("{} ({}{})", key.about, key.allowed, need);
 }

@@ -60,7 +60,7 @@ class AssetStore::Worker {
     is_stopped_ = true;
     changed_.notify_all();
     const bool has_ended = changed_.wait_for(lock, disk_patience, [this] { return has_ended_; });
-    if (!has_ended && note_) note_(folder_.string() + ": the disk does not answer, and is left");
+    if (!has_ended && note_) note_(folder_.string() + ": the disk does not respond; gave up on it");
     note_ = {};
     return has_ended;
   }
@@ -124,7 +124,7 @@ class AssetStore::Worker {
         keep(i, is_left);
       } catch (const std::exception& error) {
         if (!is_stopped())
-          note(assets_[i].first + " will not be in the takes: " + reason_of(error));
+          note(assets_[i].first + " will be missing from takes: " + reason_of(error));
       }
     }
     try {
@@ -187,7 +187,7 @@ class AssetStore::Worker {
   void check_room(std::uint64_t bytes) const {
     if (has_room_ && !has_room_(bytes))
       throw Error(folder_.string() +
-                  ": the disk is almost full, and takes keep some of it free "
+                  ": the disk is almost full; takes keep a reserve free "
                   "(recording.reserve_mb)");
   }
 

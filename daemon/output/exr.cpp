@@ -264,7 +264,7 @@ render::Layers read_exr(const std::filesystem::path& path) {
   try {
     bool is_tiled = false, is_deep = false, has_parts = false;
     if (!Imf::isOpenExrFile(path.c_str(), is_tiled, is_deep, has_parts) || is_deep || has_parts)
-      throw Error(path.string() + ": is no EXR file of one flat picture");
+      throw Error(path.string() + ": is not a flat, single-part EXR file");
     Imf::InputFile file(path.c_str());
     const std::size_t pixels = pixels_of(path, file.header().dataWindow());
     render::Layers layers;

@@ -37,7 +37,7 @@ constexpr const char* owner_name = ".recorder";
 std::string why_not_writable(const fs::path& folder) {
   const fs::path there = existing_part(folder);
   std::error_code unknown;
-  if (!fs::is_directory(there, unknown)) return "it is no folder";
+  if (!fs::is_directory(there, unknown)) return "it is not a folder";
   return ::access(there.c_str(), W_OK) == 0 ? "" : std::strerror(errno);
 }
 
@@ -135,7 +135,7 @@ class FolderWatch::Worker {
     changed_.notify_all();
     const bool has_ended = changed_.wait_for(lock, end_patience, [this] { return has_ended_; });
     lock.unlock();
-    if (!has_ended) note(options_.folder.string() + ": the disk does not answer, and is left");
+    if (!has_ended) note(options_.folder.string() + ": the disk does not respond; gave up on it");
     is_left_ = true;
     {
       const std::lock_guard calls(calls_);
@@ -220,8 +220,7 @@ class FolderWatch::Worker {
     if (now.is_own)
       bring_into_order(now);
     else if (now.is_there && !std::exchange(has_said_why_not_, true))
-      note("takes from before cannot be looked at: " + options_.folder.string() + ": " +
-           now.why_not);
+      note("earlier takes cannot be checked: " + options_.folder.string() + ": " + now.why_not);
     publish(std::move(now));
     const std::lock_guard lock(calls_);
     if (options_.on_news) options_.on_news();
@@ -252,7 +251,7 @@ class FolderWatch::Worker {
     const std::lock_guard lock(mutex_);
     const bool is_same = followed && followed_ && followed->take == followed_->take;
     now.take_gone = is_gone && is_same ? followed->take.string() +
-                                             " is no longer there; its disk was unmounted, or it "
+                                             " is gone; its disk was unmounted, or it "
                                              "was moved"
                                        : "";
     seen_ = std::move(now);
@@ -298,7 +297,7 @@ void FolderWatch::follow(const fs::path& take) {
 
 void FolderWatch::keep_wish(const fs::path& take) {
   worker_->add([take] { TakeFolders::keep_wish(take); },
-               "after a restart it would not go on by itself");
+               "recording would not resume after a restart");
 }
 
 void FolderWatch::keep_number(int number) {
@@ -306,7 +305,7 @@ void FolderWatch::keep_number(int number) {
       [folder = worker_->folder(), slate = worker_->slate(), number] {
         TakeFolders::keep_number(folder, slate, number);
       },
-      "if the other disk is not there at the next start, a take may get the name of one on it");
+      "if the other disk is missing at the next start, a take may get the name of one on it");
 }
 
 void FolderWatch::drop_wish() {

@@ -84,10 +84,10 @@ struct Font::Impl {
 
 Font::Font(const std::filesystem::path& file, int size_px) : impl_(std::make_unique<Impl>()) {
   const auto size = static_cast<FT_UInt>(std::max(size_px, 1));
-  if (FT_Init_FreeType(&impl_->library) != 0) throw Error("FreeType does not start");
+  if (FT_Init_FreeType(&impl_->library) != 0) throw Error("FreeType cannot be initialised");
   if (FT_New_Face(impl_->library, file.c_str(), 0, &impl_->face) != 0 ||
       FT_Set_Pixel_Sizes(impl_->face, 0, size) != 0)
-    throw Error(file.string() + ": is no font that can be read; the display's text needs it");
+    throw Error(file.string() + ": is not a readable font; the display's text needs it");
   impl_->shaper = hb_ft_font_create_referenced(impl_->face);
   hb_ft_font_set_load_flags(impl_->shaper, FT_LOAD_TARGET_LIGHT);
 }

@@ -139,7 +139,7 @@ struct Reader {
 void write_png(const std::filesystem::path& path, const Plate& picture, session::Sync sync) {
   if (picture.width < 1 || picture.height < 1 || (picture.bits != 8 && picture.bits != 16) ||
       picture.samples.size() != 3 * std::size_t(picture.width) * std::size_t(picture.height))
-    throw Error(path.string() + ": the picture is not RGB of 8 or 16 bits, or not whole");
+    throw Error(path.string() + ": the picture is not complete 8- or 16-bit RGB");
   std::vector<png_byte> bytes = to_bytes(picture);
   std::vector<png_bytep> rows = row_pointers(bytes, picture.height);
   session::Draft draft(path);
@@ -157,7 +157,7 @@ Plate read_png(const std::filesystem::path& path) {
   PngError error;
   Reader reader(error);
   if (!read_header(reader.png, reader.info, file.get()))
-    throw Error(path.string() + ": is not a PNG that can be read: " + error.message);
+    throw Error(path.string() + ": is not a readable PNG: " + error.message);
   Plate picture;
   picture.width = static_cast<int>(png_get_image_width(reader.png, reader.info));
   picture.height = static_cast<int>(png_get_image_height(reader.png, reader.info));
@@ -165,7 +165,7 @@ Plate read_png(const std::filesystem::path& path) {
   const std::size_t pixels = std::size_t(picture.width) * std::size_t(picture.height);
   if (pixels > most_pixels)
     throw Error(path.string() + ": has " + std::to_string(pixels) + " pixels; at most " +
-                std::to_string(most_pixels) + " are read");
+                std::to_string(most_pixels) + " are allowed");
   const std::size_t samples = 3 * pixels;
   std::vector<png_byte> bytes(samples * (picture.bits == 16 ? 2 : 1));
   std::vector<png_bytep> rows = row_pointers(bytes, picture.height);

@@ -89,17 +89,17 @@ void Recorder::offer(const FramePtr& frame) {
   }
   filled_.notify_one();
   if (is_silent)
-    note(Severity::warning, "the disk does not answer; what is recorded waits in memory");
+    note(Severity::warning, "the disk does not respond; the recording waits in memory");
   if (lags)
     note(Severity::warning,
          "the recording is more than a second behind the cameras; what waits is lost if the "
-         "computer goes down");
+         "computer crashes");
   if (is_first_dropped && is_far_behind)
     note_far_behind();
   else if (is_first_dropped)
     note(Severity::warning,
          "the disk is too slow, and the memory for what waits is full "
-         "(recording.queue_mb); frames are left out");
+         "(recording.queue_mb); frames are dropped");
 }
 
 bool Recorder::has_new_silence() {
@@ -123,7 +123,7 @@ void Recorder::offer_shown(const FramePtr& frame) {
     count_as_lost(left_out);
     if (status_.lost.shown > 1) return;
   }
-  note(Severity::warning, "the disk is too slow; pictures that were shown are left out");
+  note(Severity::warning, "the disk is too slow; composite frames are dropped");
 }
 
 void Recorder::offer(const session::TrackRecord& record) {
@@ -167,7 +167,7 @@ void Recorder::count_as_lost(const LeftOut& left_out) {
 void Recorder::note_short_preroll(double kept_s) const {
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(),
-                "a take begins %.1f s before the button, and not %.1f s: the memory for it is full "
+                "takes begin %.1f s before the button, not %.1f s: the frame memory is full "
                 "(recording.queue_mb)",
                 kept_s, options_.preroll_s);
   note(Severity::warning, text.data(), "recording", /*is_shown=*/true);
@@ -257,7 +257,7 @@ void Recorder::run() {
     handling_since_.reset();
     if (answers_again) {
       lock.unlock();
-      note(Severity::info, "the disk answers again");
+      note(Severity::info, "the disk responds again");
       lock.lock();
     }
     if (is_last && ending_.empty()) return;
@@ -342,7 +342,7 @@ void Recorder::mark_last_good() {
   if (take_) {
     take_->writer->mark_good();
   } else if (last.empty()) {
-    return note(Severity::info, "there is no take to mark");
+    return note(Severity::info, "no take to mark");
   } else {
     try {
       if (ending_.empty())
@@ -350,7 +350,8 @@ void Recorder::mark_last_good() {
       else
         ending_.back().take.writer->mark_good();
     } catch (const std::exception& error) {
-      return note(Severity::warning, std::string("it cannot be marked good: ") + reason_of(error));
+      return note(Severity::warning,
+                  std::string("the take cannot be marked good: ") + reason_of(error));
     }
   }
   note(Severity::info, last.filename().string() + " is marked good");
@@ -409,8 +410,8 @@ void Recorder::leave_out(const Entry& entry, Take& take, const std::string& why)
   }
   if (std::exchange(take.has_noted_odd, true)) return;
   try {
-    note(Severity::warning,
-         take.writer->directory().filename().string() + " lacks what cannot be recorded: " + why);
+    note(Severity::warning, take.writer->directory().filename().string() +
+                                " is missing what cannot be recorded: " + why);
   } catch (const std::bad_alloc&) {
     return;  // it is counted
   }
@@ -449,7 +450,7 @@ void Recorder::begin_take(bool goes_on) {
       if (!is_disks_fault ||
           !folders_.give_up(folder, folders_.all()[folder].string() + ": its disk failed"))
         throw;
-      note(Severity::error, std::string("the next disk is taken: ") + reason_of(error));
+      note(Severity::error, std::string("switching to the next disk: ") + reason_of(error));
     }
   }
 }
@@ -473,13 +474,13 @@ void Recorder::name_assets(Take& take, bool is_last) {
   if (!delivered)
     delivered = stores_[take.folder]->undelivered("it was not copied by the end of the take");
   for (const session::MissingAsset& asset : delivered->missing)
-    note(Severity::warning, take.writer->directory().filename().string() + " lacks " +
+    note(Severity::warning, take.writer->directory().filename().string() + " is missing " +
                                 asset.as_written + ": " + asset.why);
   try {
     take.writer->set_assets(delivered->assets, delivered->missing);
   } catch (const std::exception& error) {
     if (!take.writer->is_sound()) throw;
-    note(Severity::warning, std::string("the set's files cannot be named: ") + reason_of(error));
+    note(Severity::warning, std::string("the set's files cannot be listed: ") + reason_of(error));
   }
   take.order.reset();
 }

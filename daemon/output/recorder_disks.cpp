@@ -118,11 +118,11 @@ bool Recorder::goes_on_elsewhere(const std::string& why) {
   try {
     begin_take(true);
   } catch (const std::exception& error) {
-    note(Severity::error, std::string("recording cannot go on elsewhere: ") + reason_of(error));
+    note(Severity::error, std::string("recording cannot continue elsewhere: ") + reason_of(error));
     return false;
   }
-  note(Severity::error,
-       failed + " ended: " + why + "; recording goes on in " + take_->writer->directory().string());
+  note(Severity::error, failed + " ended: " + why + "; recording continues in " +
+                            take_->writer->directory().string());
   return true;
 }
 
@@ -136,7 +136,7 @@ void Recorder::check_disk() {
   folders_.give_up(folder, full);
   const std::string name = take_->writer->directory().filename().string();
   begin_next_take();
-  note(Severity::warning, "the disk of " + name + " is almost full; recording goes on in " +
+  note(Severity::warning, "the disk of " + name + " is almost full; recording continues in " +
                               take_->writer->directory().string());
 }
 
@@ -163,7 +163,7 @@ void Recorder::compare_speeds() {
     if (taken && *taken < delivered) note_slow(*taken, delivered, bytes_a_s);
   } catch (const std::exception& error) {
     note(Severity::warning,
-         std::string("how fast takes can be written is not known: ") + reason_of(error));
+         std::string("the disk's speed cannot be measured: ") + reason_of(error));
   }
 }
 
@@ -171,23 +171,24 @@ void Recorder::note_far_behind() const {
   std::array<char, 200> text{};
   std::snprintf(text.data(), text.size(),
                 "the disk or the encoder is too slow: the recording is %.1f s behind the cameras "
-                "(recording.most_behind_s), and frames are left out",
+                "(recording.most_behind_s), and frames are dropped",
                 options_.most_behind_s);
   note(Severity::warning, text.data());
 }
 
 void Recorder::note_slow(double taken, double delivered, double bytes_a_s) {
   std::array<char, 160> figures{};
-  std::snprintf(figures.data(), figures.size(),
-                "encoder and disk take %.3g pictures a second, and the cameras deliver %.3g: takes "
-                "will lack frames",
-                taken, delivered);
+  std::snprintf(
+      figures.data(), figures.size(),
+      "encoder and disk write %.3g frames per second, but the cameras deliver %.3g: takes "
+      "will miss frames",
+      taken, delivered);
   std::string text = figures.data();
   if (options_.take.codec == session::VideoCodec::ffv1) {
     const std::optional<double> disk = folders_.measure_speed();
     if (disk)
       text += "; recording.codec = \"raw\" needs no encoder and a disk of " + megabytes(bytes_a_s) +
-              " a second, and this one takes " + megabytes(*disk);
+              " per second; this one writes " + megabytes(*disk);
   } else {
     text += "; it needs a faster disk, or recording.codec = \"ffv1\", which is smaller";
   }

@@ -45,7 +45,7 @@ void Recorder::end(Take& take) {
     take.writer->set_lost(take.lost);
     take.writer->close();
   } catch (const std::exception& error) {
-    said = name + " could not be ended in order: " + reason_of(error);
+    said = name + " could not be closed cleanly: " + reason_of(error);
     abandon(take, reason_of(error));
     {
       const std::lock_guard lock(mutex_);

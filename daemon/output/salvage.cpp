@@ -27,7 +27,7 @@ bool Salvage::look(std::vector<std::string>& salvaged) {
       session::remove_dead_drafts(folders_[i]);
     } catch (const std::filesystem::filesystem_error& error) {
       is_looked_at[i] = true;  // once, and not each second
-      note_("takes from before cannot be looked at: " + std::string(error.what()));
+      note_("earlier takes cannot be checked: " + std::string(error.what()));
     }
   }
   std::ranges::sort(takes, {}, [](const auto& take) { return take.filename(); });
@@ -44,7 +44,7 @@ void Salvage::salvage(const std::filesystem::path& take, std::vector<std::string
       salvaged.push_back(take.filename().string() + " was cut off; it has " +
                          std::to_string(*frames) + " frames");
   } catch (const std::exception& error) {
-    note_("a take from before cannot be read: " + std::string(error.what()));
+    note_("an earlier take cannot be read: " + std::string(error.what()));
   }
 }
 

@@ -93,7 +93,7 @@ std::string TakeFolders::why_full(std::size_t folder) const {
   const std::uint64_t free = free_on_disk_of(folders_[folder], free_bytes_);
   if (free >= reserve_bytes_) return {};
   return folders_[folder].string() + ": the disk is almost full, " + megabytes(free) +
-         " are left and " + megabytes(reserve_bytes_) + " are kept free (recording.reserve_mb)";
+         " are free, " + megabytes(reserve_bytes_) + " are reserved (recording.reserve_mb)";
 }
 
 bool TakeFolders::give_up(std::size_t folder, const std::string& why) {

@@ -68,9 +68,9 @@ ListedTake listed_take(const std::filesystem::path& directory) {
   const std::filesystem::path take = named(directory);
   if (is_take(take)) return look_at(take);
   if (!std::filesystem::exists(take))
-    throw Error(take.string() + ": is not there; `previzd takes list` shows the takes there are");
+    throw Error(take.string() + ": not found; `previzd takes list` shows the existing takes");
   const bool holds_takes = std::filesystem::is_directory(take) && !list_takes({take}).empty();
-  throw Error(take.string() + (holds_takes ? ": is a folder of takes; name the takes in it"
+  throw Error(take.string() + (holds_takes ? ": is a folder of takes; give the takes in it"
                                            : ": is not a take; it holds no session.toml"));
 }
 

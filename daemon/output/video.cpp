@@ -114,7 +114,7 @@ VideoWriter::VideoWriter(const std::filesystem::path& stem, int width, int heigh
   AVFormatContext* file = nullptr;
   const std::string url = av::url_of(impl_->draft->path());
   impl_->check(avformat_alloc_output_context2(&file, nullptr, codec.container.c_str(), url.c_str()),
-               "cannot be made");
+               "cannot be created");
   impl_->file.reset(file);
   impl_->stream = av::made(avformat_new_stream(file, nullptr));
   impl_->stream->time_base = video_clock;
@@ -125,14 +125,14 @@ VideoWriter::VideoWriter(const std::filesystem::path& stem, int width, int heigh
   if (const auto timecode = clock.at(first_ns); timecode && counts_frames(clock))
     av_dict_set(&impl_->stream->metadata, "timecode", session::words_of(*timecode).c_str(), 0);
   impl_->check(avcodec_parameters_from_context(impl_->stream->codecpar, impl_->encoder.get()),
-               "cannot be made");
+               "cannot be created");
   impl_->check(avio_open(&file->pb, url.c_str(), AVIO_FLAG_WRITE), "cannot be opened");
   impl_->check(avformat_write_header(file, nullptr), "cannot be written");
 
   impl_->frame->format = impl_->encoder->pix_fmt;
   impl_->frame->width = width;
   impl_->frame->height = height;
-  impl_->check(av_frame_get_buffer(impl_->frame.get(), 0), "has no memory for a picture");
+  impl_->check(av_frame_get_buffer(impl_->frame.get(), 0), "is out of memory for a picture");
   impl_->converter.reset(sws_getContext(
       width, height, AV_PIX_FMT_RGB24, width, height, impl_->encoder->pix_fmt,
       SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INP, nullptr, nullptr, nullptr));
@@ -153,12 +153,12 @@ void VideoWriter::write(const Plate& picture, std::int64_t timestamp_ns) {
                                          AVRational{1, 1'000'000'000}, video_clock);
   if (tick <= impl_->last_tick)
     throw Error(impl_->path.string() + ": the time " + std::to_string(timestamp_ns) +
-                " ns does not come after the picture before it");
+                " ns is not later than the previous picture");
   if (impl_->last_tick >= 0) impl_->last_interval = tick - impl_->last_tick;
   impl_->last_tick = tick;
 
   const std::vector<std::uint8_t> rgb = to_rgb8(picture);
-  impl_->check(av_frame_make_writable(impl_->frame.get()), "has no memory for a picture");
+  impl_->check(av_frame_make_writable(impl_->frame.get()), "is out of memory for a picture");
   const std::uint8_t* rows = rgb.data();
   const int stride = 3 * picture.width;
   sws_scale(impl_->converter.get(), &rows, &stride, 0, picture.height, impl_->frame->data,

@@ -116,7 +116,7 @@ Claim claim_of(const set::Light& light, const glm::dvec3& seen_from) {
 
 void add_trouble(const set::Object& object, const char* why, LampClaims& result) {
   std::string what =
-      "the light of \"" + object.name + "\" is not taken out of the light around the set: " + why;
+      "the light of \"" + object.name + "\" is not subtracted from the environment light: " + why;
   if (std::ranges::find(result.troubles, what) == result.troubles.end())
     result.troubles.push_back(std::move(what));
 }
@@ -146,7 +146,7 @@ void claim_glowing_objects(const set::Set& set, const scene::Scene& scene,
       continue;
     const Box box = box_around(scene.meshes[instance.mesh]);
     if (is_around(box, instance, seen_from)) {
-      add_trouble(object, "it is around the light camera", result);
+      add_trouble(object, "it encloses the light camera", result);
       continue;
     }
     Claim claim;
@@ -169,7 +169,7 @@ LampClaims claims_of(const set::Set& set, const scene::Scene* scene, const glm::
     const glm::dvec3 to_lamp = lamp.position ? *lamp.position - seen_from : lamp.direction;
     if (glm::length(to_lamp) == 0)
       throw Error(set.file.string() + ": captured_light \"" + lamp.name +
-                  "\": position_m is where the light camera stands");
+                  "\": position_m is the light camera's own");
     result.claims.push_back({lamp.name, glm::normalize(to_lamp), lamp.cone_rad, {}});
   }
   for (std::size_t i = 0; i < set.lights.size(); ++i) {

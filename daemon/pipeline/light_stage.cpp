@@ -66,9 +66,10 @@ LightStage::LightStage(const set::Set& set, std::optional<LightCameraCalibration
     return;
   }
   if (!calibration)
-    throw Error(set.file.string() +
-                ": lighting: neither lighting.environment nor a light camera with a calibration is "
-                "given; one of them must light the set, or with from = \"set\" its own lights");
+    throw Error(
+        set.file.string() +
+        ": lighting: no light: give lighting.environment, a light camera with a calibration, "
+        "or from = \"set\" with lamps in the set file");
   intrinsics_ = calibration->intrinsics;
   estimator_.emplace(*calibration, settings_, room_);
   claim_lamps(set, scene, estimator_->resolution());
@@ -114,8 +115,8 @@ void LightStage::await_bracket(std::size_t exposures) {
 void LightStage::use(set::LightMode mode) {
   if (settings_.mode == mode) return;
   if (settings_.from == set::LightFrom::recording) {
-    troubles_.push_back(std::string("a recording has sources and no picture: light mode ") +
-                        set::name_of(mode) + " cannot be had of it");
+    troubles_.push_back(std::string("a recording has lamps but no light picture: light mode ") +
+                        set::name_of(mode) + " is not available");
     return;
   }
   settings_.mode = mode;
@@ -126,12 +127,12 @@ void LightStage::use(set::LightMode mode) {
 bool LightStage::usable(const Frame& frame) {
   const std::string name = "light frame " + std::to_string(frame.sequence);
   if (frame.width != intrinsics_.width || frame.height != intrinsics_.height)
-    troubles_.push_back(name + " is left out: it has " + std::to_string(frame.width) + "x" +
+    troubles_.push_back(name + " is skipped: it has " + std::to_string(frame.width) + "x" +
                         std::to_string(frame.height) + " pixels, the calibration " +
                         std::to_string(intrinsics_.width) + "x" +
                         std::to_string(intrinsics_.height));
   else if (!is_exposure(frame.exposure))
-    troubles_.push_back(name + " is left out: its exposure is " + std::to_string(frame.exposure) +
+    troubles_.push_back(name + " is skipped: its exposure is " + std::to_string(frame.exposure) +
                         "; it must be above 0");
   else
     return true;
@@ -142,8 +143,8 @@ void LightStage::drop_oldest() {
   const auto oldest = std::ranges::min_element(
       newest_, {}, [](const auto& entry) { return entry.second->timestamp_ns; });
   troubles_.push_back("light frame " + std::to_string(oldest->second->sequence) +
-                      " is left out: more than " + std::to_string(most_exposures) +
-                      " different exposures were seen since");
+                      " is skipped: more than " + std::to_string(most_exposures) +
+                      " different exposures have come since");
   newest_.erase(oldest);
 }
 
@@ -191,7 +192,7 @@ void LightStage::measure_declared(Light& light) const {
   for (std::size_t c = 0; c < fluxes.size(); ++c) {
     const glm::dvec3& flux = fluxes[c];
     std::string note = fmt::format(
-        "the light of \"{}\" is taken out of the light around the set: "
+        "the light of \"{}\" is subtracted from the environment light: "
         "{:.3g} {:.3g} {:.3g} W/m^2 facing it",
         claimed_.claims[c].lamp, flux.r, flux.g, flux.b);
     const std::size_t index =
@@ -203,11 +204,11 @@ void LightStage::measure_declared(Light& light) const {
         light.emissions[lamp.name] = emission.value_or(glm::dvec3(0)) / lamp.gain_real;
       if (lamp.measured && !emission)
         note +=
-            "; it cannot be measured by that, because it does not shine towards the light "
-            "camera, and is dark until the set file gives its emission";
+            "; its brightness cannot be measured, because it faces away from the light "
+            "camera; it stays dark until the set file gives its emission";
       else if (lamp.measured && flux == glm::dvec3(0))
         note +=
-            "; no lamp is seen there, and it is dark until one is or the set file gives its "
+            "; no lamp is visible there; it stays dark until one is, or the set file gives its "
             "emission";
       else if (emission)
         note += fmt::format("; that is an emission of {:.3g} {:.3g} {:.3g}", emission->r,

@@ -210,7 +210,7 @@ void RenderStage::light(const Shot& shot) {
   std::set<std::string> missing = unmatched(*light, set_, shot.scene);
   for (const std::string& name : missing)
     if (!unmatched_.contains(name) && options_.note)
-      options_.note("the lamp \"" + name + "\" that was changed is not found in the light now");
+      options_.note("the adjusted lamp \"" + name + "\" is not found in the current light");
   unmatched_ = std::move(missing);
   light_ = shot.light;
   relit_ = std::move(changed);

@@ -39,7 +39,7 @@ void StageKeeper::went_well() {
   if (std::exchange(is_faulty_, false)) {
     parts_.reports.settle(name_);
     parts_.reports({Severity::info, name_, "works again"});
-    parts_.metrics.count(name_ + ": begun anew");
+    parts_.metrics.count(name_ + ": restarted");
     reported_.clear();
   }
   if (failed_at_ && parts_.clock.now() - *failed_at_ > 2 * parts_.delays.last) {
@@ -60,8 +60,8 @@ void StageKeeper::failed(const char* why) noexcept {
     parts_.reports.announce(
         {.severity = Severity::error,
          .source = name_,
-         .text = "has failed and begins anew; what is recorded goes on: " + std::string(why),
-         .notice = report::lasting(name_, "has failed and begins anew: " + std::string(why))});
+         .text = "has failed and is restarting; recording continues: " + std::string(why),
+         .notice = report::lasting(name_, "has failed and is restarting: " + std::string(why))});
   } catch (...) {
     // Memory may be short; the count or the report is then missing, and nothing else.
   }

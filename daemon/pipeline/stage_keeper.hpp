@@ -52,7 +52,7 @@ class StageKeeper {
     } catch (const std::exception& error) {
       failed(error.what());
     } catch (...) {
-      failed("something was thrown that is no error");
+      failed("unknown exception");
     }
     return false;
   }

@@ -24,11 +24,10 @@ std::string why_missing(const session::Session& session, const std::string& sour
 ObserverCalibration observer_calibration(const set::Set& set, const session::SessionInfo& session) {
   if (set.observer.calibration) return *set.observer.calibration;
   if (session.observer) return *session.observer;
-  throw Error(
-      set.file.string() +
-      ": observer: neither the set nor the session has the observer's calibration: find it with "
-      "`previzd calibrate observer`, or `previzd calibrate from` if another tool has it, "
-      "and put the table [observer.intrinsics] into the set");
+  throw Error(set.file.string() +
+              ": observer: no film camera calibration in the set file or the session: find it with "
+              "`previzd calibrate observer`, or `previzd calibrate from` if another tool has it, "
+              "and put the table [observer.intrinsics] into the set");
 }
 
 std::optional<LightCameraCalibration> light_calibration(const set::Set& set,
@@ -51,7 +50,7 @@ Take open_take(const std::filesystem::path& session_directory,
   take.set_text = set_file ? session::read_file(*set_file) : take.session.info.set_text;
   if (take.set_text.empty())
     throw Error(session_directory.string() +
-                ": the session carries no set file; name one with --set FILE");
+                ": the session has no set file; give one with --set FILE");
   take.set = set::parse_set(take.set_text, name, assets,
                             set_file    ? set::Origin::crew
                             : any_paths ? set::Origin::trusted_session
@@ -67,13 +66,13 @@ Take open_take(const std::filesystem::path& session_directory,
   take.observer_stream = session::open_stream(take.session, "observer", stop);
   take.light_stream = session::open_stream(take.session, "light", stop);
   if (!take.observer_stream || take.observer_stream->records().empty())
-    throw Error(session_directory.string() + ": the session has no observer frames" +
+    throw Error(session_directory.string() + ": the session has no film camera frames" +
                 why_missing(take.session, "observer"));
   return take;
 }
 
 std::string no_light_words() {
-  return "the session has no light frames, and the set gives no lighting.environment: name a "
+  return "the session has no light frames, and the set file no lighting.environment: give a "
          "picture of the light there, or give lamps ([[light]]) and from = \"set\" in [lighting]";
 }
 

@@ -56,7 +56,7 @@ void TrackStage::follow_carriers(const Shot& shot) {
       troubles_.push_back("carrier \"" + track.name + "\" is not found" +
                           (track.reason.empty() ? "" : " (" + track.reason + ")") +
                           (carriers_.contains(track.name) ? "; it stays where it was"
-                                                          : "; what it carries is not shown"));
+                                                          : "; what it carries is hidden"));
   }
 }
 

@@ -85,7 +85,7 @@ Checked open(const fs::path& set_or_session) {
                             const fs::path& device) {
     if (driver != set::replay_driver || device.empty()) return session::SessionInfo{};
     if (!fs::exists(device)) {
-      checked.remarks.push_back(camera + ".device: there is no session " + device.string());
+      checked.remarks.push_back(camera + ".device: no such session: " + device.string());
       return session::SessionInfo{};
     }
     const auto session = session::open_session(device);
@@ -158,9 +158,9 @@ void check_tracking(Checked& checked, Lines& problems) {
   const auto& tracking = checked.set.tracking;
   const auto& calibration = checked.set.observer.calibration;
   if (tracking.enabled && tracking.tags.empty())
-    checked.remarks.push_back("tracking is on and there is no [[tag]]: the camera will be lost");
+    checked.remarks.push_back("tracking is on but there is no [[tag]]: no pose can be found");
   if (!tracking.enabled && !checked.has_track)
-    checked.remarks.push_back("tracking is off: only a session that recorded poses can be used");
+    checked.remarks.push_back("tracking is off: only a session with recorded poses can be used");
   if (tracking.enabled && calibration)
     attempt(problems, [&] { tracking::make_tracker(checked.set, *calibration, nullptr); });
 }
@@ -169,12 +169,12 @@ void remark_on_cameras(Checked& checked) {
   const auto& set = checked.set;
   if (!set.observer.calibration)
     checked.remarks.push_back(
-        "the observer has no calibration here: it must come with the session that is rendered");
+        "no film camera calibration here: it must come with the session to be rendered");
   const bool has_light_camera =
       set.light_camera.driver != set::no_driver && set.light_camera.calibration;
   if (set.lighting.from == set::LightFrom::camera && !set.lighting.environment && !has_light_camera)
     checked.remarks.push_back(
-        "no environment and no calibrated light camera here: the light must come with the session");
+        "no environment and no calibrated light camera here: the session must supply the light");
 }
 
 // A take says how it was recorded, and nothing more is recorded by its set.
@@ -194,10 +194,10 @@ void remark_on_scene(Checked& checked, const scene::Scene& scene) {
   const bool relit = std::ranges::any_of(scene.lights, &set::Light::is_relit);
   if (!has(set::Presence::virtual_object) && !has(set::Presence::removed) && !relit)
     checked.remarks.push_back(
-        "nothing is virtual, removed or relit: the picture will be the camera's own");
+        "nothing is virtual, removed or relit: the composite will equal the plate");
   else if (!has(set::Presence::phantom))
     checked.remarks.push_back(
-        "no phantom: there is nothing real to catch shadows, and nothing real hides an object");
+        "no phantom: nothing real can catch shadows or hide a virtual object");
 }
 
 void print_cameras(const set::Set& set, std::ostream& out) {
@@ -211,7 +211,7 @@ void print_cameras(const set::Set& set, std::ostream& out) {
       out << words(c->lens->focal_length_m * 1e3, " mm lens at f/", c->lens->f_number,
                    ", focus at ", c->lens->focus_distance_m, " m");
     else
-      out << "everything sharp";
+      out << "everything in focus";
   }
   out << "\n  light camera  " << device(set.light_camera.driver, set.light_camera.device);
   if (const auto& c = set.light_camera.calibration; c && set.light_camera.driver != set::no_driver)
@@ -223,7 +223,7 @@ void print_cameras(const set::Set& set, std::ostream& out) {
 void print_tags(const set::Tracking& tracking, std::ostream& out) {
   out << "\ntracking\n  ";
   if (!tracking.enabled) {
-    out << "off: the poses that the session recorded are used\n";
+    out << "off: uses the poses recorded in the session\n";
     return;
   }
   out << plural(tracking.tags.size(), "tag") << " of family " << tracking.family;
@@ -257,8 +257,7 @@ void print_objects(const set::Set& set, const scene::Scene& scene, std::ostream&
     out << "  " << object.name << ": " << set::name_of(object.presence) << ", "
         << plural(triangles[i], "triangle") << " in " << plural(instances[i], "instance")
         << ", from " << object.file_as_written;
-    if (!object.variant.empty())
-      out << ", in its variant \"" << set::printable(object.variant) << '"';
+    if (!object.variant.empty()) out << ", variant \"" << set::printable(object.variant) << '"';
     out << '\n';
     const scene::Variants* variants = scene::variants_of(scene, i);
     if (!variants) continue;
@@ -274,14 +273,13 @@ void print_objects(const set::Set& set, const scene::Scene& scene, std::ostream&
 
 void print_lights(const set::Set& set, const scene::Scene& scene, std::ostream& out) {
   const auto& lighting = set.lighting;
-  out << "\nlight\n  around the set: "
-      << (lighting.environment                   ? "the picture " + lighting.environment_as_written
+  out << "\nlight\n  environment: "
+      << (lighting.environment                   ? "the file " + lighting.environment_as_written
           : lighting.from == set::LightFrom::set ? std::string("none")
           : lighting.from == set::LightFrom::recording ? std::string("as the session recorded it")
           : set.light_camera.driver == set::no_driver
-              ? std::string("what the session's light camera saw, if it has one; this set has none")
-              : words("what the light camera sees; where it cannot see: ",
-                      set::name_of(lighting.unseen)))
+              ? std::string("from the session's light camera, if it has one; this set has none")
+              : words("from the light camera; outside its view: ", set::name_of(lighting.unseen)))
       << '\n';
   if (lighting.mode == set::LightMode::sources)
     out << "    its lamps light the set; the rest is " << set::name_of(lighting.sources.residual)
@@ -292,25 +290,25 @@ void print_lights(const set::Set& set, const scene::Scene& scene, std::ostream& 
                          double real, const glm::dvec3& tint, const std::string& more) {
     const char* change = real == 0                          ? "added"
                          : mixed * tint == glm::dvec3(real) ? "as it is"
-                         : mixed == 0                       ? "taken away"
+                         : mixed == 0                       ? "switched off"
                          : mixed < real                     ? "dimmed"
                          : mixed > real                     ? "brightened"
                                                             : "tinted";
     out << "  " << (name.empty() ? "(no name)" : name) << ": " << kind << ", " << change
-        << words(", gain ", mixed, " in the picture, ", real, " in the real scene");
+        << words(", gain ", mixed, " in the composite, ", real, " on the real set");
     if (tint != glm::dvec3(1)) out << words(", tint ", tint.r, ' ', tint.g, ' ', tint.b);
     out << more << '\n';
   };
   for (const auto& light : scene.lights)
     print(light.name, set::name_of(light.type), light.gain_mixed, light.gain_real, light.tint,
-          light.captured ? words("; taken out of the light around the set",
-                                 light.measured ? ", which says how bright it is" : "")
+          light.captured ? words("; subtracted from the environment light",
+                                 light.measured ? ", which gives its brightness" : "")
                          : "");
   for (const auto& lamp : set.captured_lamps)
     print(lamp.name,
           words("within ", lamp.cone_rad * 180 / std::numbers::pi,
-                " degrees of where it is in the light around the set"),
-          lamp.gain_mixed, 1, lamp.tint, "; taken out of it");
+                " degrees of its direction in the environment light"),
+          lamp.gain_mixed, 1, lamp.tint, "; subtracted from it");
 }
 
 void print_estimator(const set::Set& set, std::ostream& out) {
@@ -329,9 +327,9 @@ void print_features(const render::Demand& demand, const scene::Size& size, std::
         .push_back(words(feature.name, ": ", needed ? feature.used : feature.left_out));
   }
   out << "\nthis set uses\n  geometry: " << plural(size.triangles, "triangle") << ", or "
-      << grouped(size.instanced_triangles) << " with every copy of an object counted\n";
+      << grouped(size.instanced_triangles) << " counting every copy of an object\n";
   for (const auto& line : used) out << "  " << line << '\n';
-  out << "\nleft out, because this set does not use it\n";
+  out << "\nnot used by this set, so switched off\n";
   for (const auto& line : unused) out << "  " << line << '\n';
 }
 
@@ -413,7 +411,7 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
   for (const std::string& line : implausible(checked.set)) checked.remarks.push_back(line);
   remark_on_cameras(checked);
   remark_on_scene(checked, *scene);
-  out << checked.set.name << " (" << checked.set.file.string() << ") is right\n";
+  out << checked.set.name << " (" << checked.set.file.string() << ") is valid\n";
   print_cameras(checked.set, out);
   print_tags(checked.set.tracking, out);
   print_objects(checked.set, *scene, out);
@@ -426,7 +424,7 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
       render::material_features(*scene, checked.set.estimation.specular_roughness));
   print_features(demand, size, out);
   print_costs(checked.set, render::needed_bits(demand), size, out);
-  if (!checked.remarks.empty()) out << "\nworth a look\n";
+  if (!checked.remarks.empty()) out << "\nworth checking\n";
   for (const auto& remark : checked.remarks) out << "  " << remark << '\n';
   return 0;
 }

@@ -115,8 +115,8 @@ void look_at_disk(const set::Recording& recording, const Folder& folder, double 
   const fs::path there = output::existing_part(folder.path);
   if (::access(there.c_str(), W_OK) != 0)
     lines.push_back(fmt::format(
-        "{}: you may not write into {}; takes are written by whoever runs the rig, as the service "
-        "by the user previzd",
+        "{}: you may not write to {}; takes are written by the user who runs the rig: the "
+        "service runs as previzd",
         folder.key, there.string()));
   const std::optional<double> free = free_bytes(folder.path);
   if (free && *free < megabyte * recording.reserve_mb)
@@ -164,8 +164,8 @@ Lines why_nothing_is_recorded(const set::Set& set) {
     const fs::path there = output::existing_part(folder.path);
     if (fs::exists(there, unknown) && !fs::is_directory(there, unknown))
       lines.push_back(
-          fmt::format("{}: {}: {} is a file; allowed: a folder, which is made if it is "
-                      "not there",
+          fmt::format("{}: {}: {} is a file; allowed: a folder, which is created if it "
+                      "is missing",
                       set.file.string(), folder.key, there.string()));
   }
   return lines;
@@ -180,8 +180,8 @@ Lines remarks_on_recording(const set::Set& set, std::uint64_t memory_bytes) {
   if (recording.second_directory &&
       output::are_on_one_disk(recording.directory, *recording.second_directory))
     lines.emplace_back(
-        "recording.second_directory is on the disk of recording.directory now: where that is full "
-        "or fails, no recording can go on in it");
+        "recording.second_directory is now on the same disk as recording.directory: if that is "
+        "full or fails, recording stops");
   look_at_preroll(recording, bytes_a_second, memory_bytes, lines);
   return lines;
 }
@@ -191,10 +191,11 @@ void print_recording(const set::Set& set, std::ostream& out) {
   const ExpectedFrames expected = expected_frames(set);
   out << "\nrecording\n";
   if (expected.bytes_a_second > 0)
-    out << fmt::format(
-        "  the cameras' pictures: about {} a second, {}\n", size_in_words(expected.bytes_a_second),
-        recording.codec == session::VideoCodec::raw ? "recorded as they are (raw)"
-                                                    : "and about half of that recorded (ffv1)");
+    out << fmt::format("  the cameras' pictures: about {} per second, {}\n",
+                       size_in_words(expected.bytes_a_second),
+                       recording.codec == session::VideoCodec::raw
+                           ? "recorded as they are (raw)"
+                           : "and about half of that recorded (ffv1)");
   for (const std::string& table : expected.unknown)
     out << "  for how long the disk lasts cannot be said without " << table
         << " rate_hz and the picture's size\n";

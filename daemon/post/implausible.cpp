@@ -66,7 +66,7 @@ void look_at_lens(const ThinLens& lens, Lines& lines) {
         fmt::format("[observer.lens] f_number = {:g}: no lens has this aperture", lens.f_number));
   if (lens.focus_distance_m < 0.02 || lens.focus_distance_m > 1000)
     lines.push_back(fmt::format(
-        "[observer.lens] focus_distance_m = {:g}: it is in metres; leave the table out, and "
+        "[observer.lens] focus_distance_m = {:g}: it is in metres; remove the table, and "
         "everything is sharp",
         lens.focus_distance_m));
 }
@@ -79,7 +79,7 @@ void look_at_shutter(const std::string& camera, const set::CameraWish& wish, Lin
   const double longest = *std::ranges::max_element(times), frame_s = 1 / *wish.settings.rate_hz;
   if (longest > shutter_tolerance * frame_s)
     lines.push_back(fmt::format(
-        "[{}.camera] exposes for {:g} s, longer than a frame lasts at {:g} a second ({:.3g} s): "
+        "[{}.camera] exposes for {:g} s, longer than a frame lasts at {:g} per second ({:.3g} s): "
         "the camera will be slower, or expose less; times are in seconds",
         camera, longest, *wish.settings.rate_hz, frame_s));
 }

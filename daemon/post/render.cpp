@@ -60,8 +60,8 @@ void check_directory(const set::Set& set, const RenderOptions& options) {
   const bool chosen = options.directory || options.set_file || options.any_paths;
   if (!chosen && !session::lies_within(options.session, set.output.directory))
     throw Error(
-        options.session.string() + ": its set writes into " + set.output.directory.string() +
-        ", outside the take's folder; name a folder with --out, or let it with --any-paths");
+        options.session.string() + ": its set file writes to " + set.output.directory.string() +
+        ", outside the take's folder; give a folder with --out, or allow it with --any-paths");
 }
 
 // Returns how many frames on each side a picture is averaged with.
@@ -112,7 +112,7 @@ FrameRange range_of(const RenderOptions& options, const pipeline::Take& take) {
   FrameRange range = options.frames.value_or(FrameRange{0, last});
   if (range.first > last)
     throw Error(options.session.string() + ": --frames starts at " + std::to_string(range.first) +
-                ", but the last observer frame is " + std::to_string(last));
+                ", but the last frame is " + std::to_string(last));
   range.last = std::min(range.last, last);
   return range;
 }
@@ -141,10 +141,10 @@ std::string quality_words(const set::Quality& quality) {
   if (pipeline::spreads_samples(quality))
     text += " on average";
   else if (quality.adaptive)
-    text += ", the same for every pixel (adaptive takes 32 or more, and neither error nor seconds)";
+    text += ", the same for every pixel (adaptive needs 32 or more, without error or seconds)";
   if (quality.error > 0) text += ", then to an error of " + percent_words(quality.error);
   if (quality.seconds > 0)
-    text += ", then for " + output::duration_words(quality.seconds) + " a frame at most";
+    text += ", then for " + output::duration_words(quality.seconds) + " per frame at most";
   if (quality.denoise) text += ", denoised";
   if (const int neighbours = neighbours_of(quality))
     text += ", over " + std::to_string(neighbours) + (neighbours == 1 ? " frame" : " frames") +
@@ -170,10 +170,10 @@ std::string dropped_text(const render::Counters& counters) {
   const auto add = [&](std::uint64_t count, const char* what) {
     if (count > 0) add_to_list(text, std::to_string(count) + what);
   };
-  add(counters.dropped_not_finite, " samples not finite");
-  add(counters.dropped_negative, " samples negative");
-  add(counters.stopped_in_layers, " rays stopped by the last of too many transparent surfaces");
-  add(counters.unfinished, " paths cut off before their end");
+  add(counters.dropped_not_finite, " non-finite samples");
+  add(counters.dropped_negative, " negative samples");
+  add(counters.stopped_in_layers, " rays stopped after too many transparent surfaces");
+  add(counters.unfinished, " paths cut short");
   return text;
 }
 
@@ -281,7 +281,7 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
     if (!shot.whole) return directory.release(shot.index);
     directory.write(shot, written);
     if (const std::string dropped = dropped_text(shot.counters); !dropped.empty())
-      progress.note("frame " + std::to_string(shot.index) + ": left out " + dropped);
+      progress.note("frame " + std::to_string(shot.index) + ": dropped " + dropped);
     progress.frame_done(done_text(shot), now_s());
     if (options.on_frame) options.on_frame(shot);
   });
@@ -338,7 +338,7 @@ void report_opened(const RenderDirectory& directory, const RenderReport& report,
   for (const std::string& note : directory.notes()) out << folder << ": " << note << std::endl;
   if (report.found_finished > 0)
     out << folder << ": " << report.found_finished
-        << " frames are finished already, and their files are as they were written" << std::endl;
+        << " frames already rendered, and their files are as they were written" << std::endl;
   for (const auto& [why, frames] : directory.rejected())
     out << folder << ": rendered again: " << frames_words(frames) << ": " << why << std::endl;
 }

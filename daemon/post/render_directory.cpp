@@ -79,7 +79,7 @@ std::string why_broken(const std::filesystem::path& file, bool has_marks, Finish
     if (std::filesystem::file_size(file, unknown) != mark->second.bytes)
       return its + " has another size than when it was written";
     if (session::sha256_of(file) != mark->second.sha256)
-      return its + " has another content (SHA-256) than when it was written";
+      return its + " has other content (SHA-256) than when it was written";
   } catch (const Error&) {
     return its + (has_marks ? " cannot be read" : " cannot be decoded");
   }
@@ -130,7 +130,7 @@ RenderDirectory::RenderDirectory(const set::Output& output, const std::string& s
   std::error_code code;
   std::filesystem::create_directories(path(), code);
   if (!std::filesystem::is_directory(path()))
-    throw Error(path().string() + ": cannot be made: " + code.message());
+    throw Error(path().string() + ": cannot be created: " + code.message());
   for (const char* name : {settings_name, lines_name})
     if (const std::string why = session::why_not_plain(path() / name); !why.empty())
       throw Error((path() / name).string() + ": " + why);
@@ -160,10 +160,10 @@ void RenderDirectory::begin(const std::string& settings, bool force, FrameRange 
   const std::string differ = is_new ? "" : differences_from(settings);
   if (!differ.empty() && !others.empty())
     throw Error(name + ": other settings are being rendered there (" + differ + ") by " + who +
-                "; name another directory with --out, or wait until they have ended");
+                "; give another folder with --out, or wait until they have ended");
   if (!differ.empty() && !force)
-    throw Error(name + ": the frames there were rendered with other settings (" + differ +
-                "); name another directory with --out, or render them again with --force");
+    throw Error(name + ": its frames were rendered with other settings (" + differ +
+                "); give another folder with --out, or render them again with --force");
   if (force && !others.empty())
     notes_.push_back(
         "--force is ignored while others are at work here, so that what they finish "
@@ -257,8 +257,8 @@ void RenderDirectory::reject_without_line(FrameRange range) {
       if (file(*frame, extension).filename() == entry.path().filename()) frames.insert(*frame);
   }
   if (!frames.empty())
-    rejected_["it has no whole line in " + std::string(lines_name)].assign(frames.begin(),
-                                                                           frames.end());
+    rejected_["it has no complete line in " + std::string(lines_name)].assign(frames.begin(),
+                                                                              frames.end());
 }
 
 std::vector<const char*> RenderDirectory::extensions() const {
@@ -378,7 +378,7 @@ std::filesystem::path RenderDirectory::write_video(const std::vector<FinishedFra
       << std::endl;
   if (clock_.timecode && !session::counts_frames(clock_))
     out << "  without timecode: the take's counts " << clock_.timecode->fps
-        << " frames a second (recording.timecode_fps), and it has " << clock_.fps << std::endl;
+        << " frames per second (recording.timecode_fps), and it has " << clock_.fps << std::endl;
   return written;
 }
 

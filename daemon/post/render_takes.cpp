@@ -22,7 +22,7 @@ TakesReport render_takes(const RenderOptions& options, WhichTakes which, std::os
     if (!is_wanted(take, which)) continue;
     found = true;
     if (take.may_be_in_recording) {
-      out << take.directory.string() << ": is being recorded, left out" << std::endl;
+      out << take.directory.string() << ": is being recorded, skipped" << std::endl;
       continue;
     }
     out << take.directory.string() << std::endl;
@@ -43,7 +43,7 @@ TakesReport render_takes(const RenderOptions& options, WhichTakes which, std::os
                 (which == WhichTakes::good
                      ? ": no take in it is marked good; `previzd takes mark TAKE` marks one, and "
                        "--all renders every take"
-                     : ": there is no take in it; name the folder that the set's "
+                     : ": contains no takes; give the folder that the set's "
                        "recording.directory names"));
   return report;
 }

@@ -104,11 +104,11 @@ void check_room(const output::ListedTake& take, const fs::path& folder) {
 bool copy_take(const output::ListedTake& take, const fs::path& copy, const std::stop_token& stop) {
   const fs::path folder = fs::absolute(copy).parent_path();
   if (session::lies_within(take.directory, copy))
-    throw Error(copy.string() + ": lies in the take itself; name another folder");
+    throw Error(copy.string() + ": is inside the take; choose another folder");
   if (fs::exists(copy)) {
     if (is_same_copy(take, copy)) return false;
     throw Error(copy.string() +
-                ": is there already, and is no copy of this take as it is now; copy into another "
+                ": already exists and is not a current copy of this take; copy to another "
                 "folder, or remove it");
   }
   check_room(take, folder);
@@ -125,7 +125,7 @@ bool copy_take(const output::ListedTake& take, const fs::path& copy, const std::
     const std::string hash = session::sha256_of(from, stop);
     if (session::sha256_of(to, stop) != hash)
       throw Error(copy.string() + ": " + file.string() +
-                  " reads back different from what was written; the disk fails, or its cable; no "
+                  " does not read back as written; the disk or its cable is failing; no "
                   "copy was made");
     sums[file.string()] = hash;
   }

@@ -32,8 +32,8 @@ Paths folders_of(const Paths& places) {
       if (recording.second_directory) folders.push_back(*recording.second_directory);
     } else {
       throw Error(place.string() +
-                  ": is not there; name a folder of takes, or a set file, whose "
-                  "recording.directory has them");
+                  ": not found; give a folder of takes, or a set file whose "
+                  "recording.directory holds them");
     }
   }
   return folders;
@@ -117,7 +117,7 @@ std::vector<ListedTake> takes_at_rest(const Paths& directories) {
     if (takes.back().may_be_in_recording)
       throw Error(takes.back().directory.string() +
                   ": is being recorded; end the take first (`previzctl record off`), or start the "
-                  "rig once if its computer went down meanwhile");
+                  "rig once if its computer crashed during the take");
   }
   return takes;
 }
@@ -149,7 +149,7 @@ void delete_take(const ListedTake& take, std::ostream& out) {
   if (rest.empty()) delete_file(directory);
   session::sync_names(fs::absolute(directory).parent_path());
   out << directory.string() << ": deleted, " << size_words(take.bytes)
-      << (rest.empty() ? "" : "; not the take's own, and still there: " + rest) << '\n';
+      << (rest.empty() ? "" : "; kept, because not part of the take: " + rest) << '\n';
 }
 
 }  // namespace
@@ -251,7 +251,7 @@ int copy_takes(const CopyOptions& options, std::ostream& out, const std::stop_to
     const fs::path copy = options.folder / take.directory.filename();
     const bool was_made = copy_take(take, copy, stop);
     out << copy.string()
-        << (was_made ? ": " + size_words(take.bytes) + ", checked" : ": was copied before")
+        << (was_made ? ": " + size_words(take.bytes) + ", checked" : ": already copied")
         << std::endl;
     // The bytes are the same; whether they are a whole take is another question.
     for (const std::string& fault : damage_of(copy, stop)) {
@@ -271,7 +271,7 @@ void delete_takes(const Paths& takes, bool also_good, std::ostream& out) {
   for (const ListedTake& take : all)
     if (!also_good && take.summary.info.take && take.summary.info.take->good)
       throw Error(take.directory.string() +
-                  ": is marked good; say --good to delete it all the same, or take the mark away "
+                  ": is marked good; add --good to delete it anyway, or remove the mark "
                   "with `previzd takes mark --not`; nothing was deleted");
   for (const ListedTake& take : all) delete_take(take, out);
 }

@@ -99,7 +99,7 @@ Drawing aprilgrid(const calibrate::Board& board, const std::string& name) {
   const double cell = tag / shape.border, outside = (shape.total - shape.border) * cell / 2;
   if (gap < 2 * outside)
     throw Error(
-        fmt::format("board \"{}\" has tags that run into each other: {} of {:g} mm needs a "
+        fmt::format("board \"{}\" has overlapping tags: {} of {:g} mm needs a "
                     "gap of {:g} mm or more",
                     name, board.dictionary, tag, 2 * outside));
   const double margin = board.is_kalibr ? gap + cell : std::max(gap, outside + cell);

@@ -9,7 +9,7 @@ namespace {
 
 void add_print_options(CLI::App& command, PrintOptions& options, const char* file) {
   options.file = file;
-  command.add_option("--paper", options.paper, "Paper; what is larger is cut into several sheets")
+  command.add_option("--paper", options.paper, "Paper size; larger drawings span several sheets")
       ->check(CLI::IsMember({"A4", "A3", "Letter"}))
       ->capture_default_str();
   command.add_option("--out", options.file, "PDF file")->capture_default_str();
@@ -28,9 +28,9 @@ void add_tag_options(CLI::App& command, TagOptions& options, const char* ids, co
 void add_print(CLI::App& app, Commands& commands) {
   CLI::App& command = *app.add_subcommand("print", "Draw tags and boards for the printer, as PDF");
   command.require_subcommand(1);
-  add_tag_options(*command.add_subcommand("tags", "Tags to cut out, several a sheet"),
+  add_tag_options(*command.add_subcommand("tags", "Tags to cut out, several per sheet"),
                   commands.tags, "Ids: 0-11,20", "tags.pdf");
-  add_tag_options(*command.add_subcommand("block", "Paper to fold around a cube, a tag a side"),
+  add_tag_options(*command.add_subcommand("block", "Paper to fold around a cube, one tag per side"),
                   commands.block, "Ids: four around it, one above, one below (or none)",
                   "block.pdf");
   add_tag_options(*command.add_subcommand("stick", "Paper to fold around a square stick"),

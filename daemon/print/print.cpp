@@ -17,7 +17,7 @@ TagSheet sheet_of(const TagOptions& options) {
   const auto size = calibrate::parse_length(options.size);
   if (!size)
     throw Error("size \"" + options.size +
-                "\" is not understood; allowed: 80mm, 8cm, 0.08m or 3in, the side of the black "
+                "\" is not valid; allowed: 80mm, 8cm, 0.08m or 3in, the side of the black "
                 "border");
   return {options.family, parse_ids(options.ids), 1000 * *size};
 }

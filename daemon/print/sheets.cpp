@@ -93,7 +93,7 @@ Paper paper_by_name(const std::string& name) {
     if (paper.name == name) return paper;
     add_to_list(known, paper.name);
   }
-  throw Error("paper \"" + name + "\" is not known; known are " + known);
+  throw Error("paper \"" + name + "\" is unknown; known: " + known);
 }
 
 std::vector<Sheet> lay_out(const std::vector<Drawing>& drawings, const Paper& paper,
@@ -111,7 +111,7 @@ std::vector<Sheet> lay_out(const std::vector<Drawing>& drawings, const Paper& pa
   if (best->count() > most_sheets_of_a_drawing)
     throw Error(
         fmt::format("{} is {:.0f} mm x {:.0f} mm and would take {} sheets of {}; at most {} "
-                    "can be put together: choose a smaller size or larger paper",
+                    "are allowed: choose a smaller size or larger paper",
                     drawings.front().name, drawings.front().width, drawings.front().height,
                     best->count(), paper.name, most_sheets_of_a_drawing));
   std::vector<Sheet> sheets;

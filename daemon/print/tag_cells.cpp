@@ -45,7 +45,7 @@ OwnedFamily make_family(const std::string& name) {
     if (name == family.name) return {family.create(), family.destroy};
     add_to_list(known, family.name);
   }
-  throw Error("\"" + name + "\" is not a tag family; known are " + known);
+  throw Error("\"" + name + "\" is not a tag family; known: " + known);
 }
 
 }  // namespace

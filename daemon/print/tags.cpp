@@ -79,10 +79,10 @@ std::vector<int> parse_ids(const std::string& text) {
       read = std::from_chars(read.ptr + 1, end, last);
     if (read.ec != std::errc{} || read.ptr != end || first < 0 || last < first ||
         last - first > most)
-      throw Error("ids \"" + part + "\" are not understood; allowed: 0-11,20");
+      throw Error("ids \"" + part + "\" are not valid; allowed: 0-11,20");
     for (int id = first; id <= last; ++id) ids.push_back(id);
   }
-  if (ids.empty()) throw Error("there are no ids; allowed: 0-11,20");
+  if (ids.empty()) throw Error("no ids given; allowed: 0-11,20");
   return ids;
 }
 
@@ -137,7 +137,7 @@ Drawing draw_block(const TagSheet& sheet) {
 Drawing draw_stick(const TagSheet& sheet) {
   if (sheet.ids.size() % 4 != 0)
     throw Error(
-        "a stick has four tags around it, and again four above: give 4, 8, 12 ... ids; "
+        "a stick has rings of four tags: give 4, 8, 12 ... ids; "
         "these are " +
         std::to_string(sheet.ids.size()));
   const double face = face_mm(sheet);

@@ -143,7 +143,7 @@ void Device::create_instance() {
   std::vector<const char*> extensions;
   if (options_.validation) {
     if (!has_layer(context_, layer))
-      throw Error("Vulkan: validation was asked for, but the layer " + std::string(layer) +
+      throw Error("Vulkan: validation was requested, but the layer " + std::string(layer) +
                   " is not installed (package vulkan-validationlayers)");
     layers.push_back(layer);
     if (options_.synchronization) extensions.push_back(VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME);
@@ -174,7 +174,7 @@ void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) 
     const std::string name = properties.deviceName;
     std::string lack = lacks(physical);
     const bool is_cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
-    if (lack.empty() && is_cpu && !cpu_too) lack = "the CPU, while a GPU is waited for";
+    if (lack.empty() && is_cpu && !cpu_too) lack = "a CPU; waiting for a GPU";
     found += "\n  " + name + (lack.empty() ? "" : " (" + lack + ")");
     if (!lack.empty() || name.find(wanted_name) == std::string::npos) continue;
     if (rank(properties.deviceType) >= best) continue;
@@ -294,7 +294,7 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
     throw;
   } catch (const vk::SystemError& error) {
     const bool is_full = error.code() == vk::Result::eErrorOutOfDeviceMemory;
-    throw Error("Vulkan: " + device.name() + (is_full ? " has no memory left" : " has no room") +
+    throw Error("Vulkan: " + device.name() + (is_full ? " is out of memory" : " has no room") +
                 " for a buffer of " + std::to_string(result.size) + " bytes" +
                 (is_full ? "" : std::string(": ") + error.what()));
   }

@@ -110,22 +110,22 @@ constexpr std::array<Feature, 31> feature_table = {{
            return std::ranges::any_of(d.scene.instances, is_not_in_both);
          },
      .used = "an object is virtual or removed, so light is followed with it and without it",
-     .left_out = "no object is virtual or removed, so light takes the same way with or without"},
+     .left_out = "no object is virtual or removed, so light paths are the same with or without"},
     {.name = "removed objects",
      .in_frame =
          [](bool, const Demand& d) {
            return std::ranges::find(d.scene.instances, scene::world_real,
                                     &scene::Instance::presence) != d.scene.instances.end();
          },
-     .used = "a real object is taken out of the picture",
-     .left_out = "no real object is taken out of the picture"},
+     .used = "a real object is removed from the picture",
+     .left_out = "no real object is removed from the picture"},
     {.name = "relighting",
      .in_frame =
          [](bool, const Demand& d) {
            return d.relights_captured || std::ranges::any_of(d.scene.lights, &set::Light::is_relit);
          },
-     .used = "a lamp is added, taken away, dimmed, brightened or tinted",
-     .left_out = "every lamp shines in the picture as it does on the stage"},
+     .used = "a lamp is added, switched off, dimmed, brightened or tinted",
+     .left_out = "every lamp shines in the picture as it does on the set"},
     {.name = "lens",
      .bit = gpu::FEATURE_LENS,
      .can_be_carried = true,
@@ -134,7 +134,7 @@ constexpr std::array<Feature, 31> feature_table = {{
      .left_out = "everything is in focus"},
     {.name = "deforming objects",
      .in_frame = [](bool, const Demand& d) { return !d.scene.deformations.empty(); },
-     .used = "an object bends, or changes its shape, while it is played",
+     .used = "an animated object bends or changes its shape",
      .left_out = "every object keeps its shape"},
     {.name = "gloss",
      .bit = gpu::FEATURE_GLOSSY,
@@ -146,7 +146,7 @@ constexpr std::array<Feature, 31> feature_table = {{
      .bit = gpu::FEATURE_COAT_COLOR,
      .can_be_carried = true,
      .in_material = has_coat_color,
-     .used = "paint or plastic reflects in a colour of its own",
+     .used = "paint or plastic reflects in its own colour",
      .left_out = "paint and plastic reflect all colours alike"},
     {.name = "brushed metal",
      .bit = gpu::FEATURE_ANISOTROPY,
@@ -155,8 +155,8 @@ constexpr std::array<Feature, 31> feature_table = {{
          [](const Material& m, const Scene& scene, double alpha) {
            return scene::is_anisotropic(m) && reflects(m, scene, alpha);
          },
-     .used = "a surface draws highlights out in one direction, as brushed metal does",
-     .left_out = "no surface draws highlights out in one direction"},
+     .used = "a surface stretches highlights in one direction, as brushed metal does",
+     .left_out = "no surface stretches highlights in one direction"},
     {.name = "cloth",
      .bit = gpu::FEATURE_SHEEN,
      .can_be_carried = true,
@@ -193,8 +193,8 @@ constexpr std::array<Feature, 31> feature_table = {{
      .bit = gpu::FEATURE_ATTENUATION,
      .can_be_carried = true,
      .in_material = [](const Material& m, const Scene&, double) { return scene::attenuates(m); },
-     .used = "glass or a liquid colours light more the longer its way through",
-     .left_out = "light keeps its colour on its way through what is clear"},
+     .used = "glass or a liquid tints light, the more the thicker it is",
+     .left_out = "clear materials do not tint the light"},
     {.name = "photons",
      .bit = gpu::FEATURE_PHOTONS,
      .in_material = [](const Material& m, const Scene& scene,
@@ -211,8 +211,8 @@ constexpr std::array<Feature, 31> feature_table = {{
      .bit = gpu::FEATURE_CAUSTICS,
      .in_frame = [](bool,
                     const Demand& d) { return d.estimation.caustics == set::Caustics::traced; },
-     .used = "light by way of mirrors and clear glass is found by chance, as the set asks",
-     .left_out = "the set does not ask for them"},
+     .used = "light via mirrors and clear glass is found by chance, as the set file asks",
+     .left_out = "the set file does not ask for them"},
     {.name = "textures",
      .bit = gpu::FEATURE_TEXTURES,
      .can_be_carried = true,
@@ -253,9 +253,10 @@ constexpr std::array<Feature, 31> feature_table = {{
          },
      .in_frame = [](bool textured,
                     const Demand& d) { return textured && d.estimation.filter_textures; },
-     .used = "images on surfaces are averaged over the area that a sample stands for",
-     .left_out = "no image is averaged over the area that a sample stands for, or the set does not "
-                 "ask for it"},
+     .used = "textures are averaged over the area that a sample covers",
+     .left_out =
+         "no texture is averaged over the area that a sample covers, or the set file does not "
+         "ask for it"},
     {.name = "normal maps",
      .bit = gpu::FEATURE_NORMAL_MAPS,
      .can_be_carried = true,
@@ -269,17 +270,17 @@ constexpr std::array<Feature, 31> feature_table = {{
      .bit = gpu::FEATURE_ALPHA,
      .can_be_carried = true,
      .in_material = lets_through,
-     .used = "a surface has holes or is a veil, by its material's alpha",
-     .left_out = "no surface has holes or is a veil"},
+     .used = "a surface has holes or is see-through, by its material's alpha",
+     .left_out = "no surface has holes or is see-through"},
     {.name = "lamps",
      .bit = gpu::FEATURE_LIGHTS,
      .can_be_carried = true,
      .in_material = glows,
      .in_frame = [](bool glow,
                     const Demand& d) { return glow || d.finds_lamps || !d.scene.lights.empty(); },
-     .used = "the set or a model has lamps, a surface glows, or lamps are found in the light "
-             "around the set",
-     .left_out = "only the light around the set shines"},
+     .used = "the set or a model has lamps, a surface glows, or lamps are found in the environment "
+             "light",
+     .left_out = "the only light is the environment light"},
     {.name = "lamps in view",
      .bit = gpu::FEATURE_VISIBLE_LIGHTS,
      .can_be_carried = true,
@@ -293,13 +294,13 @@ constexpr std::array<Feature, 31> feature_table = {{
      .bit = gpu::FEATURE_MANY_LIGHTS,
      .can_be_carried = true,
      .in_frame = [](bool, const Demand& d) { return are_many(d.scene); },
-     .used = "a point is lit by those of many lamps that are near and turned to it",
-     .left_out = "the lamps are so few that each is looked for everywhere"},
+     .used = "of many lamps, each point uses those that are near and face it",
+     .left_out = "with so few lamps, every point considers each of them"},
     {.name = "glowing surfaces",
      .in_material = glows,
      .used = "a surface gives off light",
      .left_out = "no surface gives off light"},
-    {.name = "light around the set",
+    {.name = "environment light",
      .bit = gpu::FEATURE_ENVIRONMENT_SAMPLING,
      .in_frame =
          [](bool, const Demand& d) {
@@ -307,7 +308,7 @@ constexpr std::array<Feature, 31> feature_table = {{
                   (d.shines_around || d.finds_lamps);
          },
      .used = "rays are aimed at its brightest parts",
-     .left_out = "there is none, or the set asks for no rays aimed at its brightest parts"},
+     .left_out = "there is none, or the set file turns such rays off"},
     {.name = "difference only",
      .bit = gpu::FEATURE_DIFFERENCE,
      // The other composites need the real world's own radiance in every pixel.
@@ -325,10 +326,10 @@ constexpr std::array<Feature, 31> feature_table = {{
            return d.has_plate && d.estimation.real_radiance == set::RealRadiance::camera;
          },
      .used = "what the camera sees of the real set lights the virtual objects",
-     .left_out = "the light that real surfaces pass on is simulated"},
+     .left_out = "the light that real surfaces reflect is simulated"},
     {.name = "denoiser",
      .in_frame = [](bool, const Demand& d) { return d.denoises; },
-     .used = "noise is taken out of the picture that is shown",
+     .used = "noise is removed from the picture that is shown",
      .left_out = "noise is left in the picture that is shown"},
 }};
 static_assert(feature_table.size() <= max_features);

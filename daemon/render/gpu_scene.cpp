@@ -142,9 +142,9 @@ void append_extras(const scene::Mesh& mesh, std::vector<glm::uvec2>& extras) {
 // A path has so many bits to say which medium it is in.
 void check_medium(const scene::Material& material, std::size_t index) {
   if (index >= gpu::MAX_MEDIUM && scene::attenuates(material))
-    throw Error("scene: material \"" + material.name + "\" is coloured inside and is number " +
-                std::to_string(index + 1) + "; only the first " + std::to_string(gpu::MAX_MEDIUM) +
-                " can be");
+    throw Error("scene: material \"" + material.name +
+                "\" has an attenuation colour but is number " + std::to_string(index + 1) +
+                "; only the first " + std::to_string(gpu::MAX_MEDIUM) + " can have one");
 }
 
 template <typename T>
@@ -293,9 +293,9 @@ void GpuScene::check_deforming() const {
   const vk::DeviceSize most = device_.limits().maxStorageBufferRange;
   for (const Buffer* buffer : {&bvh_, &vertices_})
     if (buffer->size > most)
-      throw Error("Vulkan: with meshes that deform, the scene's trees and vertices may have " +
-                  std::to_string(most) + " bytes each on " + device_.name() + ", but here are " +
-                  std::to_string(buffer->size) + "; reduce the scene or play no animation");
+      throw Error("Vulkan: with deforming meshes, the scene's trees and vertices are limited to " +
+                  std::to_string(most) + " bytes each on " + device_.name() + ", but need " +
+                  std::to_string(buffer->size) + "; reduce the scene or remove the animation");
 }
 
 void GpuScene::upload_materials(double specular_alpha) {

@@ -63,11 +63,11 @@ void refuse_too_large(int width, int height, const PictureMemory& memory) {
   const std::string picture = "a picture of " + size_words(width, height);
   if (width < 1 || height < 1) throw Error(picture + " has no pixel");
   if (rays_of(width, height) > memory.texels)
-    throw Error(picture + " is more than the " + std::to_string(memory.texels) +
+    throw Error(picture + " exceeds the " + std::to_string(memory.texels) +
                 " pixels that the Vulkan device can address; make it smaller");
   const std::uint64_t bytes = picture_bytes(width, height, memory.read_back);
   if (bytes > memory.bytes)
-    throw Error(picture + " takes " + gigabytes(bytes) + " of memory, and there is " +
+    throw Error(picture + " takes " + gigabytes(bytes) + " of memory, but there is only " +
                 gigabytes(memory.bytes) + "; make it smaller");
 }
 

@@ -27,7 +27,7 @@ void BusLink::look() {
 void BusLink::connect() {
   if (bus_) {
     bus_.reset();
-    throw Error("D-Bus: the bus has gone");
+    throw Error("D-Bus: lost the bus");
   }
   bus_.emplace(loop_.handle(), verbs_);
 }

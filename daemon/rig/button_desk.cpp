@@ -71,8 +71,7 @@ void ButtonDesk::tick(std::int64_t now_ns) {
 void ButtonDesk::count() {
   for (Watched& watched : devices_) {
     DeviceCounters counters = watched.device.buttons->counters();
-    if (watched.full_turns > 0)
-      counters["turns with more events than are read at once"] = watched.full_turns;
+    if (watched.full_turns > 0) counters["event bursts larger than one read"] = watched.full_turns;
     watched.counts.update(counters);
   }
 }

@@ -36,7 +36,7 @@ FramePtr CameraSource::ask() {
     if (frame) arrived(*frame);
     if (!frame) look_at_silence();
   } catch (const std::exception& error) {
-    failed(std::string("has failed: ") + error.what() + "; it is asked again");
+    failed(std::string("has failed: ") + error.what() + "; trying again");
   }
   return frame;
 }
@@ -92,7 +92,7 @@ void CameraSource::change_exposure(double stops) {
     pulse_.wait();
     if (!is_driven)
       parts_.kept.reports(report::once(
-          {report::Severity::warning, camera_.name(), "its exposure cannot be driven from here"}));
+          {report::Severity::warning, camera_.name(), "its exposure cannot be controlled"}));
   } catch (const std::exception& error) {
     failed(std::string("its exposure cannot be set: ") + error.what());
   }

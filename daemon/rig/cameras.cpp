@@ -66,9 +66,9 @@ std::size_t exposures_of(const session::StreamReader& stream) {
 
 Cameras open_cameras(const set::Set& set, bool loop, const Usb& usb) {
   if (set.observer.driver == set::no_driver)
-    throw Error(set.file.string() + ": observer.driver: \"none\" shows nothing live");
+    throw Error(set.file.string() + ": observer.driver: \"none\" cannot run live");
   if (set.observer.device.empty())
-    throw Error(set.file.string() + ": observer.device: names no session; a folder is needed here");
+    throw Error(set.file.string() + ": observer.device: is empty; give the folder of a session");
   const std::string light_driver =
       set.lighting.environment ? set::no_driver : set.light_camera.driver;
 

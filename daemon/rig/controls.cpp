@@ -112,7 +112,7 @@ std::optional<Outcome> Controls::no_lamp() const {
   const std::vector<std::string> names = lights();
   const bool is_there = std::ranges::find(names, name) != names.end();
   if (is_there || edits().lights.contains(name)) return std::nullopt;
-  return Outcome{name + " is not found in the light now", true, {}};
+  return Outcome{name + " is not in the current light", true, {}};
 }
 
 // Returns the change of the selected lamp; a found one is meant by its direction.
@@ -187,7 +187,7 @@ Outcome Controls::apply(const set::Record&) {
 
 Outcome Controls::apply(const set::MarkGood&) {
   if (!look_.state.recording && !look_.state.has_take)
-    return {"no take was recorded yet; there is nothing to mark", true, {}};
+    return {"no take recorded yet; nothing to mark", true, {}};
   return {"take marked good", false, Request::mark_good};
 }
 
@@ -206,15 +206,15 @@ Outcome Controls::snapshot(std::uint64_t Look::*of) {
 
 Outcome Controls::apply(const set::ReloadSet&) {
   if (look_.state.recording) return {"still recording; end the take first", true, {}};
-  return {"loading the set file again", false, Request::reload_set};
+  return {"reloading the set file", false, Request::reload_set};
 }
 
 Outcome Controls::apply(const set::KeepEdits&) {
   if (look_.state.recording) return {"still recording; end the take first", true, {}};
   if (look_.of_take)
-    return {"what is changed in a take is not the set's; keep that of the live picture", true, {}};
+    return {"changes to a take in review cannot be kept; only live changes can", true, {}};
   if (look_.edits == pipeline::Edits{})
-    return {"buttons have changed nothing; there is nothing to keep", true, {}};
+    return {"buttons have changed nothing; nothing to keep", true, {}};
   return {"changes kept in the set file", false, Request::keep_edits};
 }
 
@@ -239,15 +239,15 @@ Outcome Controls::apply(const set::ChangeSamples& effect) {
 }
 
 Outcome Controls::apply(const set::HoldRate&) {
-  if (!(fps_ > 0)) return {"this set holds no frame rate", true, {}};
+  if (!(fps_ > 0)) return {"quality.fps is 0 in this set file", true, {}};
   look_.governed = true;
   look_.samples = set_samples_;
-  return {fmt::format("{:g} pictures a second are held", fps_), false, {}};
+  return {fmt::format("holding {:g} frames per second", fps_), false, {}};
 }
 
 Outcome Controls::apply(const set::ToggleAccumulation&) {
   look_.accumulates = !look_.accumulates;
-  return {look_.accumulates ? "averaging over frames on" : "averaging over frames off", false, {}};
+  return {look_.accumulates ? "frame averaging on" : "frame averaging off", false, {}};
 }
 
 Outcome Controls::apply(const set::NextEstimator&) {
@@ -306,7 +306,7 @@ Outcome Controls::apply(const set::ScaleObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
   double& scale = edits().objects[selected_object()].scale;
   scale *= effect.steps > 0 ? control_.scale_step : 1 / control_.scale_step;
-  return {fmt::format("{} at {:.3g} of its size", selected_object(), scale), false, {}};
+  return {fmt::format("{} scaled to {:.3g}", selected_object(), scale), false, {}};
 }
 
 // Returns the name of the look that an object with looks is shown in.
@@ -332,9 +332,8 @@ Outcome Controls::apply(const set::ChangeVariant& effect) {
                                               : around(static_cast<std::size_t>(at - names.begin()),
                                                        effect.next, names.size());
   edits().objects[object].variant = names[index];
-  const std::string named = names[index].empty()
-                                ? "as its file has it"
-                                : "variant \"" + set::printable(names[index]) + '"';
+  const std::string named =
+      names[index].empty() ? "no variant" : "variant \"" + set::printable(names[index]) + '"';
   return {fmt::format("{}: {} ({} of {})", object, named, index + 1, names.size()), false, {}};
 }
 
@@ -342,7 +341,7 @@ Outcome Controls::apply(const set::ResetObject&) {
   if (objects_.empty()) return none_of("virtual object");
   edits().objects.erase(selected_object());
   return {
-      selected_object() + " is back where the " + (look_.of_take ? "take" : "set file") + " has it",
+      selected_object() + " is back as the " + (look_.of_take ? "take" : "set file") + " has it",
       false,
       {}};
 }
@@ -351,13 +350,13 @@ Outcome Controls::apply(const set::PlayAnimations&) {
   if (!is_animated_) return none_of("animation");
   ++look_.plays;
   look_.animations_held = false;
-  return {"animations play from their beginning", false, {}};
+  return {"animations restarted", false, {}};
 }
 
 Outcome Controls::apply(const set::HoldAnimations&) {
   if (!is_animated_) return none_of("animation");
   look_.animations_held = !look_.animations_held;
-  return {look_.animations_held ? "animations held" : "animations continue", false, {}};
+  return {look_.animations_held ? "animations paused" : "animations continue", false, {}};
 }
 
 Outcome Controls::apply(const set::SelectLight& effect) {
@@ -394,7 +393,7 @@ Outcome Controls::apply(const set::ResetLight&) {
   if (auto refused = no_lamp()) return *refused;
   edits().lights.erase(selected_light());
   return {
-      selected_light() + " is back as in the " + (look_.of_take ? "take" : "set file"), false, {}};
+      selected_light() + " is reset to the " + (look_.of_take ? "take" : "set file"), false, {}};
 }
 
 Outcome Controls::apply(const set::ChangeExposure& effect) {

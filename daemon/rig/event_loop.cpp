@@ -79,7 +79,7 @@ int on_time(sd_event_source* timer, std::uint64_t, void* data) {
 
 EventLoop::EventLoop(OnFault on_fault)
     : on_fault_(std::make_shared<const OnFault>(std::move(on_fault))) {
-  check(sd_event_new(&event_), "cannot be made");
+  check(sd_event_new(&event_), "cannot be created");
 }
 
 EventLoop::~EventLoop() {
@@ -99,7 +99,7 @@ std::unique_ptr<EventLoop::Watch> EventLoop::every(std::chrono::milliseconds int
   source->interval_us = static_cast<std::uint64_t>(std::chrono::microseconds(interval).count());
   check(sd_event_add_time_relative(event_, source->out(), CLOCK_MONOTONIC, source->interval_us,
                                    1000, on_time, source.get()),
-        "no timer can be made");
+        "a timer cannot be created");
   return source;
 }
 

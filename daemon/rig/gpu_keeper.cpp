@@ -8,7 +8,7 @@ using report::Severity;
 
 namespace {
 
-constexpr const char* graphics_device = "graphics device";  // as the crew calls it
+constexpr const char* graphics_device = "graphics card";  // as the crew calls it
 
 }  // namespace
 
@@ -16,8 +16,8 @@ void GpuKeeper::say_lost(const std::string& what) {
   parts_.reports(
       report::counted({.severity = Severity::error,
                        .source = "",
-                       .text = what + "; it is opened again",
-                       .notice = report::lasting(graphics_device, "is lost; it is opened again")}));
+                       .text = what + "; reopening it",
+                       .notice = report::lasting(graphics_device, "is lost; reopening it")}));
   parts_.metrics.count("device lost");
   gpu_.drop();
 }
@@ -41,7 +41,7 @@ void GpuKeeper::build() {
   is_built_ = true;
   parts_.reports.settle(graphics_device);
   if (gpu_.stands_in())
-    parts_.reports.show(report::lasting(graphics_device, "is gone; the CPU draws, slowly"));
+    parts_.reports.show(report::lasting(graphics_device, "is gone; rendering on the CPU, slowly"));
 }
 
 bool GpuKeeper::renew(const render::DeviceLost& lost) {
@@ -56,8 +56,8 @@ bool GpuKeeper::await() {
     try {
       gpu_.open();
       build();
-      parts_.metrics.count("device opened again");
-      parts_.reports({Severity::info, "", "pictures again, on " + gpu_.name()});
+      parts_.metrics.count("device reopened");
+      parts_.reports({Severity::info, "", "rendering again, on " + gpu_.name()});
     } catch (const std::exception& error) {
       parts_.reports(report::once({Severity::error, "", error.what()}));
       gpu_.drop();

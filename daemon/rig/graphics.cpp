@@ -74,11 +74,10 @@ std::shared_ptr<render::Device> open_graphics(const render::DeviceOptions& optio
     if (render::is_gpu(*device)) remember(*memory, render::device_name(*device), reports);
   } catch (const Error& error) {
     const std::string what =
-        had.empty()
-            ? "there is no graphics device; takes can be recorded, and one is waited for. "
-            : "the rig had the graphics device " + had +
-                  ", which is not there; it is waited for. If it is gone for good, remove " +
-                  memory->string() + ". ";
+        had.empty() ? "no graphics card; takes can be recorded; waiting for one. "
+                    : "the rig's graphics card " + had +
+                          " is missing; waiting for it. If it is gone for good, delete " +
+                          memory->string() + ". ";
     reports({report::Severity::error, "", what + error.what()});
   }
   return device;
@@ -86,7 +85,7 @@ std::shared_ptr<render::Device> open_graphics(const render::DeviceOptions& optio
 
 std::string device_words(const render::Device& device) {
   const std::string name = render::drawing_device(device);
-  return name.empty() ? "no graphics device yet" : name;
+  return name.empty() ? "no graphics card yet" : name;
 }
 
 }  // namespace previz::rig

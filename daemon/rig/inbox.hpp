@@ -21,7 +21,7 @@ namespace previz::rig {
 class Inbox {
  public:
   Inbox() : descriptor_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
-    if (!descriptor_) throw Error(std::string("no eventfd can be made: ") + std::strerror(errno));
+    if (!descriptor_) throw Error(std::string("cannot create an eventfd: ") + std::strerror(errno));
   }
 
   int fd() const { return descriptor_.get(); }  // readable while something waits

@@ -167,7 +167,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
   const auto metrics_json = [&] { return to_json(snapshot()); };
   const auto end_if_replaced = [&] {
     if (!options.replaced || !options.replaced()) return;
-    reports({report::Severity::info, "", "another version was installed, and is started now"});
+    reports({report::Severity::info, "", "another version was installed; restarting"});
     end.request_stop();
   };
   SetKeeper sets(
@@ -207,7 +207,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     reports({report::Severity::info, "",
              "live on " + device_words(*device) + ", set \"" + set.name + "\", " +
                  (set.quality.fps > 0 ? "at most " : "") + std::to_string(set.quality.samples) +
-                 " samples a frame" +
+                 " samples per frame" +
                  (set.quality.fps > 0 ? ", fewer where the rate would suffer (quality.fps)" : "")});
     std::optional<BusLink> bus;
     std::optional<RecordingWatch> watch;
@@ -226,7 +226,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
           is_recording(*rig) || !options.has_new_devices())
         return;
       reports({report::Severity::info, "",
-               "there are devices of a new kind; previzd starts again to open them"});
+               "a new kind of device appeared; previzd is restarting to open it"});
       end.request_stop();
     };
     const auto drivers = loop.every(std::chrono::seconds(1), end_if_barred);
@@ -234,7 +234,7 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
     sets.leave(rig->controls().look().edits);
     if (sets.has_next() && rig->controls().look().take_edits != pipeline::Edits{})
       reports({report::Severity::warning, "review",
-               "what was changed in the take in review is dropped, because a set is read"});
+               "changes to the take in review are dropped, because a set is loading"});
     rig->on_change({});
     bus.reset();
     watch.reset();

@@ -20,7 +20,7 @@ LiveFiles::LiveFiles(std::filesystem::path directory, std::function<std::string(
   std::error_code code;
   std::filesystem::create_directories(directory_, code);
   if (!std::filesystem::is_directory(directory_))
-    throw Error(directory_.string() + ": cannot be made: " + code.message());
+    throw Error(directory_.string() + ": cannot be created: " + code.message());
   thread_ = std::jthread([this] { run(); });
 }
 

@@ -59,7 +59,7 @@ void LiveLight::update(std::vector<pipeline::LightFrame>& frames,
   }
   const std::shared_ptr<const Look> look = parts_.look.get();
   if (!tracks(look->state)) {
-    parts_.kept.metrics.count("light frames that estimation rested", frames.size());
+    parts_.kept.metrics.count("light frames not evaluated in this mode", frames.size());
     return;
   }
   stage_->use(look->light_mode);

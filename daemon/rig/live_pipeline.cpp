@@ -93,10 +93,10 @@ struct LivePipeline::Impl {
   pipeline::StageKeeper demosaicing{"conversion", parts.kept, &pipeline::Patience::stage};
   pipeline::StageKeeper tracking{"tracking", parts.kept, &pipeline::Patience::stage,
                                  [this] { make_track_stage(); }};
-  pipeline::StageKeeper lighting{"light of the picture", parts.kept, &pipeline::Patience::stage};
+  pipeline::StageKeeper lighting{"picture lighting", parts.kept, &pipeline::Patience::stage};
   pipeline::StageKeeper rendering{"render", parts.kept, &pipeline::Patience::render,
                                   [this] { begin_rendering_anew(); }};
-  pipeline::StageKeeper keeping_shown{"pictures in the take", parts.kept,
+  pipeline::StageKeeper keeping_shown{"composite recording", parts.kept,
                                       &pipeline::Patience::stage};
   pipeline::StageKeeper displaying{"display", parts.kept, &pipeline::Patience::stage};
   std::unique_ptr<CameraSource> observer, light_camera;
@@ -204,7 +204,7 @@ void LivePipeline::Impl::show_plates(std::chrono::milliseconds time) {
   const std::stop_token stop = stop_source.get_token();
   rendering.waits();
   while (!stop.stop_requested() && Clock::now() < end) {
-    if (std::optional<Shot> shot = live_render.next_plate("there is no graphics device"))
+    if (std::optional<Shot> shot = live_render.next_plate("no graphics card"))
       rendered.push(*std::move(shot));
     else if (live_render.finished())
       std::this_thread::sleep_for(std::chrono::milliseconds(20));  // a stop comes soon
@@ -311,7 +311,7 @@ Shot LivePipeline::Impl::track(Shot shot) {
   const double animation_s =
       animation_clock.at(shot.frame->timestamp_ns, look->plays, look->animations_held);
   if (!tracks(look->state)) {
-    parts.kept.metrics.count("frames that tracking rested");
+    parts.kept.metrics.count("frames not tracked in this mode");
     return shot;
   }
   const bool is_tracked = tracking.attempt([&] {
@@ -325,7 +325,7 @@ Shot LivePipeline::Impl::track(Shot shot) {
     shot.tracking_done = true;
   }
   if (pose_filter) shot.shown_pose = pose_filter->shown(shot.track, shot.frame->timestamp_ns);
-  if (shot.shown_pose && !shot.track.pose) parts.kept.metrics.count("poses held");
+  if (shot.shown_pose && !shot.track.pose) parts.kept.metrics.count("predicted poses");
   shot.motion.animation_s = animation_s;
   lighting.attempt([&] {
     shot.light = light.light_for(shot, look->light_mode);
@@ -340,7 +340,7 @@ void LivePipeline::Impl::offer_track(Shot& shot, const pipeline::Edits& edits) {
     shot.scene = pipeline::scene_state(parts.set, edits, shot.motion);
     parts.recorder.offer(track_record_of(shot));
   } catch (const std::exception& error) {
-    parts.kept.metrics.count("lines of tracking that failed");
+    parts.kept.metrics.count("tracking lines not recorded");
     parts.kept.reports(report::once({Severity::error, "tracking", reason_of(error)}));
   }
 }
@@ -387,16 +387,15 @@ void count_picture(const Shot& shot, pipeline::Metrics& metrics, report::Reports
   }
   const render::Counters& counters = shot.counters;
   if (counters.rebuilt_trees > 0)
-    metrics.count("trees of deforming meshes built anew", counters.rebuilt_trees);
+    metrics.count("trees of deforming meshes rebuilt", counters.rebuilt_trees);
   if (counters.dropped_not_finite + counters.dropped_negative + counters.stopped_in_layers +
           counters.unfinished ==
       0)
     return;
-  metrics.count("samples not finite", counters.dropped_not_finite);
-  metrics.count("samples negative", counters.dropped_negative);
-  metrics.count("rays stopped by the last of too many transparent surfaces",
-                counters.stopped_in_layers);
-  metrics.count("paths cut off before their end", counters.unfinished);
+  metrics.count("non-finite samples", counters.dropped_not_finite);
+  metrics.count("negative samples", counters.dropped_negative);
+  metrics.count("rays stopped after too many transparent surfaces", counters.stopped_in_layers);
+  metrics.count("paths cut short", counters.unfinished);
 }
 
 LivePipeline::LivePipeline(Parts parts, std::stop_token stop)

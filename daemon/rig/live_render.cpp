@@ -295,8 +295,8 @@ void LiveRender::save_refined(const Look& look) {
 void LiveRender::save(const Shot& shot) {
   if (channels_.snapshots.offer(shot)) return;
   if (stop_.stop_requested()) return metrics_.dropped("snapshot", "stopped");
-  metrics_.dropped("snapshot", "too many waited");
-  const std::string what = "is left out, because those before it are not on the disk yet";
+  metrics_.dropped("snapshot", "queue full");
+  const std::string what = "is skipped, because earlier ones are not on the disk yet";
   reports_({report::Severity::error, "snapshot", what, {}, report::passing("snapshot", what)});
 }
 

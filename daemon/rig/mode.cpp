@@ -8,9 +8,9 @@ Step go(State state, Mode mode) {
   if (state.recording && (mode == Mode::standby || mode == Mode::review))
     return {state, "still recording; end the take first"};
   if (mode == Mode::refine && !state.has_good)
-    return {state, "no frame with a pose and light was seen yet; there is nothing to refine"};
+    return {state, "no frame with a pose and light yet; nothing to refine"};
   if (mode == Mode::review && !state.has_take)
-    return {state, "no take was recorded yet; there is nothing to review"};
+    return {state, "no take recorded yet; nothing to review"};
   state.mode = mode;
   return {state};
 }

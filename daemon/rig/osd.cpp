@@ -75,7 +75,7 @@ std::string samples(const PictureFacts& picture, const Look& look) {
 
 OsdText tracking_words(const PictureFacts& picture) {
   if (picture.held_s > 0)
-    return {fmt::format("tracking held {:.1f} s", picture.held_s), OsdTone::warning};
+    return {fmt::format("predicted pose {:.1f} s", picture.held_s), OsdTone::warning};
   switch (picture.tracking) {
     case TrackStatus::lost:
       return {"tracking lost", OsdTone::alarm};
@@ -98,7 +98,7 @@ void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page
     page.notices.push_back({"recording ended: " + rig.recorder_fault, OsdTone::alarm});
   if (rig.disk_silent_s >= long_silence_s)
     page.notices.push_back(
-        {fmt::format("the disk has not answered for {:.0f} s", rig.disk_silent_s), OsdTone::alarm});
+        {fmt::format("disk not responding for {:.0f} s", rig.disk_silent_s), OsdTone::alarm});
   else if (rig.backlog.seconds - rig.backlog.of_ring_s >= long_behind_s)
     page.notices.push_back({fmt::format("recording is {:.1f} s behind ({:.0f} MB in memory)",
                                         rig.backlog.seconds, 1e-6 * double(rig.backlog.bytes)),

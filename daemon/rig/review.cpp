@@ -18,7 +18,8 @@ void play(const std::stop_token& stop, const std::filesystem::path& directory, c
           pipeline::Mailbox<pipeline::Shot>& out, Reports& reports) {
   pipeline::Take take = pipeline::open_take(directory, {}, false, stop);
   if (take.set_text != set.text)
-    throw Error(directory.string() + ": was recorded with another set; run that one to review it");
+    throw Error(directory.string() +
+                ": was recorded with another set file; run that one to review it");
   for (const std::string& what : take.session.missing)
     reports(report::once({Severity::warning, directory.string(), what}));
   if (!take.session.track.empty()) take.set.tracking.enabled = false;

@@ -54,7 +54,7 @@ output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& camer
   try {
     take.assets = scene::assets_of(set);
   } catch (const Error& error) {
-    reports(report::once({Severity::warning, "takes will lack the scene", error.what()}));
+    reports(report::once({Severity::warning, "takes will miss the scene files", error.what()}));
   }
   return take;
 }
@@ -237,7 +237,7 @@ Outcome Rig::apply(Outcome outcome, const std::string& by, Severity severity) {
     if (std::optional<std::string> why_not = carry_out(*outcome.request, by))
       outcome = {*std::move(why_not), true, {}};
     else if (outcome.request == Request::keep_edits && parts_.sets.is_reading())
-      outcome.said = "changes are being kept in the set file";
+      outcome.said = "keeping the changes in the set file";
   }
   publish_look();  // after the request, so that a take exists before its first shown picture
   if (outcome.refused) severity = Severity::warning;
@@ -309,7 +309,7 @@ std::optional<std::string> Rig::carry_out(Request request, const std::string& by
 // A set that is read at once, as most are, or is found wrong at once is answered for at once.
 std::optional<std::string> Rig::read_set(const std::function<void()>& begin,
                                          const std::string& by) {
-  if (parts_.sets.is_reading() || parts_.sets.has_next()) return "a set is being read already";
+  if (parts_.sets.is_reading() || parts_.sets.has_next()) return "a set is already loading";
   begin();
   reading_for_ = by;
   return take_set(prompt);
@@ -321,7 +321,7 @@ std::optional<std::string> Rig::take_set(std::chrono::milliseconds patience) {
   if (!ended) return std::nullopt;
   if (ended->why_not) return ended->why_not;
   if (controls_.look().state.recording)
-    return parts_.sets.drop_next("recording began while another one was read");
+    return parts_.sets.drop_next("recording began while another one was loading");
   parts_.loop.exit();
   return std::nullopt;
 }
@@ -396,9 +396,9 @@ void Rig::look_at_folders() {
     const std::string name = seen.folder.string();
     std::string what;
     if (seen.silent_s > longest_folder_silence_s)
-      what = "its disk does not answer; takes may not be written there";
+      what = "its disk does not respond; takes may not be written there";
     else if (!seen.why_not.empty())
-      what = "takes cannot be written there: " + seen.why_not;
+      what = "is not writable for takes: " + seen.why_not;
     if (what.empty())
       parts_.kept.reports.settle(name);
     else
@@ -440,7 +440,7 @@ void Rig::announce_salvaged(const std::vector<std::string>& salvaged) {
 // says that he has seen it.
 void Rig::resume(const std::string& take) {
   if (!controls_.look().state.recording) apply(controls_.happened(Event::record_on), "recorder");
-  const std::string what = take + " was cut off; recording goes on in the next take";
+  const std::string what = take + " was cut off; recording continues in the next take";
   apply({what, false, {}}, "recorder", Severity::error);
   parts_.kept.reports.show(report::lasting(cut_off, what));
 }

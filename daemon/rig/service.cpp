@@ -66,7 +66,7 @@ void Service::report_hung(const std::vector<std::string>& hung) {
   for (const std::string& name : hung) names += (names.empty() ? "" : ", ") + name;
   if (names == reported_) return;
   reported_ = names;
-  if (!names.empty()) reports_({report::Severity::error, "", "does not answer any more: " + names});
+  if (!names.empty()) reports_({report::Severity::error, "", "stopped responding: " + names});
 }
 
 void Service::ready(const std::string& status) {

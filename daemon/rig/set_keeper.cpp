@@ -93,7 +93,7 @@ std::optional<SetKeeper::Ended> SetKeeper::finish(std::chrono::milliseconds pati
     if (Clock::now() - begun_ < patience_) return std::nullopt;
     reading_ = {};
     next_.reset();
-    return Ended{refused_("its files cannot be read: the disk does not answer")};
+    return Ended{refused_("its files cannot be read: the disk does not respond")};
   }
   try {
     Read read = reading_.get();
@@ -101,8 +101,9 @@ std::optional<SetKeeper::Ended> SetKeeper::finish(std::chrono::milliseconds pati
     next_ = std::move(read.set);
     if (!read.kept) return Ended{};
     changes_.kept = std::move(read.kept);
-    reports_({Severity::info, "keep",
-              next_->set.file.string() + " has the changes; as it was: " + read.kept_beside});
+    reports_(
+        {Severity::info, "keep",
+         next_->set.file.string() + " has the changes; previous version: " + read.kept_beside});
     return Ended{};
   } catch (const std::exception& error) {
     next_.reset();
@@ -113,8 +114,8 @@ std::optional<SetKeeper::Ended> SetKeeper::finish(std::chrono::milliseconds pati
 std::string SetKeeper::drop_next(const std::string& why) {
   if (next_ && next_->set.file == running_.set.file) file_ = SetFileWatch(running_.changed);
   next_.reset();
-  reports_({Severity::warning, "", "the set stays as it was: " + why});
-  return "the set stays as it was: " + why;
+  reports_({Severity::warning, "", "the old set stays in use: " + why});
+  return "the old set stays in use: " + why;
 }
 
 void SetKeeper::begin_change(int next) {
@@ -124,9 +125,9 @@ void SetKeeper::begin_change(int next) {
       },
       [this](const std::string& what) {
         const std::string first = what.substr(0, what.find('\n'));
-        reports_({Severity::error, "", what + "\nthe set stays as it was", "",
-                  report::passing("the set stays as it was", first)});
-        return "the set stays as it was: " + first;
+        reports_({Severity::error, "", what + "\nthe old set stays in use", "",
+                  report::passing("the old set stays in use", first)});
+        return "the old set stays in use: " + first;
       });
 }
 
@@ -155,10 +156,10 @@ void SetKeeper::begin_keep(const pipeline::Edits& edits) {
     // What a symbolic link leads to is written, not the link.
     const std::filesystem::path target = std::filesystem::canonical(file);
     if (set::read_set_file(target) != text_before)
-      throw Error(file.string() + " was changed since it was read; load it again first");
+      throw Error(file.string() + " has changed since it was loaded; reload it first");
     const std::string text = with_edits(text_before, set, edits);
     if (text == text_before)
-      throw Error("the changes come to nothing; " + file.string() + " stays as it is");
+      throw Error("the changes have no effect; " + file.string() + " stays as it is");
     Read read{loaded(text, file, with), Kept{text_before, edits}, {}};
     read.kept_beside = set::keep_beside(target).string();
     session::replace_file(target, text);
@@ -180,19 +181,19 @@ void SetKeeper::carry_edits() {
   const bool are_in_file = is_same && kept && running_.text != kept->text_before;
   if (are_in_file && edits != kept->edits)
     reports_({Severity::warning, "keep",
-              "what buttons changed after the changes were kept is dropped: " +
-                  running_.set.file.string() + " was read again"});
+              "button changes made since the last keep are dropped: " + running_.set.file.string() +
+                  " was reloaded"});
   if (!is_same || are_in_file) changes_ = {};
   for (const std::string& name : pipeline::drop_unknown(edits, running_.set))
     reports_({Severity::warning, "",
               "\"" + name +
-                  "\" was changed by buttons and is no longer in the set; the change is "
+                  "\" was changed by buttons but is no longer in the set; the change is "
                   "dropped"});
   for (const std::string& variant :
        pipeline::drop_unknown_variants(edits, running_.set, running_.scene))
     reports_({Severity::warning, "",
               "the variant " + variant +
-                  " was chosen by buttons and is no longer in its file; the choice is dropped"});
+                  " was chosen by buttons but is no longer in its file; the choice is dropped"});
 }
 
 void SetKeeper::run(LoadedSet set) {
@@ -210,7 +211,7 @@ void SetKeeper::begin_next() {
 bool SetKeeper::go_back(const std::string& why) {
   if (!before_) return false;
   reports_(
-      {Severity::error, "", why + "\nback to the set as it was: " + before_->set.file.string()});
+      {Severity::error, "", why + "\nback to the previous set: " + before_->set.file.string()});
   // The same file is not tried again until it changes again.
   if (before_->set.file == running_.set.file) before_->changed = running_.changed;
   run(*std::exchange(before_, std::nullopt));

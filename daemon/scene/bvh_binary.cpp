@@ -134,7 +134,7 @@ std::vector<BinaryNode> build_binary_tree(std::span<const Aabb> boxes, BvhQualit
   if (quality == BvhQuality::high) primitives.resize(boxes.size() * 2);
 
   const DevicePtr device(rtcNewDevice(nullptr), rtcReleaseDevice);
-  if (!device) throw Error("scene: Embree gives no device to build a BVH with");
+  if (!device) throw Error("scene: Embree cannot create a device");
   const BvhPtr bvh(rtcNewBVH(device.get()), rtcReleaseBVH);
   RTCBuildArguments arguments = rtcDefaultBuildArguments();
   arguments.buildQuality = embree_quality(quality);

@@ -120,14 +120,14 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
     if (node.mesh >= 0) {
       const std::string where = file + ": " + node_name(model, placed.node);
       if (static_cast<std::size_t>(node.mesh) >= model.meshes.size())
-        throw Error(where + ": there is no mesh " + std::to_string(node.mesh));
+        throw Error(where + ": no mesh " + std::to_string(node.mesh));
       NodeDeformation deforms = read_node_deformation(model, placed.node, where, file_nodes, budget,
                                                       played ? &*played : nullptr, animation.nodes);
       deforms.deformation.object = object_index;
       const std::vector<glm::dmat4> copies = node_from_copies(model, node, where);
       if (deforms.is_skinned && copies.size() > 1)
-        notes.add(node_name(model, placed.node) + ": a skin places its mesh; of its " +
-                  std::to_string(copies.size()) + " copies one is kept");
+        notes.add(node_name(model, placed.node) + ": a skin places its mesh; only one of its " +
+                  std::to_string(copies.size()) + " copies is kept");
       for (std::size_t i = 0; i < copies.size(); ++i)
         add_mesh(placed,
                  {instance, copies[i], i == 0, object.world_from_file * z_up_from_y_up, deforms});
@@ -153,7 +153,7 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
     scene.animations.push_back(std::move(animation));
   }
   if (scene.instances.size() + scene.lights.size() == before)
-    notes.add("object \"" + set::printable(object.name) + "\" has nothing to see in it");
+    notes.add("object \"" + set::printable(object.name) + "\" has nothing visible in it");
 }
 
 void GltfFile::Loader::add_mesh(const PlacedNode& placed, const MeshUse& use) {
@@ -229,7 +229,7 @@ void GltfFile::Loader::add_looks(const tinygltf::Primitive& primitive, const std
       if (deforms) {
         look_then.material = own.material;
         notes.add(what +
-                  ": deforms, and one of its variants maps textures otherwise; there it "
+                  ": deforms, and one of its variants maps textures differently; there it "
                   "keeps its own material");
       } else {
         const MeshSource mapped = mesh_source(primitive, used.mappings);
@@ -254,7 +254,7 @@ void GltfFile::Loader::note_missing_uvs(const UsedMaterial& material, const Mesh
   const Material& m = scene.materials[material.index];
   const std::size_t around = mapping_of(m, &Material::anisotropy_texture);
   if (is_anisotropic(m) && source.uvs[around] < 0)
-    notes.add(missing(around) + " that says which way its anisotropy runs; any way is taken");
+    notes.add(missing(around) + " for its anisotropy direction; an arbitrary one is used");
 }
 
 void GltfFile::Loader::keep_looks(std::uint32_t object_index) {
@@ -286,7 +286,7 @@ std::optional<std::uint32_t> GltfFile::Loader::add_deformed(const MeshSource& so
   if (moves) deformation.extent = extent_of(mesh->undeformed);
   if (!has_usable_positions(*mesh) ||
       (moves && !can_be_shown(shape_at_rest(deformation), deformation.extent)))
-    throw Error(file + ": " + what + ": its joints or targets take vertices beyond 1e15 at rest");
+    throw Error(file + ": " + what + ": its joints or targets move vertices beyond 1e15 at rest");
   const auto index = static_cast<std::uint32_t>(scene.meshes.size());
   scene.meshes.push_back(std::move(*mesh));
   if (!moves) return index;
@@ -317,7 +317,7 @@ void GltfFile::Loader::add_light(const PlacedNode& placed, const glm::dmat4& wor
   if (index < 0) return;
   const std::string where = node_name(model, placed.node);
   if (index >= static_cast<double>(model.lights.size()))
-    throw Error(file + ": " + where + ": there is no light " +
+    throw Error(file + ": " + where + ": no light " +
                 std::to_string(static_cast<std::int64_t>(std::min(index, 1e15))));
   const tinygltf::Light& given = model.lights[static_cast<std::size_t>(index)];
   const std::string what = where + ": its light";
@@ -328,7 +328,7 @@ void GltfFile::Loader::add_light(const PlacedNode& placed, const glm::dmat4& wor
   light.direction = -glm::dvec3(world_from_node[2]);
   const double length = glm::length(light.direction);
   if (!is_finite(world_from_node) || !(length > 0) || !std::isfinite(length)) {
-    notes.add(what + " has a transform that is singular or not finite; left out");
+    notes.add(what + " has a transform that is singular or not finite; skipped");
     return;
   }
   light.direction /= length;
@@ -344,7 +344,7 @@ void GltfFile::Loader::add_light(const PlacedNode& placed, const glm::dmat4& wor
     light.inner_cone_rad =
         within(given.spot.innerConeAngle, 0, light.outer_cone_rad, what + "'s inner cone", notes);
   } else {
-    notes.add(what + " is of the unknown type \"" + set::printable(given.type) + "\"; left out");
+    notes.add(what + " is of the unknown type \"" + set::printable(given.type) + "\"; skipped");
     return;
   }
   const std::vector<double> color =

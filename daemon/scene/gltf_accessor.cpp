@@ -81,7 +81,7 @@ bool is_index_type(int type) {
 const tinygltf::Accessor& checked(const tinygltf::Model& model, int index,
                                   const std::string& where) {
   if (index < 0 || static_cast<std::size_t>(index) >= model.accessors.size())
-    throw Error(where + ": there is no accessor " + std::to_string(index));
+    throw Error(where + ": no accessor " + std::to_string(index));
   return model.accessors[static_cast<std::size_t>(index)];
 }
 
@@ -238,10 +238,10 @@ std::uint64_t element_count(const tinygltf::Model& model, int index, const std::
 std::span<const unsigned char> view_bytes(const tinygltf::Model& model, int index,
                                           const std::string& where) {
   if (index < 0 || static_cast<std::size_t>(index) >= model.bufferViews.size())
-    throw Error(where + ": there is no buffer view " + std::to_string(index));
+    throw Error(where + ": no buffer view " + std::to_string(index));
   const tinygltf::BufferView& view = model.bufferViews[static_cast<std::size_t>(index)];
   if (view.buffer < 0 || static_cast<std::size_t>(view.buffer) >= model.buffers.size())
-    throw Error(where + ": there is no buffer " + std::to_string(view.buffer));
+    throw Error(where + ": no buffer " + std::to_string(view.buffer));
   const auto& data = model.buffers[static_cast<std::size_t>(view.buffer)].data;
   if (view.byteOffset > data.size() || view.byteLength > data.size() - view.byteOffset)
     throw Error(where + ": buffer view " + std::to_string(index) +

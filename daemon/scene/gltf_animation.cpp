@@ -184,7 +184,7 @@ void GltfAnimation::read_channel(std::size_t index, const tinygltf::AnimationCha
                                  const std::string& where) {
   if (given.target_node < 0) return;  // such a channel is ignored (glTF 2.0, 3.11)
   if (place(given.target_node) >= moved_.size())
-    throw Error(where + ": there is no node " + std::to_string(given.target_node));
+    throw Error(where + ": no node " + std::to_string(given.target_node));
   const tinygltf::Animation& animation = model_.animations[index];
   const tinygltf::Node& node = model_.nodes[place(given.target_node)];
   AnimatedNode& moved = moved_[place(given.target_node)];
@@ -197,7 +197,7 @@ void GltfAnimation::read_channel(std::size_t index, const tinygltf::AnimationCha
     return notes_.add(label(model_, index) + ": its channels of \"" +
                       set::printable(given.target_path) + "\" are not played");
   if (given.sampler < 0 || place(given.sampler) >= animation.samplers.size())
-    throw Error(where + ": there is no sampler " + std::to_string(given.sampler));
+    throw Error(where + ": no sampler " + std::to_string(given.sampler));
   const tinygltf::AnimationSampler& sampler = animation.samplers[place(given.sampler)];
   note_replaced(index, given);
   if (is_weights) {

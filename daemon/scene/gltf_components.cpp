@@ -124,7 +124,7 @@ void note_component_types(const tinygltf::Model& model, Notes& notes) {
       if (allowed.use == Components::floats || (type & allowed.core) != 0) continue;
       if ((type & allowed.quantised) != 0 && !is_quantised)
         notes.add(what +
-                  " belongs to KHR_mesh_quantization, which the file does not name in "
+                  " needs KHR_mesh_quantization, which the file does not name in "
                   "extensionsUsed; read as that says");
       else if ((type & allowed.tolerated) != 0)
         notes.add(what + " is not glTF; read as if it were " + std::string(allowed.in_words));

@@ -26,7 +26,7 @@ std::vector<Deformation::Joint> read_joints(const tinygltf::Model& model, int in
                                             const std::string& where, FileNodes& nodes,
                                             Budget& budget) {
   if (index_of(index) >= model.skins.size())
-    throw Error(where + ": there is no skin " + std::to_string(index));
+    throw Error(where + ": no skin " + std::to_string(index));
   const tinygltf::Skin& skin = model.skins[index_of(index)];
   const std::string what = where + ": skin " + std::to_string(index);
   if (skin.joints.empty() || skin.joints.size() > std::numeric_limits<std::uint16_t>::max())
@@ -50,7 +50,7 @@ std::vector<Deformation::Joint> read_joints(const tinygltf::Model& model, int in
   }
   for (std::size_t i = 0; i < joints.size(); ++i) {
     if (skin.joints[i] < 0 || index_of(skin.joints[i]) >= model.nodes.size())
-      throw Error(what + ": there is no node " + std::to_string(skin.joints[i]));
+      throw Error(what + ": no node " + std::to_string(skin.joints[i]));
     joints[i].file_from_joint = nodes.file_from_node(skin.joints[i]);
   }
   return joints;
@@ -123,7 +123,7 @@ void read_influences(const tinygltf::Model& model, const MeshSource& source,
     without += normalise(std::span(influences).subspan(v * sets, sets)) ? 0 : 1;
   if (without > 0)
     notes.add(what + ": " + std::to_string(without) +
-              " vertices follow no joint; the skin's first joint is taken");
+              " vertices follow no joint; the skin's first joint is used");
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ std::string in_words(const draco::Status& status) {
 
 tinygltf::Accessor& accessor_of(tinygltf::Model& model, int index, const std::string& where) {
   if (index < 0 || static_cast<std::size_t>(index) >= model.accessors.size())
-    throw Error(where + ": there is no accessor " + std::to_string(index));
+    throw Error(where + ": no accessor " + std::to_string(index));
   return model.accessors[static_cast<std::size_t>(index)];
 }
 
@@ -55,7 +55,7 @@ std::uint64_t triangles_of(std::span<const unsigned char> bytes, const std::stri
       !status.ok())
     throw Error(where + ": is not Draco data: " + in_words(status) + remedy);
   if (header.encoder_type != draco::TRIANGULAR_MESH)
-    throw Error(where + ": its Draco data is no mesh of triangles" + remedy);
+    throw Error(where + ": its Draco data is not a triangle mesh" + remedy);
   if (header.version_major != 2 || header.version_minor != 2)
     throw Error(where + ": its Draco data is of version " + std::to_string(header.version_major) +
                 "." + std::to_string(header.version_minor) + "; glTF has version 2.2" + remedy);

@@ -119,7 +119,7 @@ Json parsed(std::string_view text, const std::string& file) {
   } catch (const Json::exception& error) {
     throw Error(file + ": is not a valid glTF file: " + set::printable(error.what()));
   }
-  throw Error(file + ": is not a valid glTF file: its JSON is no object");
+  throw Error(file + ": is not a valid glTF file: its JSON is not an object");
 }
 
 // Where the walk through the tree is; it is put into words only for a message.

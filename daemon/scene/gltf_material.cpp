@@ -50,7 +50,7 @@ UvMapping read_mapping(const TextureInfo& texture, const std::string& what, Note
   if (set >= 0 && set <= last_set && set == std::floor(set))
     mapping.set = static_cast<int>(set);
   else
-    notes.add(what + ": its set of texture coordinates is none from 0 to 255; set 0 taken");
+    notes.add(what + ": its set of texture coordinates is not from 0 to 255; set 0 used");
   const std::vector<double> offset = numbers(texture.transform, "offset", {0, 0});
   const std::vector<double> scale = numbers(texture.transform, "scale", {1, 1});
   const double rotation = number(texture.transform, "rotation", 0);
@@ -67,7 +67,7 @@ AlphaMode alpha_mode(const std::string& mode, const std::string& what, Notes& no
   if (mode == "MASK") return AlphaMode::mask;
   if (mode == "BLEND") return AlphaMode::blend;
   if (mode != "OPAQUE")
-    notes.add(what + ": alphaMode \"" + set::printable(mode) + "\" is not known; OPAQUE taken");
+    notes.add(what + ": alphaMode \"" + set::printable(mode) + "\" is unknown; OPAQUE used");
   return AlphaMode::opaque;
 }
 
@@ -84,7 +84,7 @@ UsedMaterial GltfMaterials::use(int index) {
   }
   if (static_cast<std::size_t>(index) >= model_.materials.size())
     throw Error(file_ + ": a primitive uses material " + std::to_string(index) +
-                ", which is not there");
+                ", which does not exist");
   const tinygltf::Material& given = model_.materials[static_cast<std::size_t>(index)];
   at->second =
       read(given, "material " + std::to_string(index) + " \"" + set::printable(given.name) + "\"");
@@ -180,7 +180,7 @@ void GltfMaterials::read_extensions(const tinygltf::Material& given, const std::
 
 // A factor whose texture cannot be had says nothing about any place of the surface.
 void GltfMaterials::leave_out(const std::string& what, const std::string& extension) {
-  notes_.add(what + ": " + extension + " is left out, since its texture cannot be read");
+  notes_.add(what + ": " + extension + " is ignored, because its texture cannot be read");
 }
 
 void GltfMaterials::read_glass(const tinygltf::Material& given, const std::string& what,
@@ -204,7 +204,7 @@ void GltfMaterials::read_glass(const tinygltf::Material& given, const std::strin
   if (distance_m > 0 && distance_m < max_distance_m)
     material.attenuation_distance_m = static_cast<float>(distance_m);
   else if (distance_m <= 0)
-    notes_.add(what + ": attenuationDistance must be greater than 0; taken as infinite");
+    notes_.add(what + ": attenuationDistance must be greater than 0; infinite used");
 }
 
 void GltfMaterials::read_clearcoat(const tinygltf::Material& given, const std::string& what,
@@ -239,9 +239,8 @@ void GltfMaterials::read_sheen(const tinygltf::Material& given, const std::strin
   material.sheen_roughness = std::max(roughness, gpu::LEAST_SHEEN_ROUGHNESS);
   if (!has_sheen(material)) return;
   if (roughness < material.sheen_roughness)
-    notes_.add(what + ": its sheenRoughnessFactor is taken as " +
-               std::to_string(gpu::LEAST_SHEEN_ROUGHNESS).substr(0, 4) +
-               ", the least that is supported");
+    notes_.add(what + ": its sheenRoughnessFactor is raised to " +
+               std::to_string(gpu::LEAST_SHEEN_ROUGHNESS).substr(0, 4) + ", the supported minimum");
   if (textures.take(sheen, "sheenColorTexture", Encoding::srgb, &Material::sheen_color_texture) &&
       textures.take(sheen, "sheenRoughnessTexture", alpha_only, &Material::sheen_roughness_texture))
     return;
@@ -278,7 +277,7 @@ void GltfMaterials::read_anisotropy(const tinygltf::Material& given, const std::
                                             what + ": anisotropyRotation", notes_);
   if (material.anisotropy <= 0) return;
   if (!is_anisotropic(material)) {
-    notes_.add(what + ": as it lets light through, its anisotropy is left out");
+    notes_.add(what + ": it transmits light, so its anisotropy is ignored");
     return;
   }
   if (textures.take(anisotropy, "anisotropyTexture", Encoding::linear,

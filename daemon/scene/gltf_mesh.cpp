@@ -194,10 +194,10 @@ void repair_normals(Mesh& mesh, const std::string& what, Notes& notes) {
   }
   if (replaced > 0)
     notes.add(what + ": " + count_of(replaced, "normal is", "normals are") +
-              " no direction; made from the triangles around");
+              " no direction; computed from adjacent triangles");
   if (turned > 0)
     notes.add(what + ": " + count_of(turned, "normal points", "normals point") +
-              " to the back of every triangle around; turned round");
+              " to the back of every adjacent triangle; flipped");
 }
 
 std::vector<glm::vec2> read_uvs(const tinygltf::Model& model, int accessor,

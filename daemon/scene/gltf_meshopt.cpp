@@ -38,7 +38,7 @@ Encoded encoded_of(const tinygltf::Model& model, const tinygltf::Value& given,
   if (encoded.filter.empty()) encoded.filter = "NONE";
   const double buffer = number(given, "buffer", -1);
   if (buffer < 0 || buffer >= static_cast<double>(model.buffers.size()))
-    throw Error(where + ": there is no such buffer");
+    throw Error(where + ": no such buffer");
   const auto& data = model.buffers[static_cast<std::size_t>(buffer)].data;
   const std::uint64_t offset = whole_of(given, "byteOffset"), size = whole_of(given, "byteLength");
   if (offset > data.size() || size > data.size() - offset)

@@ -20,7 +20,7 @@ std::vector<int> root_nodes(const tinygltf::Model& model, const std::string& fil
   if (!model.scenes.empty()) {
     const int scene = model.defaultScene < 0 ? 0 : model.defaultScene;
     if (static_cast<std::size_t>(scene) >= model.scenes.size())
-      throw Error(file + ": its default scene " + std::to_string(scene) + " is not there");
+      throw Error(file + ": its default scene " + std::to_string(scene) + " does not exist");
     if (model.scenes.size() > 1)
       notes.add("has " + std::to_string(model.scenes.size()) + " scenes; only scene " +
                 std::to_string(scene) + " is used");
@@ -105,7 +105,7 @@ std::vector<int> parents_of(const tinygltf::Model& model, const std::string& fil
   for (std::size_t i = 0; i < parents.size(); ++i)
     for (const int child : model.nodes[i].children) {
       if (child < 0 || static_cast<std::size_t>(child) >= parents.size())
-        throw Error(file + ": there is no node " + std::to_string(child));
+        throw Error(file + ": no node " + std::to_string(child));
       int& parent = parents[static_cast<std::size_t>(child)];
       if (parent >= 0) throw Error(file + ": " + node_name(model, child) + " has two parents");
       parent = static_cast<int>(i);
@@ -163,7 +163,7 @@ std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
     to_visit.pop_back();
     const int index = visit.placed.node;
     if (index < 0 || static_cast<std::size_t>(index) >= model.nodes.size())
-      throw Error(file + ": there is no node " + std::to_string(index));
+      throw Error(file + ": no node " + std::to_string(index));
     if (visited[static_cast<std::size_t>(index)])
       throw Error(file + ": " + node_name(model, index) +
                   " has two parents or is its own ancestor");

@@ -30,7 +30,7 @@ std::string one_line(std::string text) {
 std::string read_file(const fs::path& file, std::vector<unsigned char>& bytes) {
   std::error_code error;
   const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status)) return "there is no such file";
+  if (!fs::exists(status)) return "file not found";
   if (!fs::is_regular_file(status)) return "it is not a regular file";
   const std::uint64_t size = fs::file_size(file, error);
   if (error) return "its size cannot be read";

@@ -81,18 +81,18 @@ std::string failure() {
 std::uint32_t GltfTextures::use(int index, Encoding encoding) {
   const std::string name = "texture " + std::to_string(index);
   if (index < 0 || static_cast<std::size_t>(index) >= model_.textures.size())
-    throw Error(file_ + ": a material uses " + name + ", which is not there");
+    throw Error(file_ + ": a material uses " + name + ", which does not exist");
   const tinygltf::Texture& texture = model_.textures[static_cast<std::size_t>(index)];
   if (texture.source < 0) {
-    notes_.add(name + ": has no PNG or JPEG image; left out");
+    notes_.add(name + ": has no PNG or JPEG image; ignored");
     return no_texture;
   }
   if (static_cast<std::size_t>(texture.source) >= model_.images.size())
-    throw Error(file_ + ": " + name + ": there is no image " + std::to_string(texture.source));
+    throw Error(file_ + ": " + name + ": no image " + std::to_string(texture.source));
   tinygltf::Sampler sampler;
   if (texture.sampler >= 0) {
     if (static_cast<std::size_t>(texture.sampler) >= model_.samplers.size())
-      throw Error(file_ + ": " + name + ": there is no sampler " + std::to_string(texture.sampler));
+      throw Error(file_ + ": " + name + ": no sampler " + std::to_string(texture.sampler));
     sampler = model_.samplers[static_cast<std::size_t>(texture.sampler)];
   }
 
@@ -118,7 +118,7 @@ Texture GltfTextures::decode(int index, Encoding encoding) {
   const std::span<const unsigned char> bytes = image.bufferView >= 0
                                                    ? view_bytes(model_, image.bufferView, where)
                                                    : std::span<const unsigned char>(image.image);
-  if (bytes.empty()) throw Error(where + ": there is no such file, or it is empty");
+  if (bytes.empty()) throw Error(where + ": not found, or empty");
   const bool is_png = begins_with(bytes, png_signature);
   if (!is_png && !begins_with(bytes, jpeg_signature))
     throw Error(where + ": is neither PNG nor JPEG");

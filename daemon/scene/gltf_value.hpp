@@ -43,7 +43,7 @@ inline std::vector<double> numbers(const tinygltf::Value& object, const std::str
 // Clamps `value` to the allowed range, with a note if that changes it.
 inline float within(double value, double low, double high, const std::string& what, Notes& notes) {
   const double allowed = value >= low ? std::min(value, high) : low;
-  if (allowed != value) notes.add(what + " is out of range; brought to the nearest allowed");
+  if (allowed != value) notes.add(what + " is out of range; nearest allowed value used");
   return static_cast<float>(allowed);
 }
 

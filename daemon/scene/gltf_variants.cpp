@@ -41,8 +41,7 @@ GltfVariants::GltfVariants(const tinygltf::Model& model, std::string file, Notes
     if (is_taken()) {
       for (std::size_t number = i + 1; is_taken(); ++number)
         name = "variant " + std::to_string(number);
-      notes.add("variant " + std::to_string(i) + " has no name of its own; called \"" + name +
-                "\"");
+      notes.add("variant " + std::to_string(i) + " has no unique name; called \"" + name + "\"");
     }
     names_.push_back(name);
   }
@@ -55,7 +54,7 @@ std::size_t GltfVariants::look_of(const std::string& name) const {
   std::string known;
   for (const std::string& other : names_)
     known += (known.empty() ? "it has \"" : ", \"") + set::printable(other) + '"';
-  throw Error(file_ + ": there is no variant \"" + set::printable(name) + "\"; " +
+  throw Error(file_ + ": no variant \"" + set::printable(name) + "\"; " +
               (known.empty() ? "it has none" : known));
 }
 
@@ -72,10 +71,10 @@ std::vector<int> GltfVariants::materials(const tinygltf::Primitive& primitive,
       const double index = variant.IsNumber() ? variant.GetNumberAsDouble() : -1;
       if (!(index >= 0 && index < static_cast<double>(names_.size())) ||
           !(material >= 0 && material < 1e9))
-        throw Error(file_ + ": " + what + ": a variant is given a material, and one is not there");
+        throw Error(file_ + ": " + what + ": refers to a missing variant or material");
       const auto at = static_cast<std::size_t>(index);
       if (is_mapped[at])
-        notes_.add(what + ": has several materials in one variant; the first is taken");
+        notes_.add(what + ": has several materials in one variant; the first is used");
       else
         materials[1 + at] = static_cast<int>(material);
       is_mapped[at] = true;

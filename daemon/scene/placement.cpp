@@ -47,8 +47,8 @@ void play(const Scene& scene, const Animation& animation, double time_s, Placeme
     Instance& instance = placement.instances[deformation.instance];
     instance.presence = 0;
     placement.unknown.push_back("\"" + set::printable(instance.name) +
-                                "\" has no shape that can be shown at some times of its animation: "
-                                "its joints or targets take vertices beyond 1e15; it is not shown "
+                                "\" cannot be shown at some times of its animation: "
+                                "its joints or targets move vertices beyond 1e15; it is hidden "
                                 "then");
   }
   for (const Animation::Use& use : animation.instances) {
@@ -97,7 +97,7 @@ Placement place(const Scene& scene, const set::Set& set, const session::SceneSta
   for (const auto& [name, world_from_file] : state.objects) {
     const auto found = std::ranges::find(set.objects, name, &set::Object::name);
     if (found == set.objects.end()) {
-      placement.unknown.push_back("object \"" + name + "\" was moved; this set has none such");
+      placement.unknown.push_back("object \"" + name + "\" was moved, but is not in this set");
       continue;
     }
     const auto index = static_cast<std::size_t>(found - set.objects.begin());
@@ -112,15 +112,15 @@ Placement place(const Scene& scene, const set::Set& set, const session::SceneSta
     const Variants* variants = found == set.objects.end() ? nullptr : variants_of(scene, index);
     if (variants && show_variant(*variants, variant, placement.instances)) continue;
     if (!variants && variant.empty() && found != set.objects.end()) continue;
-    placement.unknown.push_back("object \"" + name + "\" was shown as its variant \"" +
-                                set::printable(variant) + "\"; it has none such");
+    placement.unknown.push_back("object \"" + name + "\" was shown in variant \"" +
+                                set::printable(variant) + "\", which it does not have");
   }
   // The set's own lamps are the last of the scene's.
   const std::size_t first = scene.lights.size() - set.lights.size();
   for (const auto& [name, light] : state.lights) {
     const auto found = std::ranges::find(set.lights, name, &set::Light::name);
     if (found == set.lights.end()) {
-      placement.unknown.push_back("light \"" + name + "\" was changed; this set has none such");
+      placement.unknown.push_back("light \"" + name + "\" was changed, but is not in this set");
       continue;
     }
     set::Light& placed =

@@ -73,10 +73,10 @@ FileEdit::FileEdit(std::string text) : text_(std::move(text)) {
 const FileEdit::Table& FileEdit::table(const std::string& tables, std::size_t index) const {
   const auto found = tables_.find(tables);
   if (found == tables_.end() || index >= found->second.size())
-    throw Error("there is no [[" + tables + "]] number " + std::to_string(index + 1));
+    throw Error("no [[" + tables + "]] number " + std::to_string(index + 1));
   if (found->second[index].is_inline)
     throw Error("[[" + tables + "]] number " + std::to_string(index + 1) +
-                " is written in braces; write it as a table under [[" + tables + "]]");
+                " is an inline table; write it as a table under [[" + tables + "]]");
   return found->second[index];
 }
 

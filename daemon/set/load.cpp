@@ -68,7 +68,7 @@ class Reader {
           read(*table, child.path);
         else
           problems_.add(position(entry.source()), child.path,
-                        "an entry is not a table; allowed: tables, each under " + header);
+                        "has an entry that is not a table; allowed: tables, each under " + header);
       }
       return;
     }
@@ -91,7 +91,7 @@ class Reader {
     if (const auto meant = nearest(key, near); !meant.empty()) {
       hint = "did you mean " + meant + "?";
     } else if (const auto home = home_of(key); !home.empty()) {
-      hint = "did you mean it under " + home + "?";
+      hint = "does it belong under " + home + "?";
     } else {
       hint = "allowed: ";
       for (const auto& word : near) hint += (&word == near.data() ? "" : ", ") + word;
@@ -142,7 +142,7 @@ void read_over(Draft& draft, const Overlay& with, const std::string& text, Probl
     if (std::ranges::find(allowed, name.str()) == std::end(allowed)) {
       others.emplace_back(name.str());
       problems.add(position(name.source()), others.back(),
-                   "belongs into the set file; allowed here: [quality], [[quality.preview]], "
+                   "belongs in the set file; allowed here: [quality], [[quality.preview]], "
                    "[estimator] and [lighting]");
     }
   for (const std::string& name : others) root.erase(name);
@@ -172,7 +172,7 @@ std::string text_of(const std::filesystem::path& file, const char* allowed) {
   if (kind != std::filesystem::file_type::regular &&
       kind != std::filesystem::file_type::not_found && kind != std::filesystem::file_type::none)
     throw Error(file.string() +
-                ": is no file, but a folder, a pipe or a device; allowed: " + allowed);
+                ": is not a file, but a folder, a pipe or a device; allowed: " + allowed);
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   if (!stream || (stream.peek() != EOF && !(text << stream.rdbuf())))

@@ -10,9 +10,9 @@ namespace {
 constexpr auto preamble =
     R"(# Every key of a set file. Generated from the parser's own table by `ninja reference`.
 #
-# A line that starts with "#" and no space is a key without a default, or a table that may be left
-# out: take away the "#" to use it. All other lines state the default. Lengths are in the unit that
-# a key's name ends in; the world is right-handed, Z up; colours are linear Rec. 709.
+# A line that starts with "#" and no space is a key without a default, or an optional table:
+# remove the "#" to use it. All other lines give the default. Units are at the end of
+# each key's name; the world is right-handed, Z up; colours are linear Rec. 709.
 )";
 
 // Writes sentences as comment lines of at most 100 columns.
@@ -35,7 +35,7 @@ void print(std::ostream& out, const Key& key, bool commented) {
   using enum Need::Kind;
   comment(out, key.about);
   const char* need = key.need.kind == required   ? "; required"
-                     : key.need.kind == optional ? "; may be left out"
+                     : key.need.kind == optional ? "; optional"
                                                  : "";
   comment(out, "(" + key.allowed + need + ")");
   const bool has_default = key.need.kind == defaulted;

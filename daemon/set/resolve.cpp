@@ -98,7 +98,7 @@ class Resolver {
               "--any-paths for a take that you trust");
     else if (!fs::is_regular_file(path, error))
       problem(table, key,
-              "there is no file " + path.string() +
+              "no such file: " + path.string() +
                   "; allowed: a file that exists, its path relative to the folder of this file");
     return path;
   }
@@ -116,27 +116,27 @@ class Resolver {
     if (table.at && !given(camera + ".intrinsics").at)
       problems_.add(*table.at, table.path,
                     '[' + camera + ".intrinsics]" +
-                        " is missing; a calibration given here replaces the session's as a whole");
+                        " is missing; a calibration given here replaces all of the session's");
   }
 
   void device(const std::string& table, const std::string& driver, std::string& device) {
     if (driver == no_driver)
-      exclude(given(table), {"device"}, "driver \"none\" has no device; leave one of the two out");
+      exclude(given(table), {"device"}, "driver \"none\" has no device; remove one of the two");
     if (driver == replay_driver && !device.empty()) device = located(device).string();
     const bool recorded = driver == replay_driver || driver == no_driver;
     if (!recorded && device.empty())
       problem(given(table), "device",
-              "is missing with driver \"" + driver +
+              "is missing for driver \"" + driver +
                   "\"; allowed: a name that `previzd devices` prints");
     const Given& camera = given(table + ".camera");
     if (recorded && camera.at)
       problems_.add(*camera.at, camera.path,
-                    "does not go with driver \"" + driver + "\", which drives no camera");
+                    "cannot be used with driver \"" + driver + "\", which drives no camera");
     if (camera.has("width") != camera.has("height"))
       problem(camera, camera.has("width") ? "height" : "width",
               "is missing; width and height go together");
     if (camera.has("exposure_s") && camera.has("bracket_s"))
-      problem(camera, "exposure_s", "does not go with bracket_s; leave one of the two out");
+      problem(camera, "exposure_s", "conflicts with bracket_s; remove one of the two");
   }
 
   // Reports what is wrong with a calibration, and completes it.
@@ -190,7 +190,7 @@ class Resolver {
     if (!intrinsics.at) return;
     if (!given("light_camera.pose").at)
       problems_.add(*intrinsics.at, "light_camera.pose",
-                    "is missing; a calibrated light camera needs to say where it stands: "
+                    "is missing; a calibrated light camera needs its pose: "
                     "[light_camera.pose] with position_m, rotation_deg or world_from_camera");
     set_.light_camera.calibration = draft_.light_camera.calibration;
   }
@@ -213,7 +213,7 @@ class Resolver {
         const auto [other, fresh] = first.emplace(draft.id, table.where("id"));
         if (!fresh)
           problem(table, "id",
-                  "tag " + std::to_string(draft.id) + " is already in line " +
+                  "tag " + std::to_string(draft.id) + " is already on line " +
                       std::to_string(other->second.line) + "; allowed: each id once");
       }
       Tag tag{.id = draft.id, .size_m = draft.size.value_or(0)};
@@ -227,7 +227,7 @@ class Resolver {
         if (is_frame && !frames.insert(draft.carrier).second)
           problem(table, "carrier",
                   "another tag of " + codec::quote(draft.carrier) +
-                      " is its frame already; allowed: position_m, where it is from there");
+                      " already defines its frame; allowed: position_m relative to that tag");
         tag.world_from_tag = is_frame ? glm::dmat4{1} : rigid(draft);
       }
       (draft.carrier.empty() ? set_.tracking.tags : carrier(draft.carrier).tags).push_back(tag);
@@ -263,7 +263,7 @@ class Resolver {
   void measured(const TagDraft& draft, Tag& tag) {
     const auto& table = draft.given;
     exclude(table, {"position_m", "rotation_deg", "world_from_tag"},
-            "contradicts corners_m; allowed: one form of the pose");
+            "conflicts with corners_m; allowed: one form of the pose");
     if (!table.good("corners_m")) return;
     const auto fit = fit_square(*draft.corners);
     const auto percent = [](double part) {
@@ -271,7 +271,7 @@ class Resolver {
     };
     if (!fit || fit->error > square_tolerance) {
       problem(table, "corners_m",
-              fit ? "is no square, a corner is off by " + percent(fit->error) +
+              fit ? "is not a square: a corner is off by " + percent(fit->error) +
                         " of the side; allowed: at most " + percent(square_tolerance) +
                         ", in the order lower left, lower right, upper right, upper left"
                   : "has no area; allowed: lower left, lower right, upper right, upper left");
@@ -282,8 +282,9 @@ class Resolver {
       tag.size_m = fit->size;
     } else if (std::abs(tag.size_m / fit->size - 1) > square_tolerance) {
       problem(table, "size_m",
-              "contradicts corners_m, whose side is " + codec::print_number(fit->size) +
-                  " m; allowed: that to within " + percent(square_tolerance) + ", or leave it out");
+              "conflicts with corners_m, whose side is " + codec::print_number(fit->size) +
+                  " m; allowed: the same to within " + percent(square_tolerance) +
+                  ", or remove it");
     }
   }
 
@@ -297,7 +298,7 @@ class Resolver {
         const auto [other, fresh] = first.emplace(object.name, table.where("name"));
         if (!fresh)
           problem(table, "name",
-                  codec::quote(object.name) + " is already in line " +
+                  codec::quote(object.name) + " is already on line " +
                       std::to_string(other->second.line) + "; allowed: each name once");
       }
       object.file_as_written = draft.file.string();
@@ -316,7 +317,7 @@ class Resolver {
         const auto [other, fresh] = first.emplace(material, draft.given.where("material"));
         if (!fresh)
           problem(draft.given, "material",
-                  codec::quote(material) + " is already in line " +
+                  codec::quote(material) + " is already on line " +
                       std::to_string(other->second.line) + "; allowed: each material once");
       }
       set_.surfaces.push_back(draft.surface);
@@ -328,12 +329,11 @@ class Resolver {
     if (!table.has("world_from_file"))
       return glm::scale(rigid_transform(draft.pose), glm::dvec3{draft.scale});
     exclude(table, {"position_m", "rotation_deg", "scale"},
-            "contradicts world_from_file; allowed: one of the two forms");
+            "conflicts with world_from_file; allowed: one of the two");
     if (!table.good("world_from_file")) return glm::dmat4{1};
     constexpr double flat = 1e-6;
     if (regularity(*draft.pose.matrix) < flat)
-      problem(table, "world_from_file",
-              "cannot be inverted, it flattens the object; allowed: any invertible transform");
+      problem(table, "world_from_file", "flattens the object; allowed: any invertible transform");
     return *draft.pose.matrix;
   }
 
@@ -348,7 +348,7 @@ class Resolver {
         const auto [other, fresh] = first.emplace(draft.light.name, draft.given.where(key));
         if (!fresh)
           problem(draft.given, key,
-                  codec::quote(draft.light.name) + " is already in line " +
+                  codec::quote(draft.light.name) + " is already on line " +
                       std::to_string(other->second.line) + "; allowed: each name once");
       }
       captured(draft);
@@ -367,10 +367,9 @@ class Resolver {
     light.captured = draft.captured.value_or(is_real && is_filmed);
     if (light.captured && !is_real)
       problem(table, "captured",
-              "does not go with a lamp that is only added, or moved by hand; allowed: true with "
+              "is for real lamps that stay in place; allowed: true with "
               "gain_real above 0 and no carrier");
-    if (!light.captured)
-      exclude(table, {"cone_deg"}, "goes with captured = true only; leave it out");
+    if (!light.captured) exclude(table, {"cone_deg"}, "needs captured = true; remove it");
     light.measured = light.captured && !table.has("emission");
     const bool is_in_a_map = is_filmed || draft_.environment;
     if ((!light.captured || !is_in_a_map) && !table.has("emission"))
@@ -388,25 +387,25 @@ class Resolver {
         const auto [other, fresh] = first.emplace(lamp.name, table.where("name"));
         if (!fresh)
           problem(table, "name",
-                  codec::quote(lamp.name) + " is already in line " +
+                  codec::quote(lamp.name) + " is already on line " +
                       std::to_string(other->second.line) + "; allowed: each name once");
         if (std::ranges::find(set_.lights, lamp.name, &Light::name) != set_.lights.end())
           problem(table, "name",
-                  codec::quote(lamp.name) + " is a [[light]] too; allowed: each name once");
+                  codec::quote(lamp.name) + " is also a [[light]]; allowed: each name once");
       }
       if (table.has("position_m"))
-        exclude(table, {"direction"}, "contradicts position_m; leave one of the two out");
+        exclude(table, {"direction"}, "conflicts with position_m; remove one of the two");
       else if (!table.has("direction"))
         problem(table, "direction", "is missing; allowed: 3 numbers, or position_m");
       if (table.good("direction")) {
         if (glm::length(lamp.direction) > 0)
           lamp.direction = glm::normalize(lamp.direction);
         else
-          problem(table, "direction", "has no length; allowed: any other vector");
+          problem(table, "direction", "has zero length; allowed: any other vector");
       }
       if (set_.lighting.from == LightFrom::set && !draft_.environment && table.at)
         problems_.add(*table.at, table.path,
-                      "does not go with lighting.from = \"set\", which captures no light");
+                      "conflicts with lighting.from = \"set\", which captures no light");
       set_.captured_lamps.push_back(lamp);
     }
   }
@@ -434,13 +433,13 @@ class Resolver {
       const bool is_allowed = std::ranges::find(allowed, light.type) != allowed.end();
       if (is_required && !table.has(key)) problem(table, key, "is missing; " + type + " needs it");
       if (!is_required && !is_allowed)
-        exclude(table, {key}, type + " has no such thing; leave it out");
+        exclude(table, {key}, type + " does not have this; remove it");
     }
     if (table.good("direction")) {
       if (glm::length(light.direction) > 0)
         light.direction = glm::normalize(light.direction);
       else
-        problem(table, "direction", "has no length; allowed: any other vector");
+        problem(table, "direction", "has zero length; allowed: any other vector");
     }
     if (light.type == rectangle && table.good("direction")) upright(table, light);
     if (light.type == spot && light.inner_cone_rad > light.outer_cone_rad)
@@ -456,7 +455,7 @@ class Resolver {
     if (glm::length(across) > 1e-6 * glm::length(light.up))
       light.up = glm::normalize(across);
     else
-      problem(table, "up", "has no part across the light's direction; allowed: any that has");
+      problem(table, "up", "is parallel to the light's direction; allowed: any that is not");
   }
 
   void buttons() {
@@ -470,8 +469,8 @@ class Resolver {
         if (!fresh)
           problem(table, "name",
                   std::string("a ") + name_of(button.press) + " press of " +
-                      codec::quote(button.name) + " is already in line " +
-                      std::to_string(other->second.line) + "; allowed: one action a press");
+                      codec::quote(button.name) + " is already on line " +
+                      std::to_string(other->second.line) + "; allowed: one action per press");
       }
       set_.buttons.push_back(button);
     }
@@ -494,8 +493,8 @@ class Resolver {
     const Display& display = set_.display;
     if (drives_connectors(display.driver)) return;
     const std::string no = "driver \"" + display.driver + "\" has no ";
-    exclude(given("display"), {"connector"}, no + "connector; leave it out");
-    if (display.driver == no_driver) exclude(given("display"), {"mode"}, no + "mode; leave it out");
+    exclude(given("display"), {"connector"}, no + "connector; remove it");
+    if (display.driver == no_driver) exclude(given("display"), {"mode"}, no + "mode; remove it");
   }
 
   // Refuses wiring that no button uses, since nobody would notice the typing error.
@@ -510,10 +509,11 @@ class Resolver {
         return button.name == name || button.name.starts_with(name + ':');
       });
       if (!contact.name.starts_with("gpio:"))
-        problem(table, "name", quoted + " is no GPIO line; allowed: gpio:CHIP or gpio:CHIP:LINE");
+        problem(table, "name",
+                quoted + " is not a GPIO line; allowed: gpio:CHIP or gpio:CHIP:LINE");
       else if (!fresh)
         problem(table, "name",
-                quoted + " is already in line " + std::to_string(other->second.line) +
+                quoted + " is already on line " + std::to_string(other->second.line) +
                     "; allowed: each name once");
       else if (!wires_a_button)
         problem(table, "name",
@@ -532,31 +532,29 @@ class Resolver {
       lighting.environment = existing(table, "environment", *draft_.environment);
     }
     if (given("lighting.room").at)
-      exclude(
-          given("lighting.sources"), {"distance_m"},
-          "contradicts [lighting.room], on whose walls the lamps are; leave one of the two out");
+      exclude(given("lighting.sources"), {"distance_m"},
+              "conflicts with [lighting.room], whose walls hold the lamps; remove one of the two");
     if (lighting.from == LightFrom::recording) {
-      exclude(table, {"environment"}, "does not go with from = \"recording\"; leave one out");
+      exclude(table, {"environment"}, "conflicts with from = \"recording\"; remove one");
       if (lighting.mode != LightMode::sources)
         problem(table, table.has("mode") ? "mode" : "from",
-                std::string("a recording has sources and no picture, so mode \"") +
+                std::string("a recording has lamps but no light picture, so mode \"") +
                     name_of(lighting.mode) +
-                    "\" cannot be had of it; allowed: mode = \"sources\", or from = \"camera\"");
+                    "\" is not available; allowed: mode = \"sources\", or from = \"camera\"");
     }
     if (table.good("resolution") && lighting.resolution != 0 &&
         !std::has_single_bit(static_cast<unsigned>(lighting.resolution)))
       problem(table, "resolution",
               std::to_string(lighting.resolution) +
-                  " is no power of two; allowed: 0 or 1, 2, 4 ... 4096");
+                  " is not a power of two; allowed: 0 or 1, 2, 4 ... 4096");
     if (table.has("unseen") && !table.good("unseen")) return;
     if (lighting.unseen == UnseenRule::constant) {
       if (!table.has("unseen_radiance"))
         problem(table, "unseen_radiance",
-                "is missing with unseen = \"constant\"; allowed: 3 numbers, at least 0");
+                "is missing for unseen = \"constant\"; allowed: 3 numbers, at least 0");
       lighting.unseen_radiance = draft_.unseen_radiance.value_or(glm::dvec3{0});
     } else {
-      exclude(table, {"unseen_radiance"},
-              "goes with unseen = \"constant\" only; leave one of the two out");
+      exclude(table, {"unseen_radiance"}, "needs unseen = \"constant\"; set that or remove this");
     }
   }
 
@@ -565,7 +563,7 @@ class Resolver {
     if (!table.at) return;
     Room& room = draft_.room;
     if (draft_.room_file) {
-      exclude(table, {"size_m"}, "contradicts file; allowed: one of the two");
+      exclude(table, {"size_m"}, "conflicts with file; allowed: one of the two");
       room.file_as_written = draft_.room_file->string();
       room.file = existing(table, "file", *draft_.room_file);
     } else if (!table.has("size_m")) {
@@ -574,7 +572,7 @@ class Resolver {
     room.world_from_room = rigid_transform(draft_.room_pose);
     if (set_.lighting.environment)
       problems_.add(*table.at, table.path,
-                    "does not go with lighting.environment, which is light from far away");
+                    "conflicts with lighting.environment, which is light from infinity");
     set_.lighting.room = room;
   }
 

@@ -100,7 +100,7 @@ Keys observer_keys(Observer& o) {
       {"driver", &o.driver, Rule{.words = camera_driver_words()}, "Driver of the film camera."},
       {"device", &o.device, plain, "The camera's stable name, as `previzd devices` lists it; for replay the folder of the session, relative to this file. Default: the session named on the command line.", optional("\"sessions/take1\"")},
       {"faults", &o.faults, plain, "Faults to simulate, for rehearsals, and the frames at which they happen: drop, corrupt, late, stall, disconnect.", optional("[\"stall@250\", \"disconnect@1000+2.5s\"]")},
-      {"exposure", &o.exposure, absolute_exposure, "Absolute exposure, which overrides that of the frames: signal = exposure * radiance, where a signal of 1 is the sensor's white.", optional("1.0")},
+      {"exposure", &o.exposure, absolute_exposure, "Absolute exposure, overriding the frames' own: signal = exposure * radiance, where a signal of 1 is the sensor's white.", optional("1.0")},
   };
 }
 
@@ -114,18 +114,18 @@ Keys lens_fit_keys(LensFit& f) {
 Keys camera_keys(CameraWish& wish) {
   CameraSettings& c = wish.settings;
   return {
-      {"pixel_format", &c.format, plain, "The name that the driver uses: YUYV, NV12, YU12 (planar 4:2:0; YUV420 in libcamera) and so on. Formats with more bits are worth their bandwidth.", optional("\"BayerRG12\"")},
+      {"pixel_format", &c.format, plain, "Pixel format, by the driver's name: YUYV, NV12, YU12 (planar 4:2:0; YUV420 in libcamera) and so on. Formats with more bits are worth their bandwidth.", optional("\"BayerRG12\"")},
       {"width", &c.width, px.within(1, max_picture_side_px), "Width of the pictures; height must be given as well.", optional("1920")},
       {"height", &c.height, px.within(1, max_picture_side_px), "Height of the pictures; width must be given as well.", optional("1080")},
       {"rate_hz", &c.rate_hz, plain.within(0.001, 1e4), "Frames per second. Of a rate that the camera does not have, a message lists those that it has: aravis refuses it, and v4l2 and libcamera use the nearest.", optional("25.0")},
       {"exposure_s", &c.exposure_s, shutter, "Shutter time. Turns the camera's automatic exposure off.", optional("0.01")},
-      {"gain", &c.gain, plain.within(1, 1e4), "Linear gain, for cameras that state their gain in dB.", optional("2.0")},
-      {"raw_gain", &c.raw_gain, plain.within(-most_gain, most_gain), "Gain in the camera's own units. The factor that it stands for must be part of the responsivity.", optional("64.0")},
+      {"gain", &c.gain, plain.within(1, 1e4), "Linear gain, for cameras that report their gain in dB.", optional("2.0")},
+      {"raw_gain", &c.raw_gain, plain.within(-most_gain, most_gain), "Gain in the camera's own units. Its effect must be included in the responsivity.", optional("64.0")},
       {"white_balance_k", &c.white_balance_k, plain.within(1000, 25000), "Colour temperature in kelvin. Turns the camera's automatic white balance off.", optional("5600.0")},
       {"trigger", &c.trigger, plain, "\"software\", or the camera's input line that triggers each frame. Default: no trigger, the camera runs at its own rate.", optional("\"Line1\"")},
       {"packet_size", &c.packet_size, plain.within(576, 16000), "Packet size of network cameras, in bytes. Default: the largest that the network passes. A size that is given is used untried; no frame arrives if the network does not pass it.", optional("9000")},
-      {"start_timeout_s", &wish.start_timeout_s, seconds.within(0.001, 600), "A camera that delivers no frame for this long after its start is opened again."},
-      {"stall_timeout_s", &wish.stall_timeout_s, seconds.within(0.001, 600), "A camera that delivers no frame for this long counts as stalled, and is soon opened again."},
+      {"start_timeout_s", &wish.start_timeout_s, seconds.within(0.001, 600), "A camera that delivers no frame for this long after starting is reopened."},
+      {"stall_timeout_s", &wish.stall_timeout_s, seconds.within(0.001, 600), "A camera that delivers no frame for this long counts as stalled and is soon reopened."},
   };
 }
 
@@ -140,50 +140,50 @@ Keys light_camera_keys(LightCamera& c) {
       {"driver", &c.driver, Rule{.words = camera_driver_words()}, "Driver of the light camera, the fisheye that looks at the lamps."},
       {"device", &c.device, plain, "As in [observer].", optional("\"sessions/take1\"")},
       {"faults", &c.faults, plain, "As in [observer].", optional("[\"drop@30+5\"]")},
-      {"exposure", &c.exposure, absolute_exposure, "Absolute exposure, which overrides that of the frames; see [observer].", optional("0.35")},
+      {"exposure", &c.exposure, absolute_exposure, "Absolute exposure, overriding the frames' own; see [observer].", optional("0.35")},
   };
 }
 
 Keys tracking_keys(Tracking& t) {
   return {
-      {"enabled", &t.enabled, plain, "Find the film camera's position by the tags in its picture; false: use the positions recorded in the session."},
+      {"enabled", &t.enabled, plain, "Find the film camera's pose from the tags in its picture; false: use the poses recorded in the session."},
       {"family", &t.family, Rule{.words = tag_families}, "AprilTag family of the printed tags."},
-      {"decimate", &t.decimate, plain.within(1, 8), "Tags are searched in a picture that is smaller by this factor. This is faster but misses small tags."},
+      {"decimate", &t.decimate, plain.within(1, 8), "Search for tags in a picture reduced by this factor: faster, but misses small tags."},
       {"min_margin", &t.min_margin, plain.within(0, 255), "Detections whose decision margin is lower are dropped."},
       {"max_hamming", &t.max_hamming, plain.within(0, 3), "Bits of a tag's code that may be corrected."},
-      {"ambiguity_ratio", &t.ambiguity_ratio, plain.within(0, 1), "A single tag can look alike from two positions. It counts as ambiguous if the error of the best one, over that of the second best, is above this."},
-      {"search_parts", &t.search_parts, plain, "Live, tags are searched where the last positions let them be expected, and the rest of the picture in strips, all of it within 16 frames. This keeps up with large pictures. false: the whole picture of every frame, as `previzd render` does."},
-      {"smooth", &t.smooth, plain, "Live pictures show the film camera without the jitter and the jumps of its positions. Takes, refinements and `previzd render` have the positions as they were found."},
-      {"hold_s", &t.hold_s, seconds.within(0, 60), "How long live pictures go on with the expected position while none is found, as when a hand covers the tags; 0: not at all. Such a position is never recorded."},
-      {"hold_error", &t.hold_error, plain.within(0, 1), "The expected position is given up earlier if things are likely to be off by more than this share of the picture's width, which comes soon while the camera moves."},
+      {"ambiguity_ratio", &t.ambiguity_ratio, plain.within(0, 1), "A single tag can look the same from two poses. It counts as ambiguous if the best pose's error, divided by the second best's, is above this."},
+      {"search_parts", &t.search_parts, plain, "Live, search for tags where they are expected, and the rest of the picture in strips, all of it within 16 frames, to keep up with large pictures. false: search the whole picture of every frame, as `previzd render` does."},
+      {"smooth", &t.smooth, plain, "Smooth out jitter and jumps of the film camera's pose in live pictures. Takes, refinements and `previzd render` use the poses as found."},
+      {"hold_s", &t.hold_s, seconds.within(0, 60), "How long live pictures continue with a predicted pose while none is found, as when a hand covers the tags; 0: not at all. A predicted pose is never recorded."},
+      {"hold_error", &t.hold_error, plain.within(0, 1), "The predicted pose is dropped earlier if objects are likely to be off by more than this fraction of the picture's width, as happens soon while the camera moves."},
   };
 }
 
 Keys tag_keys(TagDraft& t) {
   return {
-      {"id", &t.id, plain.within(0, 65535), "The number of the tag; each at most once.", required("0")},
-      {"size_m", &t.size, m.within(1e-4, 100), "Side of the black border, measured outside. Required unless corners_m is given.", optional("0.08")},
-      {"position_m", &t.pose.position, place, "Position of the tag's middle in the world (Z up).", optional("[0.0, 0.0, 0.0]")},
+      {"id", &t.id, plain.within(0, 65535), "The tag's id; must be unique.", required("0")},
+      {"size_m", &t.size, m.within(1e-4, 100), "Outer side of the black border. Required unless corners_m is given.", optional("0.08")},
+      {"position_m", &t.pose.position, place, "Position of the tag's centre in the world (Z up).", optional("[0.0, 0.0, 0.0]")},
       {"rotation_deg", &t.pose.rotation, turn, "Rotation about world X, then Y, then Z. Without it the tag lies face up with its right along X; [90, 0, 0] hangs it on a wall, facing -Y.", optional("[0.0, 0.0, 0.0]")},
       {"corners_m", &t.corners, place, "Instead of position and rotation: the corners of the black border, as printed: lower left, lower right, upper right, upper left.", optional("[[-0.04, -0.04, 0], [0.04, -0.04, 0], [0.04, 0.04, 0], [-0.04, 0.04, 0]]")},
       {"world_from_tag", &t.pose.matrix, matrix, "Instead of position and rotation: the rigid transform; the tag's axes point right, up and out of the paper.", optional("[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]")},
-      {"carrier", &t.carrier, plain, "Name of the thing that the tag is stuck to, if it is moved by hand: a stick, a tray. The tag's pose is then relative to the carrier; without a pose, the carrier's frame is that of the tag.", optional("\"stick\"")},
+      {"carrier", &t.carrier, plain, "Name of what carries the tag, if that is moved by hand: a stick, a tray. The tag's pose is then relative to the carrier; without a pose, the tag defines the carrier's frame.", optional("\"stick\"")},
   };
 }
 
 Keys object_keys(ObjectDraft& o) {
   return {
-      {"name", &o.object.name, plain, "Name used in messages; each at most once.", required("\"vase\"")},
+      {"name", &o.object.name, plain, "Name used in messages; must be unique.", required("\"vase\"")},
       {"file", &o.file, plain, "glTF 2.0 (.glb or .gltf); its Y-up is turned to the world's Z-up.", required("\"vase.glb\"")},
-      {"presence", &o.object.presence, plain, "\"phantom\" is the model of a real thing, \"virtual\" is added to the picture, \"removed\" is a real thing that is taken out of it.", required("\"virtual\"")},
+      {"presence", &o.object.presence, plain, "\"phantom\" is the model of a real thing, \"virtual\" is added to the picture, \"removed\" is a real thing that is removed from it.", required("\"virtual\"")},
       {"nodes", &o.object.nodes, plain, "Names of the glTF nodes to use; empty: the whole file."},
       {"animation", &o.object.animation, plain, "The animation in the file that is played (nodes, joints of skins and weights of morph targets), in the time of the pictures: its name, its index from \"0\", or \"*\" for all of them at once. A wrong name is answered with a list of what there is. Default: nothing moves.", optional("\"walk\"")},
-      {"loops", &o.object.loops, plain, "The animation starts again at its end; false: it stops there."},
-      {"variant", &o.object.variant, plain, "Name of the variant of its materials that the object is shown in (KHR_materials_variants); \"\" is the file as it is without one. The action next_variant steps through the variants of a virtual object.", optional("\"blue\"")},
+      {"loops", &o.object.loops, plain, "Loop the animation; false: it stops at its end."},
+      {"variant", &o.object.variant, plain, "Material variant to show the object in (KHR_materials_variants); \"\" is the file without a variant. The action next_variant steps through the variants of a virtual object.", optional("\"blue\"")},
       {"position_m", &o.pose.position, place, "Position of the file's origin in the world.", optional("[0.2, 0.1, 0.0]")},
       {"rotation_deg", &o.pose.rotation, turn, "Rotation about world X, then Y, then Z, applied before the position.", optional("[0.0, 0.0, 45.0]")},
       {"scale", &o.scale, plain.within(1e-9, 1e6), "Scale factor, applied before the rotation."},
-      {"carrier", &o.object.carrier, plain, "Carrier of a [[tag]] that it is attached to: it moves along, and its pose is relative to the carrier.", optional("\"stick\"")},
+      {"carrier", &o.object.carrier, plain, "Carrier of a [[tag]] to attach it to: it moves along, and its pose is relative to the carrier.", optional("\"stick\"")},
       {"world_from_file", &o.pose.matrix, matrix, "Instead of position, rotation and scale: any invertible transform.", optional("[[1, 0, 0, 0.2], [0, 1, 0, 0.1], [0, 0, 1, 0], [0, 0, 0, 1]]")},
   };
 }
@@ -203,28 +203,28 @@ Keys light_keys(LightDraft& d) {
       {"position_m", &l.position, place, "Position of its centre; not for a directional light.", optional("[0.0, -1.0, 2.0]")},
       {"direction", &l.direction, axis, "Direction in which the light travels: spot, directional, rectangle.", optional("[0.0, 0.5, -1.0]")},
       {"up", &l.up, axis, "Rectangle: direction of its height; the part along `direction` is ignored.", optional("[0.0, 1.0, 0.0]")},
-      {"emission", &l.emission, radiance, "Linear Rec. 709, in the units of the set's radiance. Point, spot: intensity in W/sr; directional: W/m^2 on a plane that faces it; rectangle, sphere: radiance in W/sr/m^2. Required, but for a lamp with captured = true: without it, the lamp is as bright as the light camera sees it.", optional("[10.0, 9.5, 8.0]")},
+      {"emission", &l.emission, radiance, "Linear Rec. 709, in the units of the set's radiance. Point, spot: intensity in W/sr; directional: W/m^2 on a plane that faces it; rectangle, sphere: radiance in W/sr/m^2. Required, except with captured = true: without it, that lamp is as bright as the light camera sees it.", optional("[10.0, 9.5, 8.0]")},
       {"width_m", &l.width_m, length, "Rectangle: its width.", optional("1.0")},
       {"height_m", &l.height_m, length, "Rectangle: its height.", optional("0.5")},
       {"radius_m", &l.radius_m, length, "Sphere: its radius.", optional("0.05")},
-      {"angular_radius_deg", &l.angular_radius_rad, deg.within(0, 90), "Directional: half the angle under which it is seen; 0 gives sharp shadows, the sun has 0.265.", optional("0.265")},
+      {"angular_radius_deg", &l.angular_radius_rad, deg.within(0, 90), "Directional: half its angular diameter; 0 gives sharp shadows, the sun has 0.265.", optional("0.265")},
       {"inner_cone_deg", &l.inner_cone_rad, deg.within(0, 90), "Spot: half angle of its full intensity. Default: 0.", optional("20.0")},
       {"outer_cone_deg", &l.outer_cone_rad, deg.within(0.01, 90), "Spot: half angle at which its light ends. Default: 45.", optional("35.0")},
-      {"carrier", &l.carrier, plain, "Carrier of a [[tag]] that it is attached to: it moves along, and its pose is relative to the carrier.", optional("\"stick\"")},
+      {"carrier", &l.carrier, plain, "Carrier of a [[tag]] to attach it to: it moves along, and its pose is relative to the carrier.", optional("\"stick\"")},
       {"gain_mixed", &l.gain_mixed, gain, "Brightness in the composite: 1 as it is, 0 off, 0.3 dimmed to 30 %."},
       {"gain_real", &l.gain_real, gain, "Brightness on the real set: 1 for a real lamp, 0 for one that is added."},
-      {"tint", &l.tint, gain, "Colour of its light in the composite over that on the real set: one factor for each of red, green and blue.", optional("[1.0, 0.8, 0.6]")},
-      {"captured", &d.captured, plain, "Whether the light around the set shows this lamp too. It is then taken out of it, so that it does not shine twice, and dimming or removing it changes the light. Default: true for a lamp with gain_real above 0 and no carrier where the light comes from a light camera.", optional("false")},
-      {"cone_deg", &l.cone_rad, deg.within(0.01, 60), "With captured = true: what is taken out is a cone of this half angle around the lamp. Default: its outline as the light camera sees it, and 1 degree around that.", optional("5.0")},
+      {"tint", &l.tint, gain, "Colour of its light in the composite relative to the real set: factors of red, green and blue.", optional("[1.0, 0.8, 0.6]")},
+      {"captured", &d.captured, plain, "Whether the environment light also contains this lamp. It is then subtracted, so that it does not shine twice and can be dimmed or removed. Default: true for a lamp with gain_real above 0 and no carrier if the light comes from a light camera.", optional("false")},
+      {"cone_deg", &l.cone_rad, deg.within(0.01, 60), "With captured = true: half angle of the cone around the lamp that is subtracted. Default: its outline as the light camera sees it, plus 1 degree.", optional("5.0")},
   };
 }
 
 Keys captured_lamp_keys(CapturedLamp& l) {
   return {
-      {"name", &l.name, plain, "Name used in messages and by the buttons; each at most once, and not that of a [[light]].", required("\"window\"")},
-      {"direction", &l.direction, axis, "Direction from the light camera towards the lamp, by the axes of the set, also where there is a room. Required unless position_m is given.", optional("[0.71, 0.33, 0.62]")},
-      {"position_m", &l.position, place, "Instead of direction: the lamp's place, from which its light then comes.", optional("[1.2, 0.4, 2.3]")},
-      {"cone_deg", &l.cone_rad, deg.within(0.01, 60), "Half angle of the cone that holds the whole lamp; what is brighter in it than at its edge is the lamp's light.", required("6.0")},
+      {"name", &l.name, plain, "Name used in messages and by the buttons; must be unique, also among [[light]].", required("\"window\"")},
+      {"direction", &l.direction, axis, "Direction from the light camera towards the lamp, in world axes, even with [lighting.room]. Required unless position_m is given.", optional("[0.71, 0.33, 0.62]")},
+      {"position_m", &l.position, place, "Instead of direction: the lamp's position, from which its light comes.", optional("[1.2, 0.4, 2.3]")},
+      {"cone_deg", &l.cone_rad, deg.within(0.01, 60), "Half angle of a cone that contains the whole lamp; light in it above the level at its edge is the lamp's.", required("6.0")},
       {"gain_mixed", &l.gain_mixed, gain, "Brightness in the composite: 1 as it is, 0 off, 0.3 dimmed to 30 %."},
       {"tint", &l.tint, gain, "Colour of its light in the composite, as factors of red, green and blue."},
   };
@@ -234,17 +234,17 @@ Keys lighting_keys(Draft& d) {
   auto& l = d.set.lighting;
   return {
       {"from", &l.from, plain, "\"camera\": the light is measured in the light camera's frames, live or recorded. \"recording\": the lamps are those that were found while the session was recorded with mode = \"sources\". \"set\": all light is declared in this file, by environment and [[light]]."},
-      {"mode", &l.mode, plain, "\"image\": the whole fisheye picture lights the scene. \"sources\": the lamps in it become discs or spheres, which needs far fewer samples; the rest of the picture is blurred or dropped. \"hybrid\": the lamps likewise, and the rest of the picture as it is."},
+      {"mode", &l.mode, plain, "\"image\": the whole fisheye picture lights the scene. \"sources\": the lamps in it become discs or spheres, which needs far fewer samples; the rest of the picture is blurred or dropped. \"hybrid\": the lamps likewise, and the rest of the picture unchanged."},
       {"sampling", &l.sampling, plain, "How directions towards the light are chosen: by its brightness, or by the surfaces alone (\"bsdf\"), which is noisier and meant for comparison."},
-      {"environment", &d.environment, plain, "Picture of the light from all around, which replaces the light camera: OpenEXR or Radiance .hdr, latitude-longitude (2:1) or a cube cross (3:4 or 4:3); Z up, the middle of the picture, or of the middle face, is +X.", optional("\"env.exr\"")},
+      {"environment", &d.environment, plain, "Picture of the light from all around, which replaces the light camera: OpenEXR or Radiance .hdr, latitude-longitude (2:1) or a cube cross (3:4 or 4:3); Z up, the centre of the picture, or of the middle face, is +X.", optional("\"env.exr\"")},
       {"environment_rotation_deg", &l.environment_rotation_rad, turn, "Rotation of the environment about world Z, counter-clockwise as seen from above."},
       {"environment_gain", &l.environment_gain, gain, "Brightness factor of the environment."},
       {"balance", &l.balance, plain.within(1e-6, 1e6), "Factors of red, green and blue that turn the light camera's radiance, or the environment's, into the film camera's (previzd calibrate balance)."},
-      {"resolution", &l.resolution, plain.within(0, 4096), "Size of the light map in texels a side, a power of two; 0: as fine as the picture that it is made from."},
+      {"resolution", &l.resolution, plain.within(0, 4096), "Size of the light map in texels per side, a power of two; 0: as fine as its source picture."},
       {"unseen", &l.unseen, plain, "What is assumed where the light camera cannot see. \"horizon\" continues the edge of its picture, \"mirror\" mirrors the picture about the plane of the lens, \"observer\" uses what the film camera has seen there and the horizon elsewhere, \"constant\" uses unseen_radiance."},
       {"unseen_radiance", &d.unseen_radiance, radiance, "With unseen = \"constant\" only: linear Rec. 709 radiance.", optional("[0.1, 0.1, 0.1]")},
       {"smoothing_s", &l.smoothing_s, seconds.within(0, 60), "Time over which steady light is averaged. Changes that exceed the sensor's noise are followed at once. 0: no averaging."},
-      {"clipped_gain", &l.clipped_gain, plain.within(1, 1e6), "Light that clips in every exposure may be taken for up to this many times as bright as the level at which it clips; 1: exactly that level, which is its lower bound."},
+      {"clipped_gain", &l.clipped_gain, plain.within(1, 1e6), "Light that clips in every exposure may be assumed up to this many times brighter than the clipping level; 1: exactly that level, its lower bound."},
       {"frame", &l.frame, plain.within(-1, 1'000'000), "Light frame to use for the whole take; -1: for each picture the last bracket before it."},
   };
 }
@@ -253,7 +253,7 @@ Keys room_keys(Draft& d) {
   return {
       {"size_m", &d.room.size_m, length, "Inner size of a box-shaped room along X, Y and Z, before its rotation. Required unless file is given.", optional("[6.0, 5.0, 2.8]")},
       {"file", &d.room_file, plain, "Instead of size_m: a glTF 2.0 file with the walls and lamps, as in [[object]].", optional("\"room.glb\"")},
-      {"position_m", &d.room_pose.position, place, "Position of the box's middle, or of the file's origin, in the world.", optional("[0.0, 0.0, 1.4]")},
+      {"position_m", &d.room_pose.position, place, "Position of the box's centre, or of the file's origin, in the world.", optional("[0.0, 0.0, 1.4]")},
       {"rotation_deg", &d.room_pose.rotation, turn, "Rotation about world X, then Y, then Z, applied before the position.", optional("[0.0, 0.0, 30.0]")},
       {"seen_from_m", &d.room.seen_from, place, "Where the light is needed: a place among the virtual objects."},
   };
@@ -262,8 +262,8 @@ Keys room_keys(Draft& d) {
 Keys light_sources_keys(LightSources& l) {
   return {
       {"contrast", &l.contrast, plain.within(2, 1e6), "A lamp must be at least this many times as bright as the mean of everything that is not a lamp."},
-      {"least_share", &l.least_share, plain.within(0, 1), "A lamp must bring at least this share of all light; fainter ones, such as reflections of lamps, stay in the picture."},
-      {"residual", &l.residual, plain, "With mode = \"sources\": the light of everything but the lamps is kept, blurred beyond recognition, or dropped; its share is then reported."},
+      {"least_share", &l.least_share, plain.within(0, 1), "A lamp must give at least this fraction of all light; fainter ones, such as reflections of lamps, stay in the picture."},
+      {"residual", &l.residual, plain, "With mode = \"sources\": light that is not from lamps is kept, heavily blurred, or dropped (its fraction is then reported)."},
       {"distance_m", &l.distance_m, length, "Distance of the lamps from the light camera. Default: they are on the walls of [lighting.room], or infinitely far away if there is none.", optional("2.5")},
   };
 }
@@ -273,16 +273,16 @@ Keys estimator_keys(Estimation& e) {
       {"kind", &e.estimator, plain, "\"paired\" traces both worlds in full, the set as it is and the set with the virtual objects. \"difference\" traces only how they differ wherever no virtual object covers the picture, which needs fewer samples (with composite = \"additive\"; the others always trace both)."},
       {"composite", &e.composite, plain, "How shadows and light are put onto the plate. \"additive\" adds the difference of the two worlds. \"ratio\" multiplies by their ratio, which forgives a phantom of the wrong colour but cannot light a black surface. \"hybrid\" uses the ratio on bright surfaces and the sum on dark ones."},
       {"real_radiance", &e.real_radiance, plain, "Radiance of real surfaces in reflections and bounced light. \"traced\" simulates it. \"camera\" takes it from the plate wherever that shows a matt surface (specularFactor 0), in focus and unclipped: reflections then show the true texture, and paths end sooner."},
-      {"composite_floor", &e.composite_floor, plain.within(0.0001, 1), "With composite = \"hybrid\": a real surface counts as dark below this share of the sensor's white."},
+      {"composite_floor", &e.composite_floor, plain.within(0.0001, 1), "With composite = \"hybrid\": a real surface counts as dark below this fraction of the sensor's white."},
       {"max_depth", &e.max_depth, plain.within(1, 64), "Largest number of bounces."},
-      {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "From this bounce on, faint paths are ended by chance (Russian roulette)."},
+      {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "From this bounce on, faint paths are ended at random (Russian roulette)."},
       {"seed", &e.seed, plain, "The same seed gives the same noise: in every frame, or, with quality.neighbours, in the frame of the same number."},
       {"specular_roughness", &e.specular_roughness, plain.within(0, 0.1), "A surface counts as a perfect mirror if its roughness (GGX alpha) is at or below this."},
-      {"difference_sampling", &e.difference_sampling, plain.within(0, 0.8), "Largest share of directions that are aimed at virtual and removed objects, because only there can the two worlds differ. Fewer are aimed where small lamps give most of the light, since these find the objects anyway. 0: none, as in the paper."},
-      {"caustics", &e.caustics, plain, "Light that falls onto rough surfaces by way of mirrors and glass. \"photons\": soft at first, then sharper. \"traced\": by paths that happen to find it, noisy. \"none\": left out."},
+      {"difference_sampling", &e.difference_sampling, plain.within(0, 0.8), "Largest fraction of directions aimed at virtual and removed objects, because only there can the two worlds differ. Fewer are aimed where small lamps give most of the light, since these find the objects anyway. 0: none, as in the paper."},
+      {"caustics", &e.caustics, plain, "Light that reaches rough surfaces via mirrors and glass. \"photons\": soft at first, then sharper. \"traced\": by paths that happen to find it, noisy. \"none\": off."},
       {"photons", &e.photons, plain.within(0.001, 10), "With caustics = \"photons\": photons per sample and pixel; at least 1024 per sample in all."},
       {"photon_radius_px", &e.photon_radius_px, plain.within(0.1, 100), "Blur of caustics in the first sample: radius over which photons are averaged, in pixels. It shrinks with every sample."},
-      {"filter_textures", &e.filter_textures, plain, "Averages colour, roughness and glow of textures over the area that a sample stands for, which calms fine patterns seen from afar at a few samples a pixel. The area shrinks with every sample. Takes a third more memory for textures."},
+      {"filter_textures", &e.filter_textures, plain, "Averages colour, roughness and emission of textures over the area that a sample covers, which calms fine distant patterns at few samples per pixel. The area shrinks with every sample. Textures need a third more memory."},
   };
 }
 
@@ -291,19 +291,19 @@ Keys quality_keys(Quality& q) {
       {"samples", &q.samples, plain.within(1, 1'000'000), "Samples per pixel and frame; with error or seconds, those of the first round."},
       {"adaptive", &q.adaptive, plain, "Spends more samples where the picture is noisy: the number of samples is then the average, and a pixel gets between an eighth and eight times as many. Offline only, from 32 samples on, and only if neither error nor seconds is set."},
       {"denoise", &q.denoise, plain, "Removes noise from the composite, in the preview as well, guided by the noise that was measured in each pixel. The fewer the samples, the more it helps and the more it blurs. The other layers of an EXR file stay as rendered."},
-      {"accumulate", &q.accumulate, plain, "Live and in review, averages what is added to the camera's picture with the frames before, as far as they show the same surfaces in the same light: less noise at the same rate. The camera's picture is never averaged. What moves fast, and what changed, starts anew. A snapshot's frame stands alone, so that it can be compared with what is rendered from a take. The action \"accumulate\" switches it. Refinement does without it; for offline rendering see neighbours."},
-      {"neighbours", &q.neighbours, plain.within(0, 4), "With denoise, `previzd render` averages what is added to the camera's picture with this many frames of the take on each side, as far as they show the same surfaces in the same light. Composite, mask and variance of an EXR file are then those of the averaged picture, which is the same whatever part of the take is rendered. With 2 it takes 1.3 GB of memory per megapixel, 2 GB without a graphics card; 0: every frame stands alone, as in a snapshot. Live, in review and in snapshots the key is unused."},
-      {"error", &q.error, plain.within(0, 1), "Adds samples wherever the estimated error is above this share of the picture's brightness; 0: a fixed number of samples."},
+      {"accumulate", &q.accumulate, plain, "Live and in review, averages what is added to the plate over previous frames, where they show the same surfaces in the same light: less noise at the same rate. The plate is never averaged. What moves fast or has changed starts over. A snapshot's frame stands alone, so that it can be compared with what is rendered from a take. The action \"accumulate\" toggles it. Not used by refinement; for offline rendering see neighbours."},
+      {"neighbours", &q.neighbours, plain.within(0, 4), "With denoise, `previzd render` averages what is added to the plate over this many frames of the take on each side, where they show the same surfaces in the same light. Composite, mask and variance of an EXR file then belong to the averaged picture, which is the same whatever part of the take is rendered. With 2 it needs 1.3 GB of memory per megapixel, 2 GB without a graphics card; 0: every frame stands alone, as in a snapshot. Live, in review and in snapshots the key is unused."},
+      {"error", &q.error, plain.within(0, 1), "Adds samples wherever the estimated error is above this fraction of the picture's brightness; 0: a fixed number of samples."},
       {"seconds", &q.seconds, plain.within(0, 86'400), "Adds samples for this long, where the picture needs them most; 0: a fixed number of samples."},
       {"scale", &q.scale, plain.within(0.01, 1), "Size of the preview, relative to the camera's picture; offline rendering is always full size."},
-      {"fps", &q.fps, plain.within(0, 240), "Frame rate that the preview holds, by 1 to 50 samples, and then by a smaller picture (scale is the largest size), or by the [[quality.preview]] tables; 0: the keys above decide."},
-      {"cpu_instead", &q.cpu_instead, plain, "Live, if the graphics card is gone: draws on the CPU, slowly, for as long as the set runs. Otherwise the plate is shown until the card is back. A rig that never had a card draws on the CPU anyway."},
+      {"fps", &q.fps, plain.within(0, 240), "Frame rate that the preview holds, with 1 to 50 samples, then with a smaller picture (scale is the largest size), or by the [[quality.preview]] tables; 0: the keys above decide."},
+      {"cpu_instead", &q.cpu_instead, plain, "Live, if the graphics card is gone: render on the CPU, slowly, as long as the set runs. Otherwise the plate is shown until the card is back. A rig that never had a card always renders on the CPU."},
   };
 }
 
 Keys preview_step_keys(PreviewStep& s) {
   return {
-      {"samples", &s.samples, plain.within(1, 50), "The least number of samples per pixel; as many more as fit are taken."},
+      {"samples", &s.samples, plain.within(1, 50), "Minimum samples per pixel; more are used if they fit."},
       {"scale", &s.scale, plain.within(0.01, 1), "Size of the picture, relative to the camera's."},
       {"denoise", &s.denoise, plain, "Whether noise is removed. Default: quality.denoise.", optional("true")},
   };
@@ -321,8 +321,8 @@ Keys gpio_keys(GpioContact& c) {
   return {
       {"name", &c.name, plain, "A button on a GPIO line; without its last part, all lines of the chip that have no table of their own.", required("\"gpio:rig-buttons\"")},
       {"active_low", &c.wiring.active_low, plain, "Whether a pressed button pulls the line low (a contact to ground)."},
-      {"bias", &c.wiring.bias, plain, "Resistor of the chip on the line; \"as_is\" leaves it as it is."},
-      {"debounce_s", &c.wiring.debounce_s, seconds.within(0, 1), "Changes that follow one within this time are taken for the contact's bouncing."},
+      {"bias", &c.wiring.bias, plain, "The chip's resistor on the line; \"as_is\" leaves it unchanged."},
+      {"debounce_s", &c.wiring.debounce_s, seconds.within(0, 1), "Changes that follow another within this time are treated as contact bounce."},
   };
 }
 
@@ -339,18 +339,18 @@ Keys control_keys(Control& c) {
 
 Keys recording_keys(Recording& r) {
   return {
-      {"directory", &r.directory, plain, "Folder for takes; each gets a folder of its own: SLATE_take001 and so on."},
-      {"second_directory", &r.second_directory, plain, "Folder on another disk, in which a recording goes on when the disk of `directory` is full or fails. Takes are numbered through both, and the set's files are kept in both. Default: the recording ends.", optional("\"/media/second/takes\"")},
+      {"directory", &r.directory, plain, "Folder for takes; each gets its own folder: SLATE_take001 and so on."},
+      {"second_directory", &r.second_directory, plain, "Folder on another disk, in which recording continues when the disk of `directory` is full or fails. Take numbers run across both, and the set's files are kept in both. Default: the recording ends.", optional("\"/media/second/takes\"")},
       {"slate", &r.slate, plain, "Scene and shot, as on the slate. Default: the set's name.", optional("\"12A\"")},
       {"notes", &r.notes, plain, "Notes that are written into every take.", optional("\"second unit, 35 mm\"")},
       {"preroll_s", &r.preroll_s, seconds.within(0, 60), "A take begins this long before the button was pressed; the frames are kept in memory until then."},
-      {"most_behind_s", &r.most_behind_s, seconds.within(0.2, 600), "The disk and the encoder are never more than this behind the cameras, because what waits in memory is lost where the computer goes down: of what waits longer, the oldest frame is left out, counted and reported. What pre-roll adds at the beginning of a take is given ten seconds."},
-      {"codec", &r.codec, plain, "Form of the cameras' pictures in a take, both without loss: ffv1 is about half as large and costs a processor core for every few pictures of 1920x1080 a second; raw costs a fast disk (1920x1080 at 25 pictures a second: 160 MB a second) and no processor. The rig says before the first take which does not keep up."},
+      {"most_behind_s", &r.most_behind_s, seconds.within(0.2, 600), "The disk and the encoder are never more than this behind the cameras, because what waits in memory is lost if the computer crashes: if more waits, the oldest frame is dropped, counted and reported. What pre-roll adds at the beginning of a take is given ten seconds."},
+      {"codec", &r.codec, plain, "Form of the cameras' pictures in a take, both without loss: ffv1 is about half as large and costs a processor core for every few pictures of 1920x1080 per second; raw costs a fast disk (1920x1080 at 25 frames per second: 160 MB per second) and no processor. The rig says before the first take which does not keep up."},
       {"queue_mb", &r.queue_mb, megabytes.within(1, 1e6), "Memory for frames that wait for the disk, half of it for those before the button, and at most three quarters of the computer's. Frames that do not fit are dropped, counted and reported. Default: a quarter of the memory that is free at the start.", optional("1024.0")},
-      {"reserve_mb", &r.reserve_mb, megabytes.within(1, 1e9), "A take is ended properly before less disk space than this is left."},
+      {"reserve_mb", &r.reserve_mb, megabytes.within(1, 1e9), "A take is closed cleanly before free disk space falls below this."},
       {"timecode_fps", &r.timecode_fps, plain.within(1, 240), "Frames per second of the timecode (time of day)."},
       {"composite", &r.composite, plain, "Also record the composite that was shown, without overlay: composite.mkv, lossless, for viewing the take elsewhere."},
-      {"end_over_bus", &r.end_over_bus, plain, "Whether a take may be ended over D-Bus, as by `previzctl record off`, by whoever may operate the rig there. Where not, only the crew's buttons end one; anybody who may operate it may begin one."},
+      {"end_over_bus", &r.end_over_bus, plain, "Whether a take may be ended over D-Bus, as by `previzctl record off`. If not, only the crew's buttons end one; anybody who may operate the rig can still begin one."},
   };
 }
 
@@ -397,28 +397,28 @@ std::vector<Section> sections(Draft& d) {
   return {
       once("set", always, "The set as a whole.", [&d] { return set_keys(d.set); }),
       once("observer", always, "The film camera.", [&d] { return observer_keys(d.set.observer); }),
-      once("observer.camera", optional, "Settings of a live camera; those that are not given stay as they are in the camera.", [&d] { return camera_keys(d.set.observer.camera); }),
-      once("observer.intrinsics", optional, "The calibrated lens of the film camera. A calibration given here replaces that of the session as a whole.", [&d] { return calibration_keys(d.observer, "intrinsics"); }),
-      once("observer.lens_fit", optional, "How certain that lens is: the statistics of the boards, which `previzd calibrate observer` prints. `previzd calibrate tags` refines the lens by it; nothing else reads it.", [&d] { return lens_fit_keys(d.set.observer.lens_fit); }),
+      once("observer.camera", optional, "Settings of a live camera; those not given stay as the camera has them.", [&d] { return camera_keys(d.set.observer.camera); }),
+      once("observer.intrinsics", optional, "The calibrated lens of the film camera. A calibration given here replaces all of the session's.", [&d] { return calibration_keys(d.observer, "intrinsics"); }),
+      once("observer.lens_fit", optional, "How accurate that lens is: the statistics of the boards, as `previzd calibrate observer` prints them. `previzd calibrate tags` refines the lens with it; nothing else reads it.", [&d] { return lens_fit_keys(d.set.observer.lens_fit); }),
       once("observer.lens", optional, "The lens, for depth of field. Without this table everything is in focus.", [&d] { return calibration_keys(d.observer, "lens"); }),
       once("observer.response", optional, "How its sensor turns light into picture values.", [&d] { return calibration_keys(d.observer, "response"); }),
       once("light_camera", always, "The light camera: a fisheye that sees the lamps.", [&d] { return light_camera_keys(d.set.light_camera); }),
       once("light_camera.camera", optional, "Settings of a live camera, as in [observer.camera].", [&d] { return light_camera_driving_keys(d.set.light_camera.camera); }),
       once("light_camera.intrinsics", optional, "The calibrated fisheye lens of the light camera.", [&d] { return calibration_keys(d.light_camera, "intrinsics"); }),
       once("light_camera.response", optional, "How its sensor turns light into picture values.", [&d] { return calibration_keys(d.light_camera, "response"); }),
-      once("light_camera.pose", optional, "Where the light camera stands.", [&d] { return calibration_keys(d.light_camera, "pose"); }),
-      once("tracking", always, "How the position of the film camera is found, by printed AprilTags.", [&d] { return tracking_keys(d.set.tracking); }),
+      once("light_camera.pose", optional, "The light camera's pose.", [&d] { return calibration_keys(d.light_camera, "pose"); }),
+      once("tracking", always, "How the film camera's pose is found, from printed AprilTags.", [&d] { return tracking_keys(d.set.tracking); }),
       many("tag", "A printed tag; one table for each. Its pose is given in one of three forms.", d.tags, tag_keys),
       many("object", "A piece of geometry, real or virtual; one table for each.", d.objects, object_keys),
       many("surface", "The colour of a real surface, where it is known better than by the model; one table for each.", d.surfaces, [](SurfaceDraft& s) { return surface_keys(s.surface); }),
       many("light", "A lamp that is added, or a real one whose brightness or colour is changed; one table for each.", d.lights, light_keys),
-      many("captured_light", "A real lamp of which nothing is known but that the light camera sees it; one table for each. Its light can be dimmed, tinted and removed. (In the picture of the light camera, lamps are found without such a table too, and the buttons can change them; it is bound to a direction, so that it means the same lamp whatever else is found.)", d.captured_lamps, [](CapturedLampDraft& l) { return captured_lamp_keys(l.lamp); }),
+      many("captured_light", "A real lamp known only from the light camera's picture; one table for each. Its light can be dimmed, tinted and removed. (Lamps are found in that picture without such a table too, and the buttons can change them; a table is tied to a direction, so it always means the same lamp.)", d.captured_lamps, [](CapturedLampDraft& l) { return captured_lamp_keys(l.lamp); }),
       once("lighting", always, "The light on the set.", [&d] { return lighting_keys(d); }),
       once("lighting.room", optional, "The room, if the lamps and walls are near: the light camera's picture is projected onto its walls, and the set sees them from where it is. Without this table, light comes from far away.", [&d] { return room_keys(d); }),
       once("lighting.sources", always, "How lamps are found in the light camera's picture, with mode = \"sources\" or \"hybrid\".", [&d] { return light_sources_keys(d.set.lighting.sources); }),
       once("estimator", always, "How light is simulated.", [&d] { return estimator_keys(d.set.estimation); }),
       once("quality", always, "How much time and noise a frame may have.", [&d] { return quality_keys(d.set.quality); }),
-      many("quality.preview", "What the preview may do to hold quality.fps; one table for each step, best first: the first one that fits is taken. `previzd trade` prints those that suit a set. Default: a sample at quality.scale, and then each time half as many pixels.", d.preview_steps, [](PreviewStepDraft& s) { return preview_step_keys(s.step); }),
+      many("quality.preview", "What the preview may do to hold quality.fps; one table for each step, best first: the first one that fits is used. `previzd trade` prints those that suit a set. Default: one sample at quality.scale, then half as many pixels at each step.", d.preview_steps, [](PreviewStepDraft& s) { return preview_step_keys(s.step); }),
       many("button", "What a button does; one table for each way to press it.", d.buttons, [](ButtonDraft& b) { return button_keys(b.button); }),
       many("gpio", "How buttons on GPIO lines are wired; one table for each chip or line that differs from the defaults below.", d.contacts, [](GpioDraft& g) { return gpio_keys(g.contact); }),
       once("control", always, "The step of each action.", [&d] { return control_keys(d.set.control); }),

@@ -35,7 +35,7 @@ class AprilTagTracker final : public Tracker {
       for (const set::Tag& tag : carrier.tags)
         if (!taken.insert(tag.id).second)
           throw Error("tracking.carriers: tag " + std::to_string(tag.id) + " of \"" + carrier.name +
-                      "\" is in the set twice");
+                      "\" is in the set file twice");
       carriers_.push_back(
           {carrier.name, TagMap(carrier.tags, lens, settings.ambiguity_ratio), false, {}});
     }
@@ -156,8 +156,8 @@ class AprilTagTracker final : public Tracker {
     if (!any_of_stage) {
       const auto add = [&](const std::string& text) { add_to_list(track.reason, text, "; "); };
       if (detections.empty()) add("no tag in the picture");
-      if (!strangers.empty()) add("not in the map: " + tags_in_words(strangers));
-      if (track.reason.empty()) add("no tag of the stage in the picture");
+      if (!strangers.empty()) add("not in the set file: " + tags_in_words(strangers));
+      if (track.reason.empty()) add("no tag of this set in the picture");
     }
     for (Carrier& carrier : carriers_)
       track.carriers.push_back(locate(carrier, detections, time_ns, track.pose));

@@ -71,7 +71,7 @@ RefinedCorners refine_corners(const Luminance& luminance, const PinholeIntrinsic
   for (std::size_t i = 0; i < 4; ++i) {
     const auto ray = undistort(lens, guess[i]);
     if (!ray) {
-      result.trouble = "a corner lies where the lens model has no inverse";
+      result.trouble = "a corner lies outside the lens model's range";
       return result;
     }
     flat[i] = *ray * focal + centre;

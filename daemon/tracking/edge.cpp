@@ -334,7 +334,7 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
     // The cutoff is wide at first, so that a shifted start does not make outliers of good pixels.
     const double cutoff = round == 0 ? 10 * contrast : std::max(6 * noise, 0.15 * contrast);
     if (!minimise(samples, cutoff, std::max(noise, least_noise), round == 0 ? 15 : 8, &p))
-      return *why = "without a fit", std::nullopt;
+      return *why = "impossible to fit", std::nullopt;
     noise = std::max(least_noise, 1.4826 * median_residual(samples, p));
 
     line = make_line(line.a + line.normal * p[kEndA], line.b + line.normal * p[kEndB],
@@ -380,7 +380,7 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
   fit.blur_px = p[kBlur];
   fit.contrast = contrast;
   fit.noise = rms;
-  if (!(fit.var_a > 0 && fit.var_b > 0)) return *why = "without a fit", std::nullopt;
+  if (!(fit.var_a > 0 && fit.var_b > 0)) return *why = "impossible to fit", std::nullopt;
   return fit;
 }
 

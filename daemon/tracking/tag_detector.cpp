@@ -54,7 +54,7 @@ const Family& family_by_name(const std::string& name) {
     if (name == family.name) return family;
     add_to_list(known, family.name);
   }
-  throw Error("tracking.family: \"" + name + "\" is not a tag family; known are " + known);
+  throw Error("tracking.family: \"" + name + "\" is not a tag family; known: " + known);
 }
 
 constexpr int kMinPictureSide =

@@ -74,7 +74,7 @@ TagMap::TagMap(const std::vector<set::Tag>& tags, const PinholeIntrinsics& lens,
   for (const set::Tag& tag : tags) {
     const std::string key = "tracking.tags: tag " + std::to_string(tag.id);
     if (!(tag.size_m > 0)) throw Error(key + ": the size must be above 0 m");
-    if (!tags_.emplace(tag.id, tag).second) throw Error(key + " is in the map twice");
+    if (!tags_.emplace(tag.id, tag).second) throw Error(key + " is in the set file twice");
   }
 }
 
@@ -108,7 +108,7 @@ Track TagMap::locate(const std::vector<TagDetection>& detections, std::int64_t t
         used.erase(found);
     }
     if (!left_out.empty())
-      add_to_list(trouble, tags_in_words(left_out) + ": not where the map says", "; ");
+      add_to_list(trouble, tags_in_words(left_out) + ": not where the set file says", "; ");
   }
   if (!trouble.empty()) add_to_list(track.reason, trouble, "; ");
   return track;
@@ -200,7 +200,7 @@ void TagMap::choose(const std::vector<FittedPose>& poses, const std::vector<TagO
   for (const TagObservation& tag : tags) ids.push_back(tag.id);
   const double gate_px = consistency_gate_px(lens_);
   if (poses.empty() || !(poses.front().rms_px <= gate_px)) {
-    track->reason = "no pose explains " + tags_in_words(ids);
+    track->reason = "no pose fits " + tags_in_words(ids);
     return;
   }
 
@@ -231,12 +231,12 @@ void TagMap::choose(const std::vector<FittedPose>& poses, const std::vector<TagO
     return;
   }
   if (contradiction) {
-    track->reason = tags_in_words(ids) + " contradict each other in this map";
+    track->reason = tags_in_words(ids) + " disagree: check their [[tag]] tables";
     return;
   }
   track->status = TrackStatus::ambiguous;
   track->reason =
-      std::to_string(plausible.size()) + " poses explain " + tags_in_words(ids) + " alike";
+      std::to_string(plausible.size()) + " poses fit " + tags_in_words(ids) + " equally well";
   for (const FittedPose* p : plausible) track->candidates.push_back(to_pose(*p, tags));
 }
 

@@ -198,19 +198,19 @@ std::string making_words(const Making& making) {
 std::string live_words(const TradeQuestion& question, const TradeAnswer& answer, double take_fps) {
   if (!answer.is_met)
     return fmt::format(
-        "{:g} pictures a second are more than this machine makes{}: {:.2g} at most, with {}, error "
+        "{:g} frames per second is more than this machine can do{}: {:.2g} at most, with {}, error "
         "{}",
         question.fps, answer.shown_fps > 0 ? " beside tracking and lighting" : "",
         answer.shown_fps > 0 ? std::min(answer.shown_fps, 1 / answer.seconds) : 1 / answer.seconds,
         making_words(answer.making), error_words(answer));
-  std::string words = fmt::format("{:g} pictures a second with {}, error {}", question.fps,
+  std::string words = fmt::format("{:g} frames per second with {}, error {}", question.fps,
                                   making_words(answer.making), error_words(answer));
   if (answer.shown_fps == 0)
     return words + (answer.not_rehearsed.empty()
                         ? "; there was no time to rehearse it beside tracking and lighting"
                         : "; its rehearsal failed: " + answer.not_rehearsed);
   if (take_fps < rate_tolerance * question.fps)
-    words += fmt::format("; rehearsed at the take's {:.3g} a second", take_fps);
+    words += fmt::format("; rehearsed at the take's {:.3g} per second", take_fps);
   return words;
 }
 
@@ -329,7 +329,7 @@ TradeAnswer answer_still(const std::string& use, const TradeQuestion& question, 
                      ? fmt::format("error {} after {}, with {} samples{}", error_words(answer),
                                    time_words(found.seconds), found.making.samples,
                                    found.making.denoise ? ", denoised" : "")
-                     : fmt::format("an error of {} is not reached; {} is the least expected",
+                     : fmt::format("an error of {} is not reached; {} is the lowest expected",
                                    share_words(question.error), error_words(answer));
   answer.words += unfinished_words(found);
   return answer;

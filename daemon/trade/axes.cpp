@@ -50,7 +50,7 @@ TradeAxis light_modes(const set::Lighting& own) {
 
 TradeAxis left_out(std::uint32_t needed) {
   TradeAxis axis{
-      parts_axis, "features that this set does not need: left out, or switched on", {}, "left out"};
+      parts_axis, "features that this set does not need: off, or switched on", {}, "off"};
   for (const render::Feature& feature : render::features())
     if (feature.can_be_carried && (feature.bit & needed) == 0)
       axis.variants.push_back(
@@ -68,7 +68,7 @@ void keep_wanted(std::vector<TradeAxis>& axes, const std::vector<std::string>& w
     if (std::ranges::find(axes, name, &TradeAxis::name) != axes.end()) continue;
     std::string allowed;
     for (const TradeAxis& axis : axes) add_to_list(allowed, axis.name);
-    throw Error("--axes " + name + ": there is no such axis; " + allowed + " are allowed");
+    throw Error("--axes " + name + ": unknown axis; " + allowed + " are allowed");
   }
   std::erase_if(axes, [&](const TradeAxis& axis) {
     return std::ranges::find(wanted, axis.name) == wanted.end();
@@ -83,27 +83,28 @@ std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed
           "estimator", "tracing both worlds in full, or only how they differ",
           [](TradeSettings & s) -> auto& { return s.estimation.estimator; }),
       numbered(
-          "difference_sampling", "largest share of directions aimed at virtual and removed objects",
-          own, {0.0, 0.25, 0.5, 0.75},
+          "difference_sampling",
+          "largest fraction of directions aimed at virtual and removed objects", own,
+          {0.0, 0.25, 0.5, 0.75},
           [](TradeSettings & s) -> auto& { return s.estimation.difference_sampling; }),
       numbered(
           "depth", "largest number of bounces", own, {1, 2, 4, 8},
           [](TradeSettings & s) -> auto& { return s.estimation.max_depth; }),
       spelled(
-          "caustics", "how light that mirrors and glass throw onto surfaces is found",
+          "caustics", "how light reaching surfaces via mirrors and glass is found",
           [](TradeSettings & s) -> auto& { return s.estimation.caustics; }),
       spelled(
           "composite", "how shadows and light are put onto the plate",
           [](TradeSettings & s) -> auto& { return s.estimation.composite; }),
       spelled(
-          "real_radiance", "real surfaces in reflections: simulated, or taken from the plate",
+          "real_radiance", "real surfaces in reflections: simulated, or read from the plate",
           [](TradeSettings & s) -> auto& { return s.estimation.real_radiance; }),
       light_modes(own.lighting),
       spelled(
           "light_sampling", "how directions towards the light are chosen",
           [](TradeSettings & s) -> auto& { return s.lighting.sampling; }),
       {"light_resolution",
-       "resolution of the light map, texels a side",
+       "resolution of the light map, texels per side",
        {{"16", [](TradeSettings& s) { s.lighting.resolution = 16; }},
         {"64", [](TradeSettings& s) { s.lighting.resolution = 64; }}},
        own.lighting.resolution > 0 ? number_words(own.lighting.resolution) : "as captured"},

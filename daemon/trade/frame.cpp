@@ -64,7 +64,7 @@ TradeFrame::TradeFrame(const TradeSource& source, std::optional<std::uint64_t> i
   const std::size_t frames = take_.observer_stream->records().size();
   if (index && *index >= frames)
     throw Error(take_.session.directory.string() + ": --frame " + std::to_string(*index) +
-                ": the last observer frame is " + std::to_string(frames - 1));
+                ": the last frame is " + std::to_string(frames - 1));
 
   pipeline::TakeShotsOptions options;
   options.first = index.value_or(0);

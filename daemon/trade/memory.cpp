@@ -186,7 +186,7 @@ void read_reference(const std::string& text, const std::string& key, KeptReferen
   int width = 0, height = 0, samples = 0;
   if (!(std::istringstream(size_line) >> width >> height >> samples) || width < 1 || height < 1 ||
       width > 65536 || height > 65536 || samples < 1)
-    throw Error("its second line is no size");
+    throw Error("its second line is not a size");
   std::string_view bytes(text);
   bytes.remove_prefix(key_line.size() + size_line.size() + 2);
   const std::size_t pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);

@@ -108,7 +108,7 @@ std::string head_row(std::initializer_list<std::pair<const char*, bool>> columns
 
 std::string rate_words(double fps) {
   char text[48];
-  std::snprintf(text, sizeof text, "%g pictures a second", fps);
+  std::snprintf(text, sizeof text, "%g frames per second", fps);
   return text;
 }
 
@@ -214,7 +214,7 @@ std::string answers_section(const TradeReport& report) {
   std::string html =
       "<h2>What you get</h2>\n<p>Asked for: " + escaped(rate_words(report.question.fps)) +
       " live, and an error of " + share_words(report.question.error) +
-      " of a frozen or a rendered frame. Live, the take was played for some seconds with all that "
+      " for a frozen or rendered frame. Live, the take was played for some seconds with all that "
       "runs beside the renderer; the time is that of its part. Refine and post: a full-size frame "
       "and all its layers, with nothing beside. Errors are from the converged picture, without its "
       "own noise.</p>\n<table class=\"answers\">\n" +
@@ -226,7 +226,7 @@ std::string answers_section(const TradeReport& report) {
   for (const TradeAnswer& answer : report.answers)
     html += (answer.is_met ? "<tr>" : "<tr class=\"bend\">") + cell(answer.use) +
             cell(answer.words) + cell(time_words(answer.seconds), true) +
-            cell(std::isfinite(answer.error) ? share_words(answer.error) : "not known", true) +
+            cell(std::isfinite(answer.error) ? share_words(answer.error) : "unknown", true) +
             cell(answer.is_met ? answer.use + ".toml" : "none") + "</tr>\n";
   html += "</table>\n";
   for (const TradeAnswer& answer : report.answers)
@@ -234,10 +234,10 @@ std::string answers_section(const TradeReport& report) {
       html += "<details><summary>" + escaped(answer.use) + ".toml</summary>\n<pre>" +
               escaped(answer.toml) + "</pre></details>\n";
   return html +
-         "<p class=\"soft\">Take a file with <code>previzd run SET --with live.toml</code> or "
+         "<p class=\"soft\">Use a file with <code>previzd run SET --with live.toml</code> or "
          "<code>previzd render SESSION --with post.toml</code>; a frozen frame that is refined has "
          "the "
-         "settings of the live picture.</p>\n";
+         "same settings as the live picture.</p>\n";
 }
 
 std::string corners_section(const TradeReport& report) {
@@ -283,10 +283,11 @@ std::string bias_sentence(const TradeReport& report, const TradePlan::Axis& axis
       biased +=
           (biased.empty() ? "" : "; ") + escaped(entry.variant) + ", " + share_words(bias->value);
   }
-  return biased.empty() ? ""
-                        : "<p class=\"soft\">However many samples, these differ from the set's own "
-                          "picture by: " +
-                              biased + ".</p>\n";
+  return biased.empty()
+             ? ""
+             : "<p class=\"soft\">With any number of samples, these differ from the set's own "
+               "picture by: " +
+                   biased + ".</p>\n";
 }
 
 std::string axis_section(const TradeReport& report, const TradePlan::Axis& axis) {
@@ -319,9 +320,11 @@ std::string photons_row(const TradeReport& report) {
 std::string parts_section(const TradeReport& report, const TradePlan::Axis& axis) {
   const TradePoint& own = report.methods.front().points.back();
   std::string html =
-      "<h2>What is left out</h2>\n<p>This set does not need these parts of the renderer, so they "
+      "<h2>What is switched off</h2>\n<p>This set does not need these parts of the renderer, so "
+      "they "
       "are "
-      "left out. For this table they were switched on, to see what that would cost; the picture "
+      "switched off. For this table they were switched on, to see what that would cost; the "
+      "picture "
       "must stay the same, bit for bit.</p>\n<table>\n" +
       head_row(
           {{"part", false}, {"without it", true}, {"with it", true}, {"pixels changed", true}});
@@ -344,7 +347,7 @@ std::string unmeasured_section(const TradeReport& report) {
   if (report.interrupted) text += "<p><b>It was stopped before it had ended.</b></p>\n";
   if (!names.empty())
     text += "<p>There was no time to measure: " + escaped(names) +
-            ". Called again, it goes on from here; with more <code>--minutes</code> it gets "
+            ". Run again, it continues from here; with more <code>--minutes</code> it gets "
             "further at once.</p>\n";
   return text;
 }
@@ -359,11 +362,10 @@ std::string reading_section(const TradeReport& report) {
          share_or_none(report.noise.virtual_part) +
          " of the virtual objects. Do not trust an error below ten times that: it is shaded in the "
          "charts and marked in the tables.</p>\n<p>Every setting was rendered " +
-         (report.rounds == 1
-              ? std::string("once")
-              : std::to_string(report.rounds) +
-                    " times, with other random numbers and in another order each time") +
-         ". The time is that of rendering alone, after a warm-up, as a median. A setting that "
+         (report.rounds == 1 ? std::string("once")
+                             : std::to_string(report.rounds) +
+                                   " times, with new random numbers and in a new order each time") +
+         ". Times are medians of rendering alone, after a warm-up. A setting that "
          "leaves "
          "something out (fewer bounces, no caustics, a pinhole lens) never reaches the picture of "
          "the set's own settings: its curve levels out. Radiance is clipped where the sensor "

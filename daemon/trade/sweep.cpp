@@ -236,7 +236,7 @@ void Sweep::use_reference() {
   const auto& added = reference_->picture().added;
   if (std::ranges::all_of(added, [](const glm::vec3& light) { return light == glm::vec3(0); }))
     throw Error(frame_.set().file.string() + ": frame " + std::to_string(report_.frame) +
-                ": nothing virtual, removed or relit is seen in it; there is nothing to trade");
+                ": nothing virtual, removed or relit is visible in it; nothing to measure");
   probes_.use(*reference_);
 }
 

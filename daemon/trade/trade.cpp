@@ -40,7 +40,7 @@ TradeOptions checked(TradeOptions options) {
   check_positive("--minutes", options.minutes);
   if (options.rounds < 1)
     throw Error("--rounds " + std::to_string(options.rounds) + ": must be at least 1");
-  if (options.samples.empty()) throw Error("--samples: names no number of samples");
+  if (options.samples.empty()) throw Error("--samples: is empty; give at least one number");
   std::ranges::sort(options.samples);
   options.samples.erase(std::unique(options.samples.begin(), options.samples.end()),
                         options.samples.end());
@@ -60,8 +60,8 @@ TradeOptions checked(TradeOptions options) {
 std::string answer_file(const TradeReport& report, const TradeAnswer& answer) {
   return "# " + set::printable(report.set) + ", " + answer.use + ": " + answer.words +
          ".\n# Found by `previzd trade` on " + report.device +
-         ". It takes the place of the set's own keys with --with " +
-         answer.file.filename().string() + "\n\n" + answer.toml;
+         ". It overrides the set file's keys with --with " + answer.file.filename().string() +
+         "\n\n" + answer.toml;
 }
 
 // Returns what the last trade in the directory measured, if it was of the same.
@@ -71,10 +71,10 @@ TradeMemory remembered(const TradeOptions& options, const fs::path& directory,
   std::string why_not;
   TradeMemory memory = load_memory(directory, key, why_not);
   if (!why_not.empty())
-    out << (directory / "trade.json").string() << ": " << why_not << "; everything is measured anew"
+    out << (directory / "trade.json").string() << ": " << why_not << "; measuring everything again"
         << std::endl;
   else if (memory.reference.samples > 0)
-    out << "goes on from the last table in " << directory.string() << " (--anew: from nothing)"
+    out << "continuing the last table in " << directory.string() << " (--anew: start over)"
         << std::endl;
   return memory;
 }
@@ -83,7 +83,7 @@ fs::path made_directory(const fs::path& directory) {
   std::error_code code;
   fs::create_directories(directory, code);
   if (code || !fs::is_directory(directory))
-    throw Error("--out " + directory.string() + ": is not a directory and cannot be made one" +
+    throw Error("--out " + directory.string() + ": is not a folder and cannot be created" +
                 (code ? ": " + code.message() : ""));
   return directory;
 }
@@ -96,7 +96,7 @@ double parse_share(const std::string& text) {
   double value = 0;
   const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (digits.empty() || code != std::errc() || end != digits.data() + digits.size() || !(value > 0))
-    throw Error("--error " + text + ": write a share above 0, 2% or 0.02");
+    throw Error("--error " + text + ": write a fraction above 0, as 2% or 0.02");
   return is_percent ? value / 100 : value;
 }
 

@@ -68,17 +68,17 @@ Agreed checked(const aravis::Terms& terms) {
   const std::optional<convert::WireFormat> wire = aravis::wire_format(terms.pfnc);
   if (!wire) throw Error("its pixel format cannot be converted");
   if (terms.width < 1 || terms.height < 1 || terms.width > 65535 || terms.height > 65535)
-    throw Error("says its pictures are " + std::to_string(terms.width) + "x" +
-                std::to_string(terms.height) + " pixels, which cannot be");
+    throw Error("reports pictures of " + std::to_string(terms.width) + "x" +
+                std::to_string(terms.height) + " pixels, which is impossible");
   const auto least =
       static_cast<std::int64_t>(convert::picture_bytes(*wire, terms.width, terms.height));
   if (terms.payload < least || terms.payload > most_payload)
-    throw Error("says that a frame is " + std::to_string(terms.payload) +
-                " bytes; its picture is " + std::to_string(least) + ", and no more than " +
-                std::to_string(most_payload) + " are taken");
+    throw Error("reports a frame size of " + std::to_string(terms.payload) +
+                " bytes; its picture needs " + std::to_string(least) + ", and at most " +
+                std::to_string(most_payload) + " are accepted");
   const bool unknown = terms.exposure_s == 0 && terms.gain == 1;
   if (!unknown && !is_exposure(terms.exposure_s, terms.gain))
-    throw Error("says its exposure is one that cannot be");
+    throw Error("reports an impossible exposure");
   Agreed agreed;
   agreed.format.format = convert::delivered_format(*wire);
   agreed.format.bayer = convert::bayer_pattern(*wire);
@@ -198,7 +198,7 @@ class AravisCamera final : public Camera {
           aravis::Kind::expose, Writer()(aravis::ExposureWords{exposure_s, gain}), time_to_answer);
       const auto applied = aravis::body_of<aravis::ExposureWords>(answer);
       if (!applied || !is_exposure(applied->exposure_s, applied->gain)) {
-        receiver_.give_up("says an exposure that cannot be");
+        receiver_.give_up("reports an impossible exposure");
         return false;
       }
       ledger_.changed(before_ns, monotonic_ns(), {applied->exposure_s, applied->gain});
@@ -212,8 +212,8 @@ class AravisCamera final : public Camera {
   DeviceCounters counters() const override {
     DeviceCounters all = counters_;
     for (const auto& [name, count] : stream_counters_) all[name] += count;
-    all["arrivals left out of the clock's map"] = clock_.left_out();
-    all["maps of the clock begun anew"] = clock_.begun_anew();
+    all["arrivals ignored by the clock map"] = clock_.left_out();
+    all["clock map restarts"] = clock_.begun_anew();
     return all;
   }
 
@@ -227,7 +227,7 @@ class AravisCamera final : public Camera {
       Message answer =
           receiver_.ask(aravis::Kind::open, Writer()(aravis::Order{settings_}), time_to_open);
       const auto terms = aravis::body_of<aravis::Terms>(answer);
-      if (!terms) throw Error("its receiver does not say what was agreed on");
+      if (!terms) throw Error("its receiver sent no valid settings");
       if (answer.descriptor) receiver_.hold(std::move(answer.descriptor), terms->address);
       return checked(*terms);
     } catch (const Error& error) {
@@ -258,13 +258,13 @@ class AravisCamera final : public Camera {
   // Takes a message; returns the frame, if it is a whole one.
   FramePtr handle(const Message& message) {
     if (message.kind == aravis::Kind::lost) {
-      trouble_ = DeviceTrouble{name(), "does not answer any more", true};
+      trouble_ = DeviceTrouble{name(), "stopped responding", true};
     } else if (message.kind == aravis::Kind::pulse) {
       take_counters(message);
     } else if (buffers_) {
       const auto note = aravis::body_of<aravis::FrameNote>(message);
       if (!note || note->buffer >= buffers_->ring().buffers) {
-        receiver_.give_up("names a buffer that there is not");
+        receiver_.give_up("names a nonexistent buffer");
         return nullptr;
       }
       FramePtr frame = take(*note);
@@ -279,7 +279,7 @@ class AravisCamera final : public Camera {
   // The names become keys of the status on the bus.
   void take_counters(const Message& message) {
     const auto pulse = aravis::body_of<aravis::Pulse>(message);
-    if (!pulse || pulse->counters.size() > 64) return receiver_.give_up("counts without sense");
+    if (!pulse || pulse->counters.size() > 64) return receiver_.give_up("sends invalid counters");
     for (const aravis::Counter& counter : pulse->counters)
       if (counter.name.starts_with("stream ") && counter.name.size() < 64 &&
           (stream_counters_.size() < 64 || stream_counters_.contains(counter.name)))
@@ -310,7 +310,7 @@ class AravisCamera final : public Camera {
     frame->timestamp_ns =
         clock_.to_host(has_clock ? note.device_ns : frame->arrival_ns, frame->arrival_ns);
     const std::optional<Exposure> exposure = exposure_of(note, frame->timestamp_ns);
-    if (!exposure) return left_out("frames between two exposures");
+    if (!exposure) return left_out("frames during an exposure change");
     apply_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
   }
@@ -329,11 +329,11 @@ class AravisCamera final : public Camera {
       case aravis::Damage::packets_missing:
         return "frames with packets missing";
       case aravis::Damage::timed_out:
-        return "frames that ended in a time-out";
+        return "frames that timed out";
       case aravis::Damage::too_large:
         return other_format;
       default:
-        return "frames given up by the receiver";
+        return "frames abandoned by the receiver";
     }
     const bool as_agreed = note.pfnc == agreed_.pfnc && note.width == agreed_.format.width &&
                            note.height == agreed_.format.height;
@@ -378,7 +378,7 @@ std::vector<FoundCamera> find_aravis() {
     try {
       listing =
           aravis::body_of<aravis::Listing>(receiver.ask(aravis::Kind::list, {}, time_to_list));
-      if (!listing) throw Error("its receiver does not say what is there");
+      if (!listing) throw Error("its receiver does not report its devices");
     } catch (const Error& error) {
       const std::string where = reach == Reach::usb ? "on the USB" : "in the network";
       found.push_back({"aravis", "", "", "cannot look for cameras " + where + ": " + error.what()});

@@ -117,7 +117,7 @@ std::string ChildProcess::end() {
   const bool by_us = !state_->ended;
   if (by_us) kill(state_->pid, SIGKILL);
   if (!state_->changed.wait_for(lock, std::chrono::seconds(2), [&] { return state_->ended; }))
-    return "it was killed and does not end";
+    return "it was killed but does not exit";
   const int status = state_->status;
   if (by_us) return "it was stopped";
   if (WIFSIGNALED(status))

@@ -63,7 +63,7 @@ ReceiverProcess::ReceiverProcess(Reach reach) : ReceiverProcess(reach, receiver_
 ReceiverProcess::ReceiverProcess(Reach reach, const fs::path& program) : heard_(Clock::now()) {
   std::array<int, 2> ends{-1, -1};
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()) != 0)
-    throw Error(std::string("a receiver gets no socket: ") + std::strerror(errno));
+    throw Error(std::string("cannot create a socket for a receiver: ") + std::strerror(errno));
   socket_ = OwnedDescriptor(ends[0]);
   OwnedDescriptor its_end(ends[1]);
   process_ = std::make_unique<ChildProcess>(
@@ -84,22 +84,23 @@ Message ReceiverProcess::ask(Kind request, const Writer& body, milliseconds dead
                              int descriptor) {
   const Clock::time_point until = Clock::now() + deadline;
   if (!gone() && !send(socket_.get(), request, body, descriptor, false))
-    give_up(last_words(socket_.get()).value_or("takes no requests"));
+    give_up(last_words(socket_.get()).value_or("accepts no requests"));
   Message message;
   while (!gone()) {
     const Received received = take(message, until);
     if (received == Received::closed) break;
     if (received == Received::nothing) {
-      give_up("does not answer for " + std::to_string(deadline.count()) + " ms");
+      give_up("has not responded for " + std::to_string(deadline.count()) + " ms");
     } else if (message.kind == Kind::done) {
       return message;
     } else if (message.kind == Kind::refused) {
       const std::optional<std::string> why = body_of<std::string>(message);
-      throw Error(why ? printable(*why) : "is refused without a reason");
+      throw Error(why ? printable(*why) : "was refused without a reason");
     } else if (unasked_.size() == most_unasked) {
-      give_up("sends more than it can have");
+      give_up("sends too many messages");
     } else if (Clock::now() >= until) {
-      give_up("sends other things than an answer for " + std::to_string(deadline.count()) + " ms");
+      give_up("has sent no answer, only other messages, for " + std::to_string(deadline.count()) +
+              " ms");
     } else {
       if (message.kind == Kind::pulse)  // only the newest is of use
         std::erase_if(unasked_, [](const Message& m) { return m.kind == Kind::pulse; });
@@ -111,7 +112,7 @@ Message ReceiverProcess::ask(Kind request, const Writer& body, milliseconds dead
 }
 
 void ReceiverProcess::post(Kind kind, const Writer& body) {
-  if (!gone() && !send(socket_.get(), kind, body, -1, false)) give_up("takes no messages");
+  if (!gone() && !send(socket_.get(), kind, body, -1, false)) give_up("accepts no messages");
 }
 
 std::optional<Message> ReceiverProcess::next(Clock::time_point until) {
@@ -125,9 +126,9 @@ std::optional<Message> ReceiverProcess::next(Clock::time_point until) {
   if (take(message, std::min(until, heard_ + longest_silence)) == Received::message) {
     if (message.kind == Kind::frame || message.kind == Kind::pulse || message.kind == Kind::lost)
       return message;
-    give_up("answers what was not asked");
+    give_up("sends an unexpected answer");
   } else if (!gone() && Clock::now() >= heard_ + longest_silence) {
-    give_up("has said nothing for " + std::to_string(longest_silence.count()) + " ms");
+    give_up("has sent nothing for " + std::to_string(longest_silence.count()) + " ms");
   }
   return std::nullopt;
 }
@@ -139,8 +140,7 @@ Received ReceiverProcess::take(Message& message, Clock::time_point until) {
     if (received == Received::message) heard_ = Clock::now();
     if (message.kind != Kind::done) message.descriptor = {};  // nothing else brings one
     // The kernel reports the reset by a process that ended with a request unread before its words.
-    if (received == Received::closed)
-      give_up(last_words(socket_.get()).value_or("is not there any more"));
+    if (received == Received::closed) give_up(last_words(socket_.get()).value_or("is gone"));
     if (received != Received::nothing || Clock::now() >= until) return received;
     pollfd readable{socket_.get(), POLLIN, 0};
     poll(&readable, 1, time_left(until));
@@ -150,10 +150,10 @@ Received ReceiverProcess::take(Message& message, Clock::time_point until) {
 // A process that has closed its socket is about to end by itself, and how it ends says more.
 void ReceiverProcess::give_up(const std::string& why) {
   if (gone()) return;
-  const bool closed = why == "is not there any more" || why.starts_with("refuses: ");
+  const bool closed = why == "is gone" || why.starts_with("refuses: ");
   const bool ended = process_->ends_within(milliseconds(closed ? 100 : 0));
   const std::string end = process_->end();
-  why_gone_ = "the process that receives from it " + why + (ended ? ": " + end : "");
+  why_gone_ = "its receiving process " + why + (ended ? ": " + end : "");
   socket_ = {};
   release_camera();
 }

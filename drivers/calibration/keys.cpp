@@ -53,7 +53,7 @@ Keys fisheye_keys(FisheyeIntrinsics& i) {
       {"intrinsics", "cx", &i.cx, principal_px, "Principal point; 0 is the centre of the leftmost pixels.", required("511.5")},
       {"intrinsics", "cy", &i.cy, principal_px, "Principal point; 0 is the centre of the topmost pixels.", required("511.5")},
       {"intrinsics", "k", &i.k, distortion, "k1 to k4 of r = t + k1 t^3 + k2 t^5 + k3 t^7 + k4 t^9, t the angle off axis."},
-      {"intrinsics", "max_angle_deg", &i.max_angle_rad, deg.within(1, 180), "Angle off axis up to which the calibration holds; nothing is read beyond it.", required("100.0"), "max_angle_rad"},
+      {"intrinsics", "max_angle_deg", &i.max_angle_rad, deg.within(1, 180), "Angle off axis up to which the calibration is valid; nothing is used beyond it.", required("100.0"), "max_angle_rad"},
   };
 }
 
@@ -61,7 +61,7 @@ Keys lens_keys(ThinLens& l) {
   return {
       {"lens", "focal_length_mm", &l.focal_length_m, mm.within(0.01, 1e4), "Focal length as engraved on the lens.", required("35.0"), "lens.focal_length_m"},
       {"lens", "f_number", &l.f_number, plain.within(0.5, 1e6), "The f-stop; no lens in air is faster than 0.5.", required("2.8"), "lens.f_number"},
-      {"lens", "focus_distance_m", &l.focus_distance_m, m.within(1e-6, far_m), "What is sharp, measured along the optical axis; beyond the focal length. 1e6 for infinity.", required("1.2"), "lens.focus_distance_m"},
+      {"lens", "focus_distance_m", &l.focus_distance_m, m.within(1e-6, far_m), "Distance in focus, along the optical axis; above the focal length. 1e6 for infinity.", required("1.2"), "lens.focus_distance_m"},
   };
 }
 
@@ -91,13 +91,13 @@ Keys clip_keys(ResponseCurve& r, const char* about) {
 
 Keys shading_keys(LightCameraCalibration& c) {
   return {
-      {"intrinsics", "vignetting", &c.vignetting, plain.within(-1e6, 1e6), "v1 to v3 of the share of light that the lens passes, 1 + v1 t^2 + v2 t^4 + v3 t^6, where t is the angle off axis in radians (previzd calibrate vignetting).", {}, "vignetting", {}, true},
-      {"response", "dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal of red, green and blue when the lens is covered, as a share of white (previzd calibrate dark).", {}, "dark_level", {}, true},
+      {"intrinsics", "vignetting", &c.vignetting, plain.within(-1e6, 1e6), "v1 to v3 of the fraction of light that the lens passes, 1 + v1 t^2 + v2 t^4 + v3 t^6, where t is the angle off axis in radians (previzd calibrate vignetting).", {}, "vignetting", {}, true},
+      {"response", "dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal of red, green and blue when the lens is covered, as a fraction of white (previzd calibrate dark).", {}, "dark_level", {}, true},
   };
 }
 
-constexpr auto observer_clips = "From this share of the largest picture value on, a pixel is clipped: it means at least so much light. Lower it where white areas of the picture stay below it, as in compressed video or video of limited range (previzd calibrate response --camera observer measures it).";
-constexpr auto light_camera_clips = "From this share of the largest picture value on, a pixel is clipped: it means at least so much light, and a shorter exposure of the bracket measures it. Lower it where lamps stay below it, as in compressed video or video of limited range (previzd calibrate response --camera light measures it).";
+constexpr auto observer_clips = "A pixel at or above this fraction of the largest picture value is clipped: it means at least that much light. Lower it if white areas stay below it, as in compressed or limited-range video (previzd calibrate response --camera observer measures it).";
+constexpr auto light_camera_clips = "A pixel at or above this fraction of the largest picture value is clipped: it means at least that much light, and a shorter exposure of the bracket measures it. Lower it if lamps stay below it, as in compressed or limited-range video (previzd calibrate response --camera light measures it).";
 
 // clang-format on
 

@@ -29,7 +29,7 @@ double rigidity_error(const glm::dmat4& transform) {
 std::string rigidity_fault(const glm::dmat4& transform) {
   const double error = rigidity_error(transform);
   if (error <= rigid_tolerance) return "";
-  return std::isinf(error) ? "is a mirroring or singular transform; allowed: a rotation and a shift"
+  return std::isinf(error) ? "mirrors or is singular; allowed: a rotation and a translation"
                            : "is not rigid, its axes are off by " + codec::print_number(error) +
                                  "; allowed: unit axes at right angles to within 1e-4";
 }
@@ -55,7 +55,7 @@ std::vector<KeyFault> faults(const PoseDraft& draft, const GivenKeys& given,
   std::vector<KeyFault> all;
   for (const char* key : {"position_m", "rotation_deg"})
     if (given.contains(key))
-      all.push_back({key, "contradicts " + matrix_key + "; allowed: one of the two forms"});
+      all.push_back({key, "conflicts with " + matrix_key + "; allowed: one of the two forms"});
   if (const auto fault = matrix->second ? rigidity_fault(*draft.matrix) : ""; !fault.empty())
     all.push_back({matrix_key, fault});
   return all;

@@ -45,12 +45,12 @@ void check_response(const ResponseCurve& curve, const std::vector<Key>& all, con
     // An author may leave gamma out: it has a default.
     const bool needed = curve.kind == ResponseCurve::Kind::table || format == Format::recorded;
     if (is_given && !belongs)
-      faults.push_back({key.name, "does not go with kind " + kind + "; allowed with " +
+      faults.push_back({key.name, "conflicts with kind " + kind + "; allowed with " +
                                       codec::quote(name_of(*key.only_with))});
     if (!is_given && belongs && needed)
       faults.push_back(
           {key.name,
-           "is missing with kind " + kind + "; allowed: " +
+           "is missing for kind " + kind + "; allowed: " +
                (curve.kind == ResponseCurve::Kind::table ? table_allowed : key.allowed(format))});
   }
   if (curve.kind != ResponseCurve::Kind::table || !is_good(given, "table")) return;
@@ -66,13 +66,13 @@ void check_angles(const LightCameraCalibration& light, const std::vector<Key>& a
   const double fold = monotonic_limit_rad(lens.k);
   if (format == Format::authored && !is_bad(given, "k") && fold < lens.max_angle_rad)
     faults.push_back(
-        {"k", "the picture folds back at " +
+        {"k", "the lens model folds back at " +
                   codec::print_number(std::floor(fold * 1800 / std::numbers::pi) / 10) +
-                  " degrees off axis; allowed: a radius that grows" + up_to});
+                  " degrees off axis; allowed: a growing radius" + up_to});
   if (is_good(given, "vignetting") &&
       !(least_illumination(light.vignetting, lens.max_angle_rad) >= min_illumination))
     faults.push_back(
-        {"vignetting", "leaves no light at some angle; allowed: at least 0.01 of it" + up_to});
+        {"vignetting", "passes no light at some angle; allowed: at least 0.01 of it" + up_to});
 }
 
 std::string missing(const Key& key, Format format) {
@@ -119,9 +119,8 @@ std::vector<KeyFault> check(ObserverDraft& draft, const GivenKeys& given, Format
   const ThinLens& lens = draft.lens;
   if (is_good(given, "focus_distance_m") && is_good(given, "focal_length_mm") &&
       lens.focus_distance_m <= lens.focal_length_m)
-    faults.push_back(
-        {"focus_distance_m", "the focus is not beyond the focal length; allowed: above " +
-                                 codec::print_number(lens.focal_length_m) + " m"});
+    faults.push_back({"focus_distance_m", "must exceed the focal length; allowed: above " +
+                                              codec::print_number(lens.focal_length_m) + " m"});
   if (given.contains("focal_length_mm")) draft.calibration.lens = lens;
   return faults;
 }

@@ -33,12 +33,12 @@ std::optional<std::string> wrong_shape(const WirePicture& picture) {
   if (width < 1 || height < 1 || width > max_side_px || height > max_side_px)
     return "cannot be " + size + " pixels";
   if (format.bits < 8 || format.bits > 16)
-    return "cannot have " + std::to_string(format.bits) + " bits a sample";
+    return "cannot have " + std::to_string(format.bits) + " bits per sample";
   if (format.packing == Packing::csi2 && format.bits != 8 && format.bits != 10 &&
       format.bits != 12 && format.bits != 14)
-    return "cannot have " + std::to_string(format.bits) + " bits a sample as CSI-2 packs them";
+    return "cannot have " + std::to_string(format.bits) + " bits per sample in CSI-2 packing";
   if (is_bayer(format.layout) && (width < 4 || height < 4))
-    return "is a Bayer mosaic of " + size + " pixels; 4x4 is the least";
+    return "is a Bayer mosaic of " + size + " pixels; the minimum is 4x4";
   if (format.layout == Layout::mjpeg) return std::nullopt;
   const std::size_t row = row_bytes(format, width);
   if (stride != 0 && stride < row)
@@ -46,7 +46,7 @@ std::optional<std::string> wrong_shape(const WirePicture& picture) {
            " are needed";
   const std::size_t whole = picture_bytes(format, width, height, stride);
   if (bytes.size() < whole)
-    return "is cut short: " + std::to_string(bytes.size()) + " of " + std::to_string(whole) +
+    return "is truncated: " + std::to_string(bytes.size()) + " of " + std::to_string(whole) +
            " bytes";
   return std::nullopt;
 }

@@ -27,7 +27,7 @@ EGLConfig choose_config(EGLDisplay display, EGLint native_visual) {
                            EGL_NONE};
   EGLint count = 0;
   if (!eglChooseConfig(display, wanted, nullptr, 0, &count) || count < 1)
-    refuse("no configuration with 8 bits a colour");
+    refuse("no configuration with 8 bits per colour");
   std::vector<EGLConfig> configs(static_cast<std::size_t>(count));
   eglChooseConfig(display, wanted, configs.data(), count, &count);
   if (native_visual == 0) return configs.front();
@@ -36,7 +36,7 @@ EGLConfig choose_config(EGLDisplay display, EGLint native_visual) {
     eglGetConfigAttrib(display, config, EGL_NATIVE_VISUAL_ID, &visual);
     if (visual == native_visual) return config;
   }
-  refuse("no configuration of the screen's pixel format");
+  refuse("no configuration for the screen's pixel format");
 }
 
 }  // namespace

@@ -75,7 +75,7 @@ void check_fits(int width, int height) {
   glGetIntegerv(GL_MAX_TEXTURE_SIZE, &most);
   if (std::max(width, height) > most)
     throw Error("OpenGL ES: a picture of " + std::to_string(width) + "x" + std::to_string(height) +
-                " is larger than this GPU's " + std::to_string(most) + " pixels a side");
+                " is larger than this GPU's " + std::to_string(most) + " pixels per side");
 }
 
 // Converts to 8 bits a sample, rounded to nearest.

@@ -46,7 +46,7 @@ struct Contact {
 Contact contact_of(const std::string& name) {
   const std::size_t begin = name.find(':') + 1, end = name.rfind(':');
   if (end <= begin || end + 1 == name.size())
-    throw Error("button \"" + name + "\": allowed is gpio:CHIP:LINE, CHIP its label");
+    throw Error("button \"" + name + "\": allowed: gpio:CHIP:LINE, CHIP is its label");
   return {name.substr(begin, end - begin), name.substr(end + 1)};
 }
 
@@ -83,8 +83,7 @@ class GpioButtons final : public Buttons {
       : device_(std::move(device)),
         epoll_(epoll_create1(EPOLL_CLOEXEC)),
         timer_(timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK)) {
-    if (!epoll_ || !timer_)
-      throw Error(device_ + ": cannot be waited for: " + std::strerror(errno));
+    if (!epoll_ || !timer_) throw Error(device_ + ": cannot be polled: " + std::strerror(errno));
     for (const std::string& name : names) {
       const ContactWiring wiring = settings.wiring_of(name);
       lines_.push_back({name, contact_of(name).line, request_flags(wiring), nullptr,
@@ -148,14 +147,14 @@ class GpioButtons final : public Buttons {
       ++counters_["not opened"];
       if (refusal_ == error.what()) return;
       refusal_ = error.what();
-      events_.emplace_back(DeviceTrouble{device_, refusal_ + "; tried again until it is there"});
+      events_.emplace_back(DeviceTrouble{device_, refusal_ + "; retrying until it is available"});
     }
   }
 
   void request(gpiod_chip& chip, Line& line) {
     line.line = find_line(chip, line.label);
     if (gpiod_line_request_both_edges_events_flags(line.line, consumer, line.request_flags) != 0)
-      throw Error("line \"" + line.label + "\" cannot be had: " + std::strerror(errno));
+      throw Error("line \"" + line.label + "\" is not available: " + std::strerror(errno));
     watch(gpiod_line_event_get_fd(line.line));
   }
 
@@ -203,7 +202,7 @@ class GpioButtons final : public Buttons {
     chip_.reset();
     retry_ns_ = monotonic_ns() + second_ns;
     ++counters_["lost"];
-    events_.emplace_back(DeviceTrouble{device_, "is lost: " + why + "; tried again"});
+    events_.emplace_back(DeviceTrouble{device_, "is lost: " + why + "; retrying"});
   }
 
   void push_edge(const Line& line) {

@@ -26,7 +26,7 @@ namespace {
 constexpr int poll_ms = 100;  // how late a stop may be noticed
 constexpr std::chrono::seconds retry_interval{1};
 constexpr const char* cut_short = "reports too short for a button";
-constexpr const char* not_taken = "events left out, which nobody took in time";
+constexpr const char* not_taken = "events dropped, not read in time";
 
 struct DeviceName {
   unsigned short vendor = 0, product = 0;
@@ -85,7 +85,7 @@ class HidButtons final : public Buttons {
         device_name_(parse_device(device_)),
         reader_(names),
         signal_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
-    if (!signal_) throw Error(device_ + ": cannot be waited for: " + std::strerror(errno));
+    if (!signal_) throw Error(device_ + ": cannot be polled: " + std::strerror(errno));
     thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
   }
 
@@ -116,7 +116,7 @@ class HidButtons final : public Buttons {
       } catch (const std::exception& error) {
         fail(error.what());
       } catch (...) {
-        fail("something was thrown that is no error");
+        fail("unknown exception");
       }
       std::unique_lock lock(mutex_);
       wake_.wait_for(lock, stop, retry_interval, [] { return false; });
@@ -136,9 +136,9 @@ class HidButtons final : public Buttons {
       release_all();
     }
     if (!std::exchange(reported_, true))
-      push(DeviceTrouble{device_, device ? "was unplugged; looked for until it is back"
-                                         : "is not there, or may not be opened; looked for until "
-                                           "it is there"});
+      push(DeviceTrouble{device_, device ? "was unplugged; waiting for it to return"
+                                         : "not found, or no permission to open it; retrying until "
+                                           "it opens"});
   }
 
   // Where there is no memory even for that, the next try may report it.
@@ -147,7 +147,7 @@ class HidButtons final : public Buttons {
       count("failed");
       release_all();
       if (!std::exchange(reported_, true))
-        push(DeviceTrouble{device_, std::string("cannot be read: ") + why + "; opened anew"});
+        push(DeviceTrouble{device_, std::string("cannot be read: ") + why + "; reopening it"});
     } catch (...) {
     }
   }
@@ -176,7 +176,7 @@ class HidButtons final : public Buttons {
     count(cut_short);
     if (short_before == 0)
       push(DeviceTrouble{device_, "sends reports of " + std::to_string(report.size()) +
-                                      " bytes, too short for a button of the set"});
+                                      " bytes, too short for a button in the set file"});
   }
 
   void count(const std::string& what, std::uint64_t by = 1) {
@@ -252,7 +252,7 @@ std::vector<ButtonEvent> ReportReader::release_all(std::int64_t time_ns) {
 void learn(const std::string& device, const std::function<bool()>& stop,
            const std::function<void(const std::string& name)>& pressed) {
   const Device opened = open_device(backends(), parse_device(device));
-  if (!opened) throw Error(device + ": may not be opened");
+  if (!opened) throw Error(device + ": cannot be opened");
   std::array<unsigned char, 4096> report{};
   // The last reports by number and length; the first of a kind is compared with one in which
   // nothing is held.

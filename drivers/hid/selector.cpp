@@ -14,10 +14,9 @@ namespace {
 constexpr std::size_t longest_report = 4096;  // HID_MAX_BUFFER_SIZE of the kernel, rounded down
 
 [[noreturn]] void refuse(const std::string& text) {
-  throw Error(
-      "HID button \"" + text +
-      "\": allowed are BYTE.BIT, BYTE=HEX and BYTE-BYTE=HEX, with REPORT/ in front where the "
-      "device numbers its reports; `previzd devices --learn` prints them");
+  throw Error("HID button \"" + text +
+              "\": allowed: BYTE.BIT, BYTE=HEX and BYTE-BYTE=HEX, preceded by REPORT/ if the "
+              "device numbers its reports; `previzd devices --learn` prints them");
 }
 
 std::size_t number(std::string_view text, std::size_t most, const std::string& whole,

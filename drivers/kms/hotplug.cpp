@@ -21,7 +21,7 @@ Hotplug::Hotplug()
   if (!monitor_ ||
       udev_monitor_filter_add_match_subsystem_devtype(monitor_.get(), "drm", nullptr) < 0 ||
       udev_monitor_enable_receiving(monitor_.get()) < 0)
-    throw Error("udev: does not report when screens are plugged in");
+    throw Error("udev: cannot watch for screens being plugged in");
 }
 
 bool Hotplug::happened() {

@@ -62,12 +62,11 @@ Target find_target(const std::string& wanted) {
     }
   }
   if (wanted.empty())
-    throw Error("no screen is plugged in" +
-                (seen.empty() ? std::string("; there is no graphics card that could drive one")
-                              : " (" + seen + ")") +
-                refusal);
-  throw Error("there is no connector " + wanted + "; there is " + (seen.empty() ? "none" : seen) +
-              refusal);
+    throw Error(
+        "no screen is plugged in" +
+        (seen.empty() ? std::string("; no graphics card could drive one") : " (" + seen + ")") +
+        refusal);
+  throw Error("no connector " + wanted + "; there is " + (seen.empty() ? "none" : seen) + refusal);
 }
 
 bool become_master(int card) {
@@ -104,7 +103,7 @@ class KmsDisplay final : public Display {
 
 int KmsDisplay::checked_master(int card, const Card& where) {
   if (!become_master(card))
-    throw Error(where.node + ": another program has the screen (a window system?)");
+    throw Error(where.node + ": another program is using the screen (a window system?)");
   return card;
 }
 
@@ -132,7 +131,7 @@ DisplayEvent KmsDisplay::show(const Screenful& screenful) {
   if (std::optional<DeviceTrouble> unplugged = look_at_plug()) return *std::move(unplugged);
   if (!master_) {
     if (!become_master(card_))
-      return DeviceTrouble{name(), "another program has the screen", false};
+      return DeviceTrouble{name(), "another program is using the screen", false};
     master_ = true;
   }
   scanout_.begin();
@@ -142,12 +141,13 @@ DisplayEvent KmsDisplay::show(const Screenful& screenful) {
   flipped_ns_.reset();
   if (const int error = output_.flip(framebuffer, &flipped_ns_)) {
     scanout_.withdraw();
-    if (error != EACCES) return lost(std::string("cannot be shown to: ") + std::strerror(error));
+    if (error != EACCES)
+      return lost(std::string("cannot display a picture: ") + std::strerror(error));
     master_ = false;
-    return DeviceTrouble{name(), "another program has taken the screen", false};
+    return DeviceTrouble{name(), "another program is using the screen", false};
   }
   const std::optional<std::int64_t> shown_ns = wait_for_flip();
-  if (!shown_ns) return lost("shows nothing: the card does not answer");
+  if (!shown_ns) return lost("shows nothing: the graphics card does not respond");
   scanout_.seen();
   return Shown{*shown_ns};
 }

@@ -43,7 +43,7 @@ std::uint32_t framebuffer_of(int card, gbm_bo* buffer) {
 
 gbm_device* make_device(int card) {
   if (gbm_device* device = gbm_create_device(card)) return device;
-  throw Error("GBM: does not know this graphics card");
+  throw Error("GBM: does not support this graphics card");
 }
 
 gbm_surface* make_surface(gbm_device* device, int width, int height) {
@@ -51,7 +51,7 @@ gbm_surface* make_surface(gbm_device* device, int width, int height) {
                                                 static_cast<std::uint32_t>(height), pixel_format,
                                                 GBM_BO_USE_SCANOUT | GBM_BO_USE_RENDERING))
     return surface;
-  throw Error("GBM: no surface of the screen's size can be made");
+  throw Error("GBM: cannot create a surface of the screen's size");
 }
 
 }  // namespace
@@ -80,7 +80,7 @@ std::uint32_t Scanout::finish() {
   if (!eglSwapBuffers(context_.display(), drawn_))
     throw Error(std::string("EGL: the picture cannot be finished: ") + gles::egl_error());
   waiting_ = gbm_surface_lock_front_buffer(surface_.get());
-  if (!waiting_) throw Error("GBM: gives no buffer");
+  if (!waiting_) throw Error("GBM: returns no buffer");
   return framebuffer_of(card_, waiting_);
 }
 

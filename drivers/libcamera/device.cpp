@@ -231,11 +231,11 @@ struct Device::Impl {
       if (candidate->id() == settings.device) camera = candidate;
       add_to_list(there, candidate->id());
     }
-    if (!camera) refuse("is not there; there are: " + (there.empty() ? "no cameras" : there));
+    if (!camera) refuse("not found; connected: " + (there.empty() ? "no cameras" : there));
   }
 
   void acquire() {
-    check(camera->acquire(), "cannot be had, somebody else may have it");
+    check(camera->acquire(), "is busy; another program may be using it");
     acquired = true;
   }
 
@@ -255,7 +255,7 @@ struct Device::Impl {
   void agree() {
     if (settings.trigger) refuse("libcamera has no triggers; remove trigger");
     if (settings.packet_size) refuse("is not a network camera; remove packet_size");
-    if (settings.raw_gain) refuse("its gain is linear; gain sets it");
+    if (settings.raw_gain) refuse("its gain is linear; use gain, not raw_gain");
     agreed.drives_exposure = has(lc::controls::ExposureTime);
     agreed.drives_gain = has(lc::controls::AnalogueGain);
     if (settings.exposure_s && !agreed.drives_exposure)
@@ -286,10 +286,10 @@ struct Device::Impl {
       std::string sizes;
       for (const lc::Size& possible : formats.sizes(wanted))
         add_to_list(sizes, possible.toString());
-      refuse("made " + config.toString() + " of " + size.toString() + "-" + wanted.toString() +
-             "; possible are: " + (sizes.empty() ? "not known" : sizes));
+      refuse("offers " + config.toString() + " instead of " + size.toString() + "-" +
+             wanted.toString() + "; possible: " + (sizes.empty() ? "unknown" : sizes));
     }
-    check(camera->configure(configuration.get()), "does not take " + config.toString());
+    check(camera->configure(configuration.get()), "rejects " + config.toString());
     const Known& known = *find_known(config.pixelFormat);
     agreed.wire = wire_format(known, config.colorSpace);
     agreed.stride = known.layout == Layout::mjpeg ? 0 : config.stride;
@@ -300,11 +300,11 @@ struct Device::Impl {
     const std::size_t delivered =
         frame_bytes(agreed.format.format, agreed.format.width, agreed.format.height);
     if (std::max(least, delivered) > convert::most_picture_bytes)
-      refuse("says its pictures are " + config.size.toString() + " pixels, which is more than " +
+      refuse("reports pictures of " + config.size.toString() + " pixels, which is more than " +
              std::to_string(convert::most_picture_bytes) + " bytes");
     if (config.frameSize < least)
-      refuse("says that a frame is " + std::to_string(config.frameSize) +
-             " bytes; its picture is " + std::to_string(least));
+      refuse("reports a frame size of " + std::to_string(config.frameSize) +
+             " bytes; its picture needs " + std::to_string(least));
   }
 
   // Returns a bound of the frame's duration; 0 for one that is no whole number of microseconds.
@@ -334,7 +334,7 @@ struct Device::Impl {
       const lc::PixelFormat wanted = lc::PixelFormat::fromString(*settings.format);
       if (std::ranges::find(its, wanted) == its.end())
         refuse("has no format " + *settings.format + "; it has: " + names_of(its));
-      if (!find_known(wanted)) refuse("sends " + *settings.format + ", which cannot be converted");
+      if (!find_known(wanted)) refuse("sends " + *settings.format + ", which is not supported");
       return wanted;
     }
     if (find_known(proposed)) return proposed;
@@ -346,7 +346,7 @@ struct Device::Impl {
   void allocate() {
     stream = configuration->at(0).stream();
     allocator = std::make_unique<lc::FrameBufferAllocator>(camera);
-    check(allocator->allocate(stream), "gives no buffers");
+    check(allocator->allocate(stream), "returns no buffers");
     for (const auto& buffer : allocator->buffers(stream)) mapped.emplace_back(*buffer);
   }
 
@@ -435,7 +435,7 @@ void Device::start(const std::optional<Exposure>& exposure) {
     auto request = impl_->camera->createRequest(i);
     if (!request || request->addBuffer(impl_->stream, buffers[i].get()) != 0) {
       impl_->requests.clear();
-      impl_->refuse("takes no requests");
+      impl_->refuse("accepts no requests");
     }
     impl_->requests.push_back(std::move(request));
   }

@@ -79,18 +79,17 @@ class LibcameraCamera final : public Camera {
   void queue_again(std::size_t buffer) {
     const bool changed = std::exchange(changed_, false);
     const std::int64_t before_ns = monotonic_ns();
-    if (!device_.queue(buffer, changed ? exposure_ : std::nullopt))
-      lost_ = "does not take its buffers back";
+    if (!device_.queue(buffer, changed ? exposure_ : std::nullopt)) lost_ = "rejects its buffers";
     if (changed) ledger_.changed(before_ns, monotonic_ns(), *exposure_);
   }
 
   FramePtr read(const Completed& completed) {
     const std::int64_t arrival_ns = monotonic_ns();
     if (completed.fate == Completed::Fate::given_up)
-      return left_out("frames given up by the receiver");
+      return left_out("frames abandoned by the receiver");
     const std::uint64_t sequence = order_.sequence_of(completed.sequence);
     if (completed.fate == Completed::Fate::damaged)
-      return left_out("frames the device says are damaged");
+      return left_out("frames the device reports as damaged");
     if (completed.overfull) return left_out("frames longer than their buffer");
     auto frame = std::make_shared<Frame>();
     const libcam::Agreed& agreed = device_.agreed();
@@ -106,7 +105,7 @@ class LibcameraCamera final : public Camera {
       stamp_ns = sensor_time_ns(boottime_, completed.timestamp_ns, arrival_ns);
     frame->timestamp_ns = order_.time_of(stamp_ns, arrival_ns);
     const std::optional<Exposure> exposure = exposure_of(completed, frame->timestamp_ns);
-    if (!exposure) return left_out("frames between two exposures");
+    if (!exposure) return left_out("frames during an exposure change");
     apply_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
   }

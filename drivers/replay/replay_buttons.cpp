@@ -31,7 +31,7 @@ class ReplayButtons final : public Buttons {
     for (ButtonEvent& event : events) waiting_.emplace_back(std::move(event));
     waiting_.emplace_back(EndOfStream{});
     timer_ = OwnedDescriptor(timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK));
-    if (!timer_) throw Error(name_ + ": no timer can be made: " + std::strerror(errno));
+    if (!timer_) throw Error(name_ + ": cannot create a timer: " + std::strerror(errno));
     arm();
   }
 
@@ -94,8 +94,7 @@ std::unique_ptr<Buttons> open_replay_buttons(const std::filesystem::path& sessio
   session::Lines<ButtonEvent> lines = session::read_button_lines(file);
   auto buttons = std::make_unique<ReplayButtons>(std::move(lines.records), file.string(), options);
   if (!lines.bad_lines.empty())
-    buttons->put_first(session::list_of("line", lines.bad_lines) +
-                       " cannot be understood and are left out");
+    buttons->put_first(session::list_of("line", lines.bad_lines) + " unreadable, skipped");
   return buttons;
 }
 

@@ -31,7 +31,7 @@ class ReplayCamera final : public Camera {
     if (!std::isfinite(options_.speed) || options_.speed < 0)
       throw Error(name_ + ": replay speed " + std::to_string(options_.speed) +
                   " is not allowed; 0 or more is");
-    if (stream_->records().empty()) throw Error(name_ + ": holds no whole frame to replay");
+    if (stream_->records().empty()) throw Error(name_ + ": has no complete frame to replay");
     options_.last = std::min(options_.last, stream_->records().size() - 1);
     if (options_.first > options_.last)
       throw Error(name_ + ": replay from frame " + std::to_string(options_.first) +
@@ -140,7 +140,7 @@ class ReplayCamera final : public Camera {
       pending_ = on_this_lap(stream_->read(at_->index));
     } catch (const Error& error) {
       ++unreadable_;
-      pending_ = DeviceTrouble{name_, std::string(error.what()) + "; the frame is left out"};
+      pending_ = DeviceTrouble{name_, std::string(error.what()) + "; the frame is skipped"};
     }
     return true;
   }

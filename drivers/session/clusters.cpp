@@ -96,8 +96,7 @@ class Search {
 
   std::vector<PacketPlace> run(const std::filesystem::path& file, const std::stop_token& stop) {
     for (std::uint64_t at = 0; !wanted_.empty();) {
-      if (stop.stop_requested())
-        throw Error(file.string() + ": was left, because reading it is to end");
+      if (stop.stop_requested()) throw Error(file.string() + ": reading interrupted");
       const std::span<const std::uint8_t> bytes = window_.at(at, cluster_id.size());
       if (bytes.size() < cluster_id.size()) {
         // The end, or a place that the disk cannot read; there is more behind that.

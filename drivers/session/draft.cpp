@@ -72,7 +72,7 @@ Draft::Made Draft::make(const fs::path& target) {
     OwnedDescriptor made(
         ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
     if (!made && errno == EEXIST) continue;
-    if (!made) fail_draft(target, "cannot be made");
+    if (!made) fail_draft(target, "cannot be created");
     if (lock(made, path)) return {std::move(path), std::move(made)};
   }
 }
@@ -106,7 +106,7 @@ void Draft::keep_owner() const {
 void Draft::put(Sync sync) {
   if (sync == Sync::yes) file_.sync();
   if (std::rename(path_.c_str(), target_.c_str()) != 0)
-    fail_draft(target_, "cannot be put in place");
+    fail_draft(target_, "cannot be renamed into place");
   path_.clear();
   if (sync == Sync::yes) sync_folder_of(target_);
 }
@@ -123,7 +123,7 @@ bool Draft::put_as_new(const fs::path& target) {
   } else if (!has_no_links || ::renameat2(AT_FDCWD, path_.c_str(), AT_FDCWD, target.c_str(),
                                           RENAME_NOREPLACE) != 0) {
     if (errno == EEXIST) return false;
-    fail_draft(target, "cannot be put in place");
+    fail_draft(target, "cannot be renamed into place");
   }
   path_.clear();
   sync_folder_of(target);
@@ -136,7 +136,7 @@ DraftFolder::DraftFolder(const fs::path& target) : target_(fs::absolute(target))
     path_ = name_of_chance(target_);
     const bool made = ::mkdir(path_.c_str(), 0777) == 0;
     if (!made && errno == EEXIST) continue;
-    if (!made) fail_draft(target_.parent_path(), "no folder can be made in it");
+    if (!made) fail_draft(target_.parent_path(), "a folder cannot be created in it");
     lock_ = OwnedDescriptor(::open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
     if (!lock_ && errno != ENOENT) {
       const int error = errno;
@@ -155,7 +155,7 @@ DraftFolder::~DraftFolder() {
 }
 
 void DraftFolder::put() {
-  if (std::rename(path_.c_str(), target_.c_str()) != 0) fail_draft(target_, "cannot be made");
+  if (std::rename(path_.c_str(), target_.c_str()) != 0) fail_draft(target_, "cannot be created");
   path_.clear();
   sync_folder_of(target_);
 }

@@ -74,7 +74,7 @@ av::Codec open_ffv1_decoder(const StreamFormat& format, const std::filesystem::p
   const std::unique_ptr<AVCodecParameters, ParametersCloser> parameters(avcodec_parameters_alloc());
   if (!parameters) throw Error(file.string() + ": no memory for a video header");
   av::check(avcodec_parameters_from_context(parameters.get(), encoder.get()), file,
-            "a video header cannot be made");
+            "a video header cannot be created");
   return open_ffv1_decoder(*parameters, file);
 }
 

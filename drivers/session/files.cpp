@@ -42,7 +42,7 @@ void OpenFile::append(std::string_view text) const {
 }
 
 void OpenFile::sync() const {
-  if (::fdatasync(get()) != 0) fail(file_, "cannot be brought to the disk");
+  if (::fdatasync(get()) != 0) fail(file_, "cannot be flushed to disk");
 }
 
 LineFile::LineFile(const std::filesystem::path& file)
@@ -51,7 +51,7 @@ LineFile::LineFile(const std::filesystem::path& file)
 void sync_names(const std::filesystem::path& folder) {
   const OpenFile open(folder.empty() ? "." : folder, O_RDONLY | O_DIRECTORY);
   const bool is_synced = ::fsync(open.get()) == 0 || errno == EINVAL || errno == EROFS;
-  if (!is_synced) fail(folder, "its names cannot be brought to the disk");
+  if (!is_synced) fail(folder, "its entries cannot be flushed to disk");
 }
 
 void make_folders(const std::filesystem::path& folder) {
@@ -61,7 +61,7 @@ void make_folders(const std::filesystem::path& folder) {
        !std::filesystem::exists(at, failure) && at.has_relative_path(); at = at.parent_path())
     missing.push_back(at);
   std::filesystem::create_directories(folder, failure);
-  if (failure) throw Error(folder.string() + ": cannot be made a directory: " + failure.message());
+  if (failure) throw Error(folder.string() + ": folder cannot be created: " + failure.message());
   for (const std::filesystem::path& made : missing) sync_names(made.parent_path());
 }
 
@@ -146,7 +146,7 @@ void read_blocks(const OpenFile& open, const std::function<bool()>& is_left,
   const std::filesystem::path& file = open.name();
   std::vector<char> block(1 << 20);
   for (;;) {
-    if (is_left()) throw Error(file.string() + ": was left, because reading it is to end");
+    if (is_left()) throw Error(file.string() + ": reading interrupted");
     pollfd waiting{open.get(), POLLIN, 0};
     if (::poll(&waiting, 1, patience_ms) == 0) continue;
     const ssize_t count = ::read(open.get(), block.data(), block.size());

@@ -48,7 +48,7 @@ const Json& three(const Json& json) {
 
 CapturedSource source_of(const Json& json) {
   CapturedSource source;
-  if (!json.at("id").is_number_integer()) throw std::invalid_argument("not a number of a source");
+  if (!json.at("id").is_number_integer()) throw std::invalid_argument("not a source number");
   source.id = json.at("id").get<int>();
   source.solid_angle_sr = number(json.at("solid_angle_sr"));
   constexpr double sphere_sr = 12.566370614359173;
@@ -94,7 +94,7 @@ CapturedLight captured_light_of(const Json& json) {
     throw std::invalid_argument("not a power of two up to 64");
   const Json& radiance = ambient.at("radiance");
   if (!radiance.is_array() || radiance.size() != 3u * static_cast<std::size_t>(size * size))
-    throw std::invalid_argument("not as many texels as the size says");
+    throw std::invalid_argument("wrong number of texels for the size");
   for (std::size_t i = 0; i < radiance.size(); i += 3)
     light.ambient.emplace_back(not_negative(radiance[i]), not_negative(radiance[i + 1]),
                                not_negative(radiance[i + 2]));

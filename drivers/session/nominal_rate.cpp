@@ -91,8 +91,8 @@ RateFraction fraction_of(double given_fps) {
 }
 
 std::string words_of(const NominalRate& rate) {
-  std::string text = fmt::format("{:.6g} frames a second", std::round(rate.fps * 1000) / 1000);
-  if (!rate.is_standard) text += ", which is no usual rate";
+  std::string text = fmt::format("{:.6g} frames per second", std::round(rate.fps * 1000) / 1000);
+  if (!rate.is_standard) text += ", which is not a usual rate";
   if (rate.varies) text += ", varying; it is the most common";
   std::int64_t missing = 0;
   for (const RateGap& gap : rate.gaps) missing += gap.frames;

@@ -13,9 +13,9 @@ std::vector<std::string> words_of(const Losses& lost) {
   const auto add = [&](std::uint64_t count, const char* what) {
     if (count > 0) words.push_back(std::to_string(count) + " " + what);
   };
-  add(lost.frames, "frames of the cameras");
-  add(lost.shown, "pictures that were shown");
-  add(lost.records, "lines of tracking, buttons and events");
+  add(lost.frames, "camera frames");
+  add(lost.shown, "composite frames");
+  add(lost.records, "tracking, button and event lines");
   return words;
 }
 

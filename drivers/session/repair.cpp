@@ -44,7 +44,7 @@ class Repairer {
     std::vector<std::uint64_t> bad_events = read_button_lines(damaged_ / "events.jsonl").bad_lines;
     if (!bad_events.empty())
       session_.missing.push_back("events.jsonl: " + list_of("line", bad_events) +
-                                 " cannot be understood and are left out");
+                                 " unreadable, skipped");
     copy_lines("track.jsonl", read_track_lines(damaged_ / "track.jsonl").bad_lines, {});
     write_assets();
     repair_.lacked = session_.missing;

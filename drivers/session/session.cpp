@@ -48,8 +48,8 @@ void forget_foreign_assets(Session& session) {
 void check_assets(Session& session, const std::stop_token& stop) {
   forget_foreign_assets(session);
   for (const auto& [as_written, file, sha256, why] : session.info.missing_assets)
-    session.missing.push_back(as_written + ": is not in the take, because " + why + "; it was " +
-                              file.string() +
+    session.missing.push_back(as_written + ": missing from the take, because " + why +
+                              "; original: " + file.string() +
                               (sha256.empty() ? "" : " with the SHA-256 " + sha256));
   for (const auto& [as_written, path] : session.info.assets) {
     const std::filesystem::path file = session.directory / path;
@@ -68,12 +68,12 @@ void read_end(const SessionFile& file, Session& session) {
   if (file.closed && !file.fault.empty())
     miss(file.fault);  // repair_session() writes both
   else if (!file.fault.empty())
-    miss("the recording ended by a fault (" + file.fault +
-         "); what came after the last whole frame is lost");
+    miss("the recording ended with a fault (" + file.fault +
+         "); all after the last complete frame is lost");
   else if (!file.closed)
     miss(
-        "the recording was not closed (power cut, crash, or still recording); what "
-        "came after the last whole frame, at most about a second, is lost");
+        "the recording was not closed (power cut, crash, or still recording); all "
+        "after the last complete frame, about a second at most, is lost");
   for (const std::string& what : words_of(file.lost))
     miss(what + " did not reach the disk in time");
 }
@@ -83,7 +83,7 @@ void read_track(Session& session) {
   session.track = std::move(lines.records);
   if (!lines.bad_lines.empty())
     session.missing.push_back("track.jsonl: " + list_of("line", lines.bad_lines) +
-                              " cannot be understood and are left out");
+                              " unreadable, skipped");
 }
 
 }  // namespace
@@ -92,7 +92,7 @@ Session open_session(const std::filesystem::path& directory, const std::stop_tok
   const std::filesystem::path toml = directory / "session.toml";
   if (!std::filesystem::exists(directory))
     throw Error(directory.string() +
-                ": is not there; `previzd takes list FOLDER` shows the takes there are");
+                ": not found; `previzd takes list FOLDER` shows the existing takes");
   if (!std::filesystem::exists(std::filesystem::symlink_status(toml)))
     throw Error(directory.string() + ": is not a session; it holds no session.toml");
   const SessionFile file = parse_session_toml(read_plain_file(toml), toml);

@@ -296,16 +296,16 @@ StreamFormat parse_stream(const Place& place) {
   try {
     stream.format = pixel_format_from_string(place.text("format"));
   } catch (const std::invalid_argument& error) {
-    place.fail("format", std::string("is not understood: ") + error.what());
+    place.fail("format", std::string("is not valid: ") + error.what());
   }
   if (place.table.contains("bayer")) {
     try {
       stream.bayer = bayer_pattern_from_string(place.text("bayer"));
     } catch (const std::invalid_argument& error) {
-      place.fail("bayer", std::string("is not understood: ") + error.what());
+      place.fail("bayer", std::string("is not valid: ") + error.what());
     }
     if (stream.format != PixelFormat::gray8 && stream.format != PixelFormat::gray16)
-      place.fail("bayer", std::string("does not go with ") + to_string(stream.format));
+      place.fail("bayer", std::string("conflicts with ") + to_string(stream.format));
   }
   if (place.table.contains("codec")) {
     const std::string codec = place.text("codec");

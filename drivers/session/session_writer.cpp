@@ -49,12 +49,12 @@ void check(const Frame& frame) {
                 " and cannot be recorded");
   };
   if (frame.source != "observer" && frame.source != "light" && frame.source != "composite")
-    fail("comes from none of \"observer\", \"light\" and \"composite\"");
+    fail("has a source other than \"observer\", \"light\" or \"composite\"");
   // libav's FFV1 decoder silently leaves out slices of a single row or column; none is at 8.
   if (frame.width < 8 || frame.height < 8 || frame.width > 65535 || frame.height > 65535)
     fail("has a width or height outside 8 to 65535 pixels");
   if (frame.bytes.size() != frame_bytes(frame.format, frame.width, frame.height))
-    fail("does not hold the bytes of its format and size");
+    fail("has the wrong length for its format and size");
   if (!std::isfinite(frame.exposure) || frame.exposure <= 0)
     fail("has an exposure that is not positive");
   if (!std::isfinite(frame.exposure_s) || !std::isfinite(frame.gain))
@@ -71,7 +71,7 @@ std::string text(const StreamFormat& format) {
 void make_empty_directory(const std::filesystem::path& directory) {
   make_folders(directory);
   if (!std::filesystem::is_empty(directory))
-    throw Error(directory.string() + ": is not empty; a session needs a directory of its own");
+    throw Error(directory.string() + ": is not empty; a session needs its own folder");
 }
 
 // A folder that its writer holds locked as long as it is written. File systems without locks let

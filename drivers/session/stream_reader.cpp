@@ -109,13 +109,13 @@ void list_missing(const Leftovers& left, const std::string& source,
   const std::string video = source + ".mkv", lines = source + ".jsonl";
   if (!left.damaged.empty())
     missing.push_back(video + ": the pictures of " + list_of("frame", left.damaged) +
-                      " are damaged and left out");
+                      " are damaged and skipped");
   if (!left.without_picture.empty())
     missing.push_back(video + ": the pictures of " + list_of("frame", left.without_picture) +
                       " are missing");
   if (left.without_line > 0)
     missing.push_back(lines + ": " + count_of("picture", left.without_line) + " of " + video +
-                      " have no line that says when they were taken, and are left out");
+                      " have no line with their time and are skipped");
 }
 
 // A video as far as it could be opened, joined with its lines.
@@ -174,8 +174,8 @@ std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& s
   const auto declared = file.streams.find(source);
   if (declared == file.streams.end()) {
     if (std::filesystem::exists(std::filesystem::symlink_status(video_file)))
-      session.missing.push_back("session.toml: does not say what is in " + source +
-                                ".mkv, which is left out");
+      session.missing.push_back("session.toml: does not describe " + source +
+                                ".mkv, which is skipped");
     return nullptr;
   }
   const StreamFormat& format = declared->second;
@@ -184,7 +184,7 @@ std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& s
   const Lines<FrameLine> lines = read_frame_lines(line_file);
   if (!lines.bad_lines.empty())
     session.missing.push_back(source + ".jsonl: " + list_of("line", lines.bad_lines) +
-                              " cannot be understood and are left out");
+                              " unreadable, skipped");
 
   OpenedVideo video;
   if (std::filesystem::exists(std::filesystem::symlink_status(video_file))) {
@@ -202,7 +202,7 @@ std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& s
   const std::uint64_t whole = stream->records().size();
   if (const auto recorded = declared->second.frames; recorded && whole < *recorded)
     session.missing.push_back(source + ": " + std::to_string(whole) + " of " +
-                              count_of("recorded frame", *recorded) + " are whole");
+                              count_of("recorded frame", *recorded) + " are complete");
   return stream;
 }
 

@@ -49,7 +49,7 @@ void visit_own(const std::filesystem::path& directory, const Visit& visit) {
 
 Summary summary_of(const std::filesystem::path& directory) {
   const std::filesystem::path toml = directory / "session.toml";
-  if (!std::filesystem::exists(directory)) throw Error(directory.string() + ": is not there");
+  if (!std::filesystem::exists(directory)) throw Error(directory.string() + ": not found");
   std::error_code unreadable;  // reading the file gives a better error
   if (std::filesystem::symlink_status(toml, unreadable).type() ==
       std::filesystem::file_type::not_found)

@@ -140,8 +140,7 @@ std::vector<VideoReader::PacketInfo> VideoReader::scan(const std::stop_token& st
   for (const auto& [key, place] : impl_->places) packets.push_back({key.first, key.second});
   if (!impl_->demuxer) return packets;
   while (impl_->next_packet()) {
-    if (stop.stop_requested())
-      throw Error(impl_->file.string() + ": was left, because reading it is to end");
+    if (stop.stop_requested()) throw Error(impl_->file.string() + ": reading interrupted");
     packets.push_back({impl_->time_ms(), crc32(av::bytes_of(*impl_->packet))});
   }
   impl_->rewind();
@@ -154,7 +153,7 @@ std::vector<std::uint8_t> VideoReader::read(const PacketInfo& wanted) {
   if (s.is_raw()) {
     if (static_cast<std::size_t>(s.packet->size) !=
         frame_bytes(s.format.format, s.format.width, s.format.height))
-      throw Error(s.failure(wanted, "has not the format and size that session.toml says"));
+      throw Error(s.failure(wanted, "does not have the format and size in session.toml"));
     return {s.packet->data, s.packet->data + s.packet->size};
   }
   int code = avcodec_send_packet(s.decoder.get(), s.packet.get());
@@ -166,7 +165,7 @@ std::vector<std::uint8_t> VideoReader::read(const PacketInfo& wanted) {
   const auto format = session_format(AVPixelFormat(s.picture->format));
   if (format != s.format.format || s.picture->width != s.format.width ||
       s.picture->height != s.format.height)
-    throw Error(s.failure(wanted, "has not the format and size that session.toml says"));
+    throw Error(s.failure(wanted, "does not have the format and size in session.toml"));
   return unpack(*s.picture);
 }
 

@@ -113,7 +113,7 @@ Hotplug::Hotplug() {
         },
         this, nullptr);
   if (error != 0)
-    throw Error(std::string("USB devices that are plugged in are not reported: ") +
+    throw Error(std::string("cannot watch for USB devices: ") +
                 libusb_strerror(static_cast<libusb_error>(error)));
   thread_ = std::jthread([this](const std::stop_token& stop) {
     while (!stop.stop_requested()) libusb_handle_events(context_.get());

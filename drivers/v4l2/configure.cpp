@@ -66,17 +66,16 @@ class Configuration {
 
   void check_capabilities() const {
     v4l2_capability capability{};
-    check(node_.control(VIDIOC_QUERYCAP, &capability), "is no video device");
+    check(node_.control(VIDIOC_QUERYCAP, &capability), "is not a video device");
     const std::uint32_t can = capability.capabilities & V4L2_CAP_DEVICE_CAPS
                                   ? capability.device_caps
                                   : capability.capabilities;
-    if (can & V4L2_CAP_VIDEO_CAPTURE_MPLANE)
-      refuse("is multi-planar; the libcamera driver is for such cameras");
+    if (can & V4L2_CAP_VIDEO_CAPTURE_MPLANE) refuse("is multi-planar; use the libcamera driver");
     if (!(can & V4L2_CAP_VIDEO_CAPTURE)) refuse("captures no video");
     if (!(can & V4L2_CAP_STREAMING)) refuse("cannot stream");
     if (settings_.trigger) refuse("V4L2 has no triggers; remove trigger");
     if (settings_.packet_size) refuse("is not a network camera; remove packet_size");
-    if (settings_.gain) refuse("its gain has no unit, so no factor can be set; raw_gain sets it");
+    if (settings_.gain) refuse("its gain has no unit; use raw_gain, not gain");
   }
 
   std::vector<std::uint32_t> formats() const {
@@ -160,7 +159,7 @@ class Configuration {
     if (settings_.format) {
       const std::optional<std::uint32_t> wanted = fourcc_of(*settings_.format);
       if (!wanted)
-        refuse("format \"" + *settings_.format + "\" is not known; known are: " + known_formats());
+        refuse("format \"" + *settings_.format + "\" is unknown; known: " + known_formats());
       if (std::ranges::find(its, *wanted) == its.end())
         refuse("has no format " + *settings_.format + "; it has: " + format_names());
       return *wanted;
@@ -186,18 +185,19 @@ class Configuration {
     picture.pixelformat = wanted;
     picture.field = V4L2_FIELD_NONE;
     picture.bytesperline = picture.sizeimage = 0;
-    check(node_.control(VIDIOC_S_FMT, &format), "does not take the format " + fourcc_name(wanted));
+    check(node_.control(VIDIOC_S_FMT, &format), "rejects the format " + fourcc_name(wanted));
     const bool as_wanted = picture.pixelformat == wanted &&
                            (!settings_.width || !settings_.height ||
                             (picture.width == static_cast<std::uint32_t>(*settings_.width) &&
                              picture.height == static_cast<std::uint32_t>(*settings_.height)));
     if (!as_wanted) refuse_size(picture, wanted);
-    if (picture.field != V4L2_FIELD_NONE) refuse("sends interlaced pictures, which are not taken");
+    if (picture.field != V4L2_FIELD_NONE)
+      refuse("sends interlaced pictures, which are not supported");
     if (picture.width < 1 || picture.height < 1 || picture.width > 65535 || picture.height > 65535)
-      refuse("says its pictures are " + size_text(picture.width, picture.height) +
-             " pixels, which cannot be");
+      refuse("reports pictures of " + size_text(picture.width, picture.height) +
+             " pixels, which is impossible");
     const std::optional<convert::WireFormat> wire = wire_format(picture);
-    if (!wire) refuse("sends " + fourcc_name(picture.pixelformat) + ", which cannot be converted");
+    if (!wire) refuse("sends " + fourcc_name(picture.pixelformat) + ", which is not supported");
     agreed_.wire = *wire;
     picture_ = picture;
     agreed_.stride = wire->layout == convert::Layout::mjpeg ? 0 : picture.bytesperline;
@@ -211,14 +211,14 @@ class Configuration {
     const auto& [format, width, height, rate_hz, bayer] = agreed_.format;
     const std::size_t row = convert::row_bytes(agreed_.wire, width);
     if (agreed_.stride != 0 && agreed_.stride < row)
-      refuse("says that its rows are " + std::to_string(agreed_.stride) + " bytes; " +
+      refuse("reports rows of " + std::to_string(agreed_.stride) + " bytes; " +
              std::to_string(row) + " are needed");
     agreed_.least_bytes = convert::picture_bytes(agreed_.wire, width, height, agreed_.stride);
     const std::size_t bytes = std::max(agreed_.least_bytes, frame_bytes(format, width, height));
     if (bytes > convert::most_picture_bytes)
-      refuse("says its pictures are " + std::to_string(width) + "x" + std::to_string(height) +
+      refuse("reports pictures of " + std::to_string(width) + "x" + std::to_string(height) +
              " pixels and " + std::to_string(bytes) + " bytes; " +
-             std::to_string(convert::most_picture_bytes) + " bytes are the most");
+             std::to_string(convert::most_picture_bytes) + " bytes is the maximum");
   }
 
   static std::string size_text(std::uint32_t width, std::uint32_t height) {
@@ -246,8 +246,8 @@ class Configuration {
         (settings_.width && settings_.height
              ? " " + std::to_string(*settings_.width) + "x" + std::to_string(*settings_.height)
              : "");
-    refuse("made " + fourcc_name(made.pixelformat) + " " + size_text(made.width, made.height) +
-           " of " + asked + "; possible are: " + (sizes.empty() ? "not known" : sizes));
+    refuse("offers " + fourcc_name(made.pixelformat) + " " + size_text(made.width, made.height) +
+           " instead of " + asked + "; possible: " + (sizes.empty() ? "unknown" : sizes));
   }
 
   // Asks for the rate, of which the node takes the nearest it has; format() reports the result.
@@ -280,7 +280,7 @@ class Configuration {
       write(node_, V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0);  // the rate stays, whatever the exposure
       const std::optional<double> applied = set_exposure(node_, *settings_.exposure_s);
       if (!applied)
-        refuse("does not take an exposure of " + std::to_string(*settings_.exposure_s) + " s");
+        refuse("rejects an exposure of " + std::to_string(*settings_.exposure_s) + " s");
       agreed_.exposure.exposure_s = *applied;
     } else if (read(node_, V4L2_CID_EXPOSURE_AUTO).value_or(V4L2_EXPOSURE_MANUAL) ==
                V4L2_EXPOSURE_MANUAL) {
@@ -299,9 +299,10 @@ class Configuration {
     if (!bounds) refuse("has no such control; remove " + name);
     if (*value < bounds->minimum || *value > bounds->maximum)
       refuse(name + " " + std::to_string(*value) + " is not possible; " +
-             std::to_string(bounds->minimum) + " to " + std::to_string(bounds->maximum) + " is");
+             std::to_string(bounds->minimum) + " to " + std::to_string(bounds->maximum) +
+             " are allowed");
     if (!write(node_, id, static_cast<std::int32_t>(std::lround(*value))))
-      refuse("does not take " + name);
+      refuse("rejects " + name);
   }
 
   Node& node_;

@@ -101,21 +101,21 @@ std::string resolve(const std::string& device, const std::vector<FoundNode>& fou
   const FoundNode* meant = nullptr;
   for (const FoundNode& node : found) {
     if (device == node.node)
-      throw Error(device + ": the number of a video node changes; this one is called \"" +
+      throw Error(device + ": video node numbers change; use the stable name \"" +
                   stable_name(node, found) + "\"");
     if (without(by_id_directory, device) == node.by_id ||
         without(by_path_directory, device) == node.by_path || device == node.serial) {
       if (meant)
-        throw Error(device + ": two cameras are called so; \"" + meant->by_path + "\" and \"" +
-                    node.by_path + "\" tell them apart");
+        throw Error(device + ": two cameras have this name; use \"" + meant->by_path + "\" or \"" +
+                    node.by_path + "\" instead");
       meant = &node;
     }
     add_to_list(there, stable_name(node, found));
   }
   if (meant) return meant->node;
   if (device.starts_with("/dev/video"))
-    throw Error(device + ": the number of a video node changes; a by-id or by-path name is needed");
-  throw Error(device + ": is not there; there are: " + (there.empty() ? "no cameras" : there));
+    throw Error(device + ": video node numbers change; use a by-id or by-path name");
+  throw Error(device + ": not found; connected: " + (there.empty() ? "no cameras" : there));
 }
 
 }  // namespace previz::v4l2

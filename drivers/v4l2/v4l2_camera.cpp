@@ -150,7 +150,7 @@ class V4l2Camera final : public Camera {
     for (int i = 0; i < most_events && node_->control(VIDIOC_DQEVENT, &event) == 0; ++i) {
       const bool size_changed = event.type == V4L2_EVENT_SOURCE_CHANGE &&
                                 (event.u.src_change.changes & V4L2_EVENT_SRC_CH_RESOLUTION) != 0;
-      if (size_changed) lost_ = "has changed its picture";
+      if (size_changed) lost_ = "has changed its picture size";
     }
   }
 
@@ -164,17 +164,17 @@ class V4l2Camera final : public Camera {
     request.count = buffers_wanted;
     request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     request.memory = V4L2_MEMORY_MMAP;
-    check(node_->control(VIDIOC_REQBUFS, &request), "gives no buffers");
-    if (request.count < 2) throw Error(name() + ": gives fewer than two buffers");
+    check(node_->control(VIDIOC_REQBUFS, &request), "returns no buffers");
+    if (request.count < 2) throw Error(name() + ": returns fewer than two buffers");
     if (request.count > VIDEO_MAX_FRAME)
-      throw Error(name() + ": says that it gives " + std::to_string(request.count) +
-                  " buffers, which cannot be");
+      throw Error(name() + ": reports " + std::to_string(request.count) +
+                  " buffers, which is impossible");
     for (std::uint32_t i = 0; i < request.count; ++i) {
       v4l2_buffer buffer = empty_buffer(i);
       check(node_->control(VIDIOC_QUERYBUF, &buffer), "does not describe its buffers");
       if (buffer.length < agreed_.least_bytes)
-        throw Error(name() + ": gives buffers of " + std::to_string(buffer.length) +
-                    " bytes; a picture has " + std::to_string(agreed_.least_bytes));
+        throw Error(name() + ": returns buffers of " + std::to_string(buffer.length) +
+                    " bytes; a picture needs " + std::to_string(agreed_.least_bytes));
       const std::span<const std::uint8_t> memory = node_->map(buffer.m.offset, buffer.length);
       if (memory.empty())
         throw Error(name() + ": a buffer cannot be mapped: " + std::strerror(errno));
@@ -195,7 +195,7 @@ class V4l2Camera final : public Camera {
   // is not whole.
   FramePtr take(v4l2_buffer& buffer) {
     const std::int64_t arrival_ns = now_ns();
-    if (buffer.index >= memory_.size()) return left_out("buffers that are none of ours");
+    if (buffer.index >= memory_.size()) return left_out("unknown buffers");
     FramePtr frame = read(buffer, arrival_ns);
     v4l2_buffer again = empty_buffer(buffer.index);
     const int error = node_->control(VIDIOC_QBUF, &again);
@@ -205,7 +205,7 @@ class V4l2Camera final : public Camera {
 
   FramePtr read(const v4l2_buffer& buffer, std::int64_t arrival_ns) {
     const std::uint64_t sequence = order_.sequence_of(buffer.sequence);
-    if (buffer.flags & V4L2_BUF_FLAG_ERROR) return left_out("frames the device says are damaged");
+    if (buffer.flags & V4L2_BUF_FLAG_ERROR) return left_out("frames the device reports as damaged");
     const std::span<const std::uint8_t> memory = memory_[buffer.index];
     if (buffer.bytesused > memory.size()) return left_out("frames longer than their buffer");
     auto frame = std::make_shared<Frame>();
@@ -218,7 +218,7 @@ class V4l2Camera final : public Camera {
     frame->arrival_ns = arrival_ns;
     frame->timestamp_ns = order_.time_of(stamp_of(buffer), arrival_ns);
     const std::optional<Exposure> exposure = ledger_.of_frame(frame->timestamp_ns);
-    if (!exposure) return left_out("frames between two exposures");
+    if (!exposure) return left_out("frames during an exposure change");
     apply_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
   }

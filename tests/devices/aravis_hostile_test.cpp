@@ -128,7 +128,7 @@ TEST_P(LostReceiver, IsReplacedAndFramesGoOn) {
       is_back = !said.empty() && std::holds_alternative<FramePtr>(event);
     }
     EXPECT_LT(Clock::now() - begin, seconds(2));
-    EXPECT_THAT(said, HasSubstr("the process that receives from it"));
+    EXPECT_THAT(said, HasSubstr("its receiving process"));
     EXPECT_NE(receivers(), before);
   }
   const DeviceCounters counted = camera.counters();
@@ -266,7 +266,7 @@ TEST(Receiver, OfAnotherVersionIsRefused) {
   ASSERT_EQ(aravis::receive(socket.get(), message), aravis::Received::message);
   EXPECT_EQ(message.kind, aravis::Kind::refused);
   EXPECT_THAT(aravis::body_of<std::string>(message).value_or(""),
-              HasSubstr("another version of previzd"));
+              HasSubstr("another version than the running previzd"));
 }
 
 // Runs a call in a process that has entered the sandbox; returns 0, or the error that it had.

@@ -117,7 +117,7 @@ TEST_F(AbsurdCamera, ASizeThatCannotBeIsRefused) {
     write(ARV_FAKE_CAMERA_REGISTER_HEIGHT, 48);
   }
   write(ARV_FAKE_CAMERA_REGISTER_WIDTH, 0);
-  EXPECT_THAT(refusal(), HasSubstr("says its pictures are 0x48 pixels, which cannot be"));
+  EXPECT_THAT(refusal(), HasSubstr("reports pictures of 0x48 pixels, which is impossible"));
   write(ARV_FAKE_CAMERA_REGISTER_WIDTH, 64);
   EXPECT_EQ(refusal(), "it was opened");
 }
@@ -125,7 +125,7 @@ TEST_F(AbsurdCamera, ASizeThatCannotBeIsRefused) {
 TEST_F(AbsurdCamera, AFrameSizeThatDoesNotFitThePictureIsRefused) {
   for (const char* bytes : {"0", "0 - 1", "3071", "1 &lt;&lt; 40"}) {
     plug(with(description(), payload_formula, bytes));
-    EXPECT_THAT(refusal(), HasSubstr("its picture is 3072")) << bytes;
+    EXPECT_THAT(refusal(), HasSubstr("its picture needs 3072")) << bytes;
   }
 }
 
@@ -134,7 +134,7 @@ TEST_F(AbsurdCamera, AnExposureThatCannotBeIsRefused) {
        {"0 - TO", "0 * TO", "1e308 * 1e308", "(1e308 * 1e308) - (1e308 * 1e308)"}) {
     plug(with(description(), "<FormulaFrom>TO</FormulaFrom>",
               "<FormulaFrom>" + std::string(formula) + "</FormulaFrom>"));
-    EXPECT_THAT(refusal(), HasSubstr("says its exposure is")) << formula;
+    EXPECT_THAT(refusal(), HasSubstr("reports an")) << formula;
   }
 }
 

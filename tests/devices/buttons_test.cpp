@@ -218,7 +218,7 @@ TEST(ButtonNames, MistakesSayWhatIsAllowed) {
     }
     return "no error";
   };
-  EXPECT_THAT(error_of("midi:1:2"), HasSubstr("this build drives no \"midi\" buttons"));
+  EXPECT_THAT(error_of("midi:1:2"), HasSubstr("this build supports no \"midi\" buttons"));
   EXPECT_THAT(error_of("gpio:chip"), HasSubstr("gpio:CHIP:LINE"));
   EXPECT_THAT(error_of("hid:12:zz:0.1"), HasSubstr("hexadecimal"));
   EXPECT_THAT(error_of("hid:12:13:0.9"), HasSubstr("BYTE.BIT"));
@@ -287,7 +287,7 @@ TEST(ButtonDevices, WhatIsNotThereIsToldOnceAndWaitedFor) {
   for (const char* name : {"gpio:no such chip:1", "hid:1209:fffe:0.1"}) {
     const auto buttons = open_buttons(std::vector<std::string>{name}, {});
     ASSERT_EQ(buttons.size(), 1u);
-    expect_trouble(*buttons[0], "until it is there");
+    expect_trouble(*buttons[0], "until it opens");
     EXPECT_FALSE(buttons[0]->next());
     EXPECT_GE(buttons[0]->counters().at("not opened"), 1u);
     EXPECT_EQ(buttons[0]->counters().at("opened"), 0u);
@@ -434,7 +434,7 @@ TEST(ButtonDevices, AGpioChipThatGoesAHundredTimes) {
 TEST(ButtonDevices, APadThatIsPulledAHundredTimes) {
   if (!UhidPad::possible()) GTEST_SKIP() << "this machine has no /dev/uhid that may be written";
   const auto buttons = open_buttons(std::vector<std::string>{"hid:1209:0001:PREVIZ1:0.0"}, {});
-  ASSERT_NO_FATAL_FAILURE(expect_trouble(*buttons[0], "not there"));
+  ASSERT_NO_FATAL_FAILURE(expect_trouble(*buttons[0], "not found"));
   std::uint64_t opened = 0;
   expect_nothing_left_behind([&] {
     const auto pad = std::make_unique<UhidPad>("PREVIZ1");
@@ -451,7 +451,7 @@ TEST(ButtonDevices, APadOfUhidPressedUnpluggedAndBack) {
   const std::vector<std::string> names{"hid:1209:0001:PREVIZ1:0.0", "hid:1209:0001:PREVIZ1:0.5"};
   const auto buttons = open_buttons(names, {});
   ASSERT_EQ(buttons.size(), 1u);
-  expect_trouble(*buttons[0], "not there");
+  expect_trouble(*buttons[0], "not found");
   for (int i = 0; i < 2; ++i) {
     auto pad = std::make_unique<UhidPad>("PREVIZ1");
     // Reports before the driver has found the pad are nobody's; it looks once a second.

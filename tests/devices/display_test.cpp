@@ -240,7 +240,7 @@ TEST_P(KmsScreen, IsGivenUpWhenItIsUnpluggedAndBackAfterIt) {
   cable.pull();
   EXPECT_EQ(life.until("unplugged"), "the screen was unplugged; reopening it");
   EXPECT_EQ(life.until("no screen"),
-            settings_.connector + ": no screen is plugged in; tried again until it is there");
+            settings_.connector + ": no screen is plugged in; retrying until it is available");
   EXPECT_FALSE(life.has_display());
   cable.plug();
   EXPECT_EQ(life.until("shown"), "shown");

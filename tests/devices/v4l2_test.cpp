@@ -62,13 +62,13 @@ TEST(V4l2Find, ByEveryStableName) {
 
 TEST(V4l2Find, NeverByNumber) {
   EXPECT_THAT(error_of([] { resolve("/dev/video2", found); }),
-              HasSubstr("this one is called \"platform-vivid.0-video-index0\""));
+              HasSubstr("use the stable name \"platform-vivid.0-video-index0\""));
   EXPECT_THAT(error_of([] { resolve("/dev/video9", found); }), HasSubstr("number"));
 }
 
 TEST(V4l2Find, WhatIsNotThereOrNotOneIsAnError) {
   EXPECT_THAT(error_of([] { resolve("missing", found); }),
-              HasSubstr("missing: is not there; there are: usb-Acme_Cam_S1-video-index0"));
+              HasSubstr("missing: not found; connected: usb-Acme_Cam_S1-video-index0"));
   EXPECT_THAT(error_of([] { resolve("missing", {}); }), HasSubstr("no cameras"));
   EXPECT_THAT(error_of([] { resolve("", found); }), HasSubstr("by-id"));
   EXPECT_THAT(error_of([] { resolve("S2", found); }), HasSubstr("two cameras"));
@@ -177,12 +177,12 @@ TEST(V4l2Configure, WhatCannotBeSaysWhatCan) {
   wanted.width = 640;
   wanted.height = 480;
   EXPECT_EQ(refusal(device, wanted),
-            "usb-cam: made YUYV 32x24 of YUYV 640x480; possible are: 32x24, 16x12");
+            "usb-cam: offers YUYV 32x24 instead of YUYV 640x480; possible: 32x24, 16x12");
   wanted = settings();
   wanted.format = "NV12";
   EXPECT_EQ(refusal(device, wanted), "usb-cam: has no format NV12; it has: MJPG, YUYV");
   wanted.format = "nonsense";
-  EXPECT_THAT(refusal(device, wanted), HasSubstr("known are: GREY"));
+  EXPECT_THAT(refusal(device, wanted), HasSubstr("known: GREY"));
   wanted = settings();
   wanted.exposure_s = 0.1;
   EXPECT_EQ(refusal(device, wanted), "usb-cam: its exposure cannot be set; remove exposure_s");
@@ -212,7 +212,7 @@ TEST(V4l2Configure, WhatIsNoCameraIsRefused) {
   device.field = V4L2_FIELD_INTERLACED;
   EXPECT_THAT(refusal(device, settings()), HasSubstr("interlaced"));
   device.unplugged = true;
-  EXPECT_THAT(refusal(device, settings()), HasSubstr("is no video device"));
+  EXPECT_THAT(refusal(device, settings()), HasSubstr("is not a video device"));
 }
 
 // ---- streaming
@@ -275,11 +275,11 @@ TEST_F(V4l2Stream, MalformedBuffersAreCountedAndLeftOut) {
   EXPECT_EQ(whole->sequence, 5u);  // four are missing before it
   EXPECT_EQ(counted("frames cut short"), 2u);
   EXPECT_EQ(counted("frames longer than their buffer"), 1u);
-  EXPECT_EQ(counted("frames the device says are damaged"), 1u);
+  EXPECT_EQ(counted("frames the device reports as damaged"), 1u);
   EXPECT_TRUE(all_buffers_are_queued());
   device_.send(time_ns, 1, [](v4l2_buffer& buffer) { buffer.index = 99; });
   EXPECT_FALSE(next());
-  EXPECT_EQ(counted("buffers that are none of ours"), 1u);
+  EXPECT_EQ(counted("unknown buffers"), 1u);
 }
 
 TEST_F(V4l2Stream, ABrokenClockOrCounterDoesNoHarm) {
@@ -297,7 +297,7 @@ TEST_F(V4l2Stream, ABrokenClockOrCounterDoesNoHarm) {
     EXPECT_GT(frame->sequence, before->sequence);
     before = std::move(frame);
   }
-  EXPECT_EQ(counted("frames without a time stamp of the kernel"), 1u);
+  EXPECT_EQ(counted("frames without a kernel time stamp"), 1u);
 }
 
 TEST_F(V4l2Stream, ATimeBeyondAllNanosecondsIsReplacedByTheArrival) {
@@ -388,7 +388,7 @@ TEST_F(V4l2Stream, DamagedFramesWithoutEndDoNotMakeItWaitLonger) {
   EXPECT_LE(device_.now_ns, begin + 31'000'000);  // a wait is rounded up to milliseconds
   EXPECT_LE(device_.dequeued, 30 / 5);
   EXPECT_GE(device_.dequeued, 30 / 5 - 1);
-  EXPECT_EQ(counted("frames the device says are damaged"),
+  EXPECT_EQ(counted("frames the device reports as damaged"),
             static_cast<std::uint64_t>(device_.dequeued));
 }
 
@@ -444,8 +444,8 @@ TEST(V4l2Buffers, OfLengthsThatCannotBeAreRefusedAndOthersUsed) {
   for (const std::uint32_t length : {0u, 1u, 32u * 24 * 2 - 1}) {
     FakeDevice device;
     device.buffer_length = length;
-    EXPECT_EQ(refusal_to_start(device),
-              "usb-cam: gives buffers of " + std::to_string(length) + " bytes; a picture has 1536");
+    EXPECT_EQ(refusal_to_start(device), "usb-cam: returns buffers of " + std::to_string(length) +
+                                            " bytes; a picture needs 1536");
     EXPECT_EQ(device.mapped, 0);
   }
   FakeDevice device;
@@ -488,22 +488,22 @@ TEST(V4l2Configure, FormatsThatCannotBeAreRefused) {
     const char* why;
   };
   const std::vector<Made> all{
-      {[](v4l2_pix_format& format) { format.width = 0; }, "which cannot be"},
-      {[](v4l2_pix_format& format) { format.height = 0; }, "which cannot be"},
-      {[](v4l2_pix_format& format) { format.width = 70'000; }, "which cannot be"},
-      {[](v4l2_pix_format& format) { format.height = 0xffffffff; }, "which cannot be"},
+      {[](v4l2_pix_format& format) { format.width = 0; }, "which is impossible"},
+      {[](v4l2_pix_format& format) { format.height = 0; }, "which is impossible"},
+      {[](v4l2_pix_format& format) { format.width = 70'000; }, "which is impossible"},
+      {[](v4l2_pix_format& format) { format.height = 0xffffffff; }, "which is impossible"},
       {[](v4l2_pix_format& format) { format.bytesperline = 1; }, "rows are 1 bytes; 64 are needed"},
-      {[](v4l2_pix_format& format) { format.bytesperline = 0xffffffff; }, "bytes are the most"},
+      {[](v4l2_pix_format& format) { format.bytesperline = 0xffffffff; }, "bytes is the maximum"},
       {[](v4l2_pix_format& format) {
          format.width = format.height = 65'535;
          format.bytesperline = 4 * 65'536;
        },
-       "bytes are the most"},
+       "bytes is the maximum"},
       {[](v4l2_pix_format& format) {
          format.pixelformat = V4L2_PIX_FMT_MJPEG;
          format.width = format.height = 65'535;
        },
-       "65535x65535 pixels and 12884508675 bytes; 1073741824 bytes are the most"},
+       "65535x65535 pixels and 12884508675 bytes; 1073741824 bytes is the maximum"},
   };
   for (std::size_t i = 0; i < all.size(); ++i) {
     FakeDevice device;
@@ -547,7 +547,7 @@ TEST_F(V4l2Stream, AChangeOfTheSourceIsALossSoThatItIsOpenedAnew) {
     const CameraEvent event = camera_->next(milliseconds(0));
     ASSERT_TRUE(std::holds_alternative<DeviceTrouble>(event));
     EXPECT_TRUE(std::get<DeviceTrouble>(event).lost);
-    EXPECT_EQ(std::get<DeviceTrouble>(event).what, "has changed its picture");
+    EXPECT_EQ(std::get<DeviceTrouble>(event).what, "has changed its picture size");
   }
 }
 
@@ -577,7 +577,7 @@ TEST_F(V4l2Stream, ExposuresAreOnTheFramesThatSurelyHaveThem) {
     device_.send(device_.now_ns + 1000, 1);
     EXPECT_FALSE(next());
   }
-  EXPECT_EQ(counted("frames between two exposures"), 4u);
+  EXPECT_EQ(counted("frames during an exposure change"), 4u);
   device_.send(device_.now_ns + 1000, 1);
   EXPECT_DOUBLE_EQ(next()->exposure_s, 0.02);
   EXPECT_FALSE(camera_->set_exposure(0.02, 2));  // the gain has no unit

@@ -426,7 +426,7 @@ class SimulatedDay : public testing::Test {
     hangs_.push_back({begin, end});
     device_.hang_until(end);
     wait(119 * second);
-    const std::int64_t after = until_said("does not answer any more: observer", before) - begin;
+    const std::int64_t after = until_said("stopped responding: observer", before) - begin;
     EXPECT_GE(after, 120 * second);
     EXPECT_LE(after, 125 * second + 100 * ms);
     time_.sleep_exactly_until(end);

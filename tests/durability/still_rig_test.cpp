@@ -41,14 +41,14 @@ TEST_F(RigLive, ADiskThatStandsStillForASnapshotKeepsNoPictureWaiting) {
       const Shown now = until([&](const Shown& s) { return s.look.snapshots == i; });
       until([&](const Shown& s) { return s.count > now.count + 3; });
     }
-    until_said("snapshot: is left out");
+    until_said("snapshot: is skipped");
     press("record");
     until_said("12A_take001 is finished");
   });
   const auto dropped = metrics_.stages.at("snapshot").dropped;
-  ASSERT_TRUE(dropped.contains("too many waited")) << log_.text();
-  EXPECT_GE(dropped.at("too many waited"), 1u);
-  EXPECT_LE(dropped.at("too many waited"), 2u);
+  ASSERT_TRUE(dropped.contains("queue full")) << log_.text();
+  EXPECT_GE(dropped.at("queue full"), 1u);
+  EXPECT_LE(dropped.at("queue full"), 2u);
   EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
 }
 
@@ -80,7 +80,7 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
     disk.stand_still();
     press("record");
     until([](const Shown& s) { return s.look.state.recording; });
-    until_said("its disk does not answer");
+    until_said("its disk does not respond");
     until_measured([](const nlohmann::json& stages) {
       const nlohmann::json& waiting = stages.at("recorder").at("waiting");
       const nlohmann::json& folders = stages.at("folders of takes").at("waiting");
@@ -121,13 +121,13 @@ TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
     disk.stand_still();
     write(other);
     press("reload_set");
-    until_said("button reload_set: loading the set file again");
+    until_said("button reload_set: reloading the set file");
     systemd.skip();
     EXPECT_GE(systemd.fed_within(std::chrono::seconds(2)), 3);
     press("samples_up");
     until([](const Shown& s) { return s.shot.samples == 3; });
     press("next_set");
-    until_said("button next_set: a set is being read already");
+    until_said("button next_set: a set is already loading");
     disk.go_on();
     until([](const Shown& s) { return s.shot.samples == 4; });
 
@@ -138,7 +138,7 @@ TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
     press("record");
     until([](const Shown& s) { return s.look.state.recording; });
     disk.go_on();
-    until_said("the set stays as it was: recording began while another one was read");
+    until_said("the old set stays in use: recording began while another one was loading");
     const int before = until([](const Shown&) { return true; }).count;
     until([&](const Shown& s) { return s.count > before + 4 && s.look.state.recording; });
     press("record");
@@ -148,7 +148,7 @@ TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
   EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
 }
 
-// Nobody waits for a set whose disk does not answer: it is given up after a while, and a rig that
+// Nobody waits for a set whose disk does not respond: it is given up after a while, and a rig that
 // ends meanwhile does so.
 TEST(SetKeeperOnAStillDisk, ReadsOnAThreadOfItsOwnAndGivesUp) {
   const test::TemporaryDirectory folder;
@@ -167,7 +167,7 @@ TEST(SetKeeperOnAStillDisk, ReadsOnAThreadOfItsOwnAndGivesUp) {
     EXPECT_TRUE(sets.is_reading());
     const std::optional<SetKeeper::Ended> ended = sets.finish(std::chrono::milliseconds(0));
     ASSERT_TRUE(ended && ended->why_not);
-    EXPECT_NE(ended->why_not->find("the disk does not answer"), std::string::npos);
+    EXPECT_NE(ended->why_not->find("the disk does not respond"), std::string::npos);
     EXPECT_FALSE(sets.is_reading());
     EXPECT_EQ(sets.running().set.name, "old");
     EXPECT_FALSE(sets.look_at_file());

@@ -52,7 +52,7 @@ start_rig() {
   within 60 "the bus answers" status_is Set rig
 }
 
-promise[killed]="kill -9 at each of ten seconds of a take costs no frame that was counted; recording goes on in the next take, and the cut-off one is named"
+promise[killed]="kill -9 at each of ten seconds of a take costs no frame that was counted; recording continues in the next take, and the cut-off one is named"
 killed() {
   local second counted in_all=0 waited=0 since
   begin_take
@@ -212,9 +212,9 @@ disk_hung() {
     [[ $((SECONDS - since)) -le $slowest ]] || slowest=$((SECONDS - since))
     sleep 2
   done
-  says "the disk does not answer" || fail "nothing says that the disk does not answer"
+  says "the disk does not respond" || fail "nothing says that the disk does not respond"
   dmsetup resume takes
-  within 60 "the disk answers again" says "the disk answers again"
+  within 60 "the disk responds again" says "the disk responds again"
   [[ $(main_pid) == "$pid" && $(restarts) == 0 ]] || fail "the rig was started anew"
   # Few, since what draws on the processor leaves it to a recording that is behind.
   local shown=$(($(metric '.stages.display.frames') - before))

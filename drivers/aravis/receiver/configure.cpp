@@ -34,8 +34,8 @@ bool gain_is_in_db(ArvCamera& camera) {
 void check_exposure(const std::string& device, const Exposure& exposure) {
   const double product = exposure.exposure_s * exposure.gain;
   if (exposure.exposure_s > 0 && exposure.gain > 0 && std::isnormal(product)) return;
-  throw Error(device + ": says its exposure is " + std::to_string(exposure.exposure_s) +
-              " s with gain " + std::to_string(exposure.gain) + ", which cannot be");
+  throw Error(device + ": reports an exposure of " + std::to_string(exposure.exposure_s) +
+              " s with gain " + std::to_string(exposure.gain) + ", which is impossible");
 }
 
 class Configuration {
@@ -78,7 +78,7 @@ class Configuration {
       const std::string name =
           or_nothing(arv_camera_get_pixel_format_as_string(&camera_, failure_.out()));
       refuse("its pixel format " + name + " cannot be converted; it has " + its_formats() +
-             "; can be: " + known_formats());
+             "; supported: " + known_formats());
     }
   }
 
@@ -106,8 +106,8 @@ class Configuration {
     arv_camera_get_region(&camera_, &x, &y, &width, &height, failure_.out());
     check("picture size");
     if (width < 1 || height < 1 || width > 65535 || height > 65535)
-      refuse("says its pictures are " + std::to_string(width) + "x" + std::to_string(height) +
-             " pixels, which cannot be");
+      refuse("reports pictures of " + std::to_string(width) + "x" + std::to_string(height) +
+             " pixels, which is impossible");
   }
 
   void check_side(const char* side, int wanted, decltype(arv_camera_get_width_bounds) bounds,
@@ -119,7 +119,7 @@ class Configuration {
     if (wanted < least || wanted > most || (wanted - least) % step != 0)
       refuse("a " + std::string(side) + " of " + std::to_string(wanted) + " is not possible; " +
              std::to_string(least) + " to " + std::to_string(most) + " in steps of " +
-             std::to_string(step) + " is");
+             std::to_string(step) + " are allowed");
   }
 
   void agree_on_trigger() {
@@ -162,7 +162,7 @@ class Configuration {
     if (!agreed_.drives_exposure && settings_.exposure_s)
       refuse("its exposure cannot be set; remove exposure_s");
     if (settings_.gain && !agreed_.gain_in_db)
-      refuse("its gain is not in dB, so no factor can be set; raw_gain sets it");
+      refuse("its gain is not in dB; use raw_gain, not gain");
     end_automatics();
     if (settings_.raw_gain) {
       arv_camera_set_gain(&camera_, *settings_.raw_gain, failure_.out());
@@ -281,7 +281,7 @@ Owned<ArvCamera> find_camera(const std::string& device) {
       return open_camera(listed.id, listed.address, device);
     add_to_list(seen, listed.serial + " (" + listed.address + ")");
   }
-  throw Error(device + ": is not there; seen are: " + (seen.empty() ? "no cameras" : seen));
+  throw Error(device + ": not found; connected: " + (seen.empty() ? "no cameras" : seen));
 }
 
 Agreed configure(ArvCamera& camera, const CameraSettings& settings) {
@@ -291,7 +291,7 @@ Agreed configure(ArvCamera& camera, const CameraSettings& settings) {
 Exposure set_exposure(ArvCamera& camera, const std::string& device, const Exposure& wanted) {
   const bool in_db = gain_is_in_db(camera);
   if (!in_db && wanted.gain != 1)
-    throw Error(device + ": its gain is not in dB, so no factor can be set");
+    throw Error(device + ": its gain is not in dB, so it cannot be set");
   Failure failure;
   double least = 0, most = 0;
   arv_camera_get_exposure_time_bounds(&camera, &least, &most, failure.out());

@@ -88,7 +88,8 @@ Terms Device::terms() const {
 }
 
 void Device::start(const Ring& ring, OwnedDescriptor memory) {
-  if (stream_ || ring.buffers == 0 || ring.payload == 0) throw Error("cannot start as it is");
+  if (stream_ || ring.buffers == 0 || ring.payload == 0)
+    throw Error("cannot start: already started, or no buffers");
   memory_.emplace(ring, std::move(memory));
   Failure failure;
   if (address_ != 0) {

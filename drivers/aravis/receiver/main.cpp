@@ -50,7 +50,7 @@ class Service {
 
  private:
   Device& device() {
-    if (!device_) throw Error("there is no open camera");
+    if (!device_) throw Error("no camera is open");
     return *device_;
   }
 
@@ -104,7 +104,7 @@ class Service {
         if (device_) device_->give_back(required<std::uint32_t>(message));
         return std::nullopt;
       default:
-        throw Error("there is no such request");
+        throw Error("unknown request");
     }
   }
 
@@ -151,7 +151,7 @@ int main(int argc, char** argv) {
   try {
     // A driver that runs on after an upgrade has messages that this program may not know.
     if (argv[2] != std::string(PREVIZ_RECEIVER_MESSAGES))
-      throw Error("it is of another version of previzd than the one that runs; restart previzd");
+      throw Error("it is from another version than the running previzd; restart previzd");
     enter_sandbox(usb);
     if (!usb) check_that_sockets_are_filtered();
   } catch (const Error& error) {

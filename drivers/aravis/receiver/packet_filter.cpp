@@ -34,7 +34,8 @@ Program stream_rules(bool extended, std::int64_t packet_size, std::int64_t paylo
   const std::uint32_t header = extended ? 20 : 8;
   const std::int64_t room = packet_size - 28 - header;  // without IPv4 and UDP
   if (room < 1)
-    throw Error("its packets of " + std::to_string(packet_size) + " bytes hold nothing");
+    throw Error("its packets of " + std::to_string(packet_size) +
+                " bytes are too small for any data");
   const auto most = static_cast<std::uint32_t>((payload + room - 1) / room);
   const Program number =
       extended ? load(BPF_W, udp + 16) : all({load(BPF_W, udp + 4), mask(0x00ffffff)});

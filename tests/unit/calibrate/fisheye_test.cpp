@@ -122,7 +122,7 @@ TEST(FisheyeCapture, AsksForTheEdgeOfTheCircle) {
   const Views views = ring({10, 30}, 8);
   const auto missing = missing_views(views, fit_fisheye(views));
   ASSERT_EQ(missing.size(), 1u);
-  EXPECT_NE(missing[0].find("near the edge of the picture circle"), std::string::npos);
+  EXPECT_NE(missing[0].find("near the edge of the image circle"), std::string::npos);
 }
 
 TEST(FisheyeCapture, AsksForMoreViews) {

@@ -236,7 +236,7 @@ TEST(LensFiles, RosMessagesAreReadAsTheyArePrinted) {
       "0.0, 1.0]\nr: [1, 0, 0, 0, 1, 0, 0, 0, 1]\np: [600, 0, 640, 0, 0, 600, 480, 0, 0, 0, 1, 0]\n"
       "binning_x: 2\nbinning_y: 2\nroi: {x_offset: 0, width: 0}\n---\nheight: 960\n---\n");
   expect_as_opencv(observer_in(result), ros_lens(five));
-  EXPECT_THAT(result.words, HasSubstr("warning: the file states binning"));
+  EXPECT_THAT(result.words, HasSubstr("warning: the file gives binning"));
   EXPECT_THAT(result.words, HasSubstr("more than one YAML document; the first is used"));
 }
 
@@ -418,7 +418,7 @@ TEST(LensRefits, WhatDoesNotFitIsForcedOnly) {
   EXPECT_THAT(from(text, as(CameraRole::light)).error, HasSubstr("allowed: 0.1 px"));
   const Result forced = from(text, as(CameraRole::light, true));
   EXPECT_EQ(forced.error, "");
-  EXPECT_THAT(forced.table, HasSubstr("# NOT TO BE RELIED ON: taken with --force although"));
+  EXPECT_THAT(forced.table, HasSubstr("# UNRELIABLE: accepted with --force although"));
   light_in(forced);
 }
 

@@ -60,7 +60,7 @@ TEST(ThinLensFit, WhatIsMissingIsNamed) {
     find_lens(facts);
     FAIL() << "a lens without f-number was taken";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("f-number is not known"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("f-number is unknown"), std::string::npos);
   }
   facts = known_lens();
   facts.sensor_width_m.reset();

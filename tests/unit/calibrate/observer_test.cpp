@@ -183,7 +183,7 @@ TEST(ObserverCapture, AsksForTheFieldsThatAreEmpty) {
   auto how = test::careful_capture();
   std::erase_if(how, [](const Held& held) { return held.turn_deg > 0; });
   for (Held& held : how) held.middle.x -= 0.05;
-  EXPECT_EQ(first_missing(how), "the board in these fields of the picture: top right, right");
+  EXPECT_EQ(first_missing(how), "the board in these areas of the picture: top right, right");
 }
 
 TEST(ObserverCapture, AsksForTilt) {
@@ -192,7 +192,7 @@ TEST(ObserverCapture, AsksForTilt) {
   EXPECT_NE(first_missing(how).find("tipped forwards and backwards"), std::string::npos);
   how = test::careful_capture();
   for (Held& held : how) held.turn_deg /= 10;
-  EXPECT_NE(first_missing(how).find("turned to the left and to the right"), std::string::npos);
+  EXPECT_NE(first_missing(how).find("turned left and right"), std::string::npos);
 }
 
 // Why: the same capture without tilt knows the focal length at least ten times worse.
@@ -208,7 +208,7 @@ TEST(ObserverCapture, AsksForTheBoardFromNearer) {
   for (const Held& held : test::careful_capture())
     how.push_back({held.turn_deg, held.tip_deg, held.roll_deg,
                    glm::dvec3(0.53 * held.middle.x / 0.12, 0.27 * held.middle.y / 0.09, 1.2)});
-  EXPECT_NE(first_missing(how).find("the board from nearer"), std::string::npos);
+  EXPECT_NE(first_missing(how).find("the board from closer"), std::string::npos);
 }
 
 TEST(ObserverCalibration, WritesTheTableThatASetFileTakes) {
@@ -302,8 +302,7 @@ TEST(ObserverByForce, OneViewGivesNoLens) {
   const Views views = captured({Held{}});
   EXPECT_TRUE(has_few_views(views, fit_observer(views)));
   const std::string why = why_useless(fit_observer_by_few(views));
-  EXPECT_NE(why.find("by 1 view), which --force does not change: film the board turned"),
-            std::string::npos)
+  EXPECT_NE(why.find("from 1 view), even with --force: film the board turned"), std::string::npos)
       << why;
 }
 
@@ -330,12 +329,12 @@ TEST(ObserverByForce, TheTableSaysWhatItLacks) {
   std::ostringstream out;
   EXPECT_EQ(insist({}, true, out), "");
   const std::vector<std::string> missing{
-      "more views: 1 different ones can be used, 5 are needed and 20 are good"};
+      "more views: 1 different ones are usable, 5 are needed, 20 recommended"};
   EXPECT_THROW(insist(missing, false, out), Error);
   const std::string comment = insist(missing, true, out);
   EXPECT_EQ(comment,
-            "# NOT TO BE RELIED ON: taken with --force although these views are missing:\n"
-            "# more views: 1 different ones can be used, 5 are needed and 20 are good\n");
+            "# UNRELIABLE: accepted with --force although these views are missing:\n"
+            "# more views: 1 different ones are usable, 5 are needed, 20 recommended\n");
   const std::string word(120, 'a');
   EXPECT_EQ(as_comment(word + " b"), "# " + word + "\n#   b\n");
   EXPECT_NO_THROW(set::parse_set(comment + set::balance_toml({1, 1, 1}), "printed.toml"));

@@ -303,9 +303,9 @@ TEST(BusWithoutARig, IsToldInPlainWords) {
   for (const char* request : {"status", "mode live"}) {
     const Said said = previzctl(request);
     EXPECT_EQ(said.status, 1);
-    EXPECT_EQ(said.out,
-              "previzctl: previzd does not answer: it is not running, or it is loading a set just "
-              "now\n");
+    EXPECT_EQ(
+        said.out,
+        "previzctl: previzd does not respond: it is not running, or is still loading a set\n");
   }
 }
 

@@ -248,7 +248,7 @@ TEST(Yuv, PlanesThatLieApartAreJoinedWithoutWhatFollowsTheirLastRows) {
   const std::array<std::span<const std::uint8_t>, 3> short_of_cb{luma, three[1].first(3), cr};
   const Bytes cut = joined_planes(plain(Layout::i420), 2, 4, 4, short_of_cb);
   Frame frame;
-  EXPECT_EQ(convert({plain(Layout::i420), 2, 4, 4, cut}, frame), "is cut short: 19 of 23 bytes");
+  EXPECT_EQ(convert({plain(Layout::i420), 2, 4, 4, cut}, frame), "is truncated: 19 of 23 bytes");
 }
 
 // ---- plain samples
@@ -456,11 +456,11 @@ TEST(Malformed, ShortAndAbsurdPicturesAreRefusedInWords) {
       const Bytes data(bytes);
       return convert({format, width, height, stride, data}, frame).value_or("");
     };
-    EXPECT_EQ(damage_of(9, 7, 0, whole - 1), "is cut short: " + std::to_string(whole - 1) + " of " +
+    EXPECT_EQ(damage_of(9, 7, 0, whole - 1), "is truncated: " + std::to_string(whole - 1) + " of " +
                                                  std::to_string(whole) + " bytes");
     EXPECT_NE(damage_of(9, 7, 0, 0), "");
     EXPECT_NE(damage_of(9, 7, row_bytes(format, 9) - 1, 10'000).find("rows of"), std::string::npos);
-    EXPECT_NE(damage_of(9, 7, std::size_t{1} << 40, 10'000).find("cut short"), std::string::npos);
+    EXPECT_NE(damage_of(9, 7, std::size_t{1} << 40, 10'000).find("truncated"), std::string::npos);
     EXPECT_NE(damage_of(0, 7, 0, 10'000), "");
     EXPECT_NE(damage_of(9, -7, 0, 10'000), "");
     EXPECT_NE(damage_of(1 << 20, 1 << 20, 0, 10'000), "");

@@ -226,7 +226,7 @@ TEST(DisplayLifeline, OpensWaitsBacksOffAndOpensAgain) {
     return std::get<DeviceTrouble>(*event).device + ": " + std::get<DeviceTrouble>(*event).what;
   };
   EXPECT_EQ(life.state(), DeviceState::absent);
-  EXPECT_EQ(report(), "HDMI-A-1: no screen is plugged in; tried again until it is there");
+  EXPECT_EQ(report(), "HDMI-A-1: no screen is plugged in; retrying until it is available");
   cable.plugged = true;
   EXPECT_EQ(report(), "");  // not before its time
   now += 100ms;
@@ -244,7 +244,7 @@ TEST(DisplayLifeline, OpensWaitsBacksOffAndOpensAgain) {
   EXPECT_EQ(life.state(), DeviceState::lost);
   EXPECT_EQ(life.display(), nullptr);
   now += 100ms;
-  EXPECT_EQ(report(), "HDMI-A-1: no screen is plugged in; tried again until it is there");
+  EXPECT_EQ(report(), "HDMI-A-1: no screen is plugged in; retrying until it is available");
   now += 199ms;  // then 200
   cable.plugged = true;
   EXPECT_EQ(report(), "");

@@ -91,7 +91,7 @@ TEST_F(LifelineTest, AnAbsentDeviceIsTriedEverLessOftenAndToldOnce) {
     return take()();
   });
   EXPECT_EQ(story(lifeline, milliseconds(17'000)),
-            " [is not there; tried again until it is there] f");
+            " [is not there; retrying until it is available] f");
   EXPECT_EQ(attempts_ms, (std::vector<int>{0, 250, 750, 1750, 3750, 7750, 11'750, 15'750}));
   EXPECT_EQ(lifeline.counters().at("not opened"), 7u);
   EXPECT_EQ(lifeline.counters().at("back-offs"), 7u);
@@ -132,13 +132,13 @@ TEST_F(LifelineTest, ALostDeviceIsPickedUpWhenItIsBack) {
       started(with_faults(take(), {{Kind::disconnect, 20, 1, std::chrono::seconds(3)}}, clock()));
   EXPECT_EQ(story(lifeline, milliseconds(9000)),
             "f [was unplugged; reopening it] "
-            " [the device is unplugged; tried again until it is there] f");
+            " [the device is unplugged; retrying until it is available] f");
   EXPECT_EQ(lifeline.state(), DeviceState::streaming);
 }
 
 TEST_F(LifelineTest, TroubleOfOneFrameIsPassedOn) {
   Lifeline lifeline = started(with_faults(take(), {{Kind::corrupt, 3}}, clock()));
-  EXPECT_EQ(story(lifeline, milliseconds(1000)), "f [frame 103 is damaged and left out] f");
+  EXPECT_EQ(story(lifeline, milliseconds(1000)), "f [frame 103 is damaged and skipped] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 1u);
 }
 
@@ -204,7 +204,7 @@ TEST_F(LifelineTest, AnExposureThatCannotBeSetKeepsNoDeviceFromBeingOpened) {
   Lifeline lifeline = started([&] { return std::make_unique<Throwing>(take()(), 1000); });
   EXPECT_TRUE(lifeline.set_exposure(0.25, 1));  // there is no device yet
   EXPECT_EQ(story(lifeline, milliseconds(300)),
-            " [lamp fell down; tried again until it is there] f");
+            " [lamp fell down; retrying until it is available] f");
 }
 
 TEST_F(LifelineTest, SequenceNumbersIncreaseOverAllOpenings) {

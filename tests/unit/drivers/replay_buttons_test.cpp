@@ -92,7 +92,7 @@ TEST(ReplayButtons, DamagedLinesAreToldAndOtherEventsAreNotButtons) {
   const auto buttons = open_replay_buttons(directory.path(), due_at({}));
   const auto trouble = std::get<DeviceTrouble>(buttons->next().value());
   EXPECT_EQ(trouble.device, (directory / "events.jsonl").string());
-  EXPECT_EQ(trouble.what, "lines 3 to 6 cannot be understood and are left out");
+  EXPECT_EQ(trouble.what, "lines 3 to 6 unreadable, skipped");
   EXPECT_FALSE(trouble.lost);
   EXPECT_EQ(due_events(*buttons), (std::vector<ButtonEvent>{{"a", true, 1}}));
 }

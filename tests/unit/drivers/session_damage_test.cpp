@@ -102,7 +102,7 @@ TEST_F(Damage, LinesCutAnywhereGiveAPrefix) {
     EXPECT_GE(opened.frames.size(), static_cast<std::size_t>(whole_lines));
     if (opened.frames.size() < frame_count) {
       EXPECT_TRUE(mentions(opened.missing, "have no line") &&
-                  mentions(opened.missing, " of 6 recorded frames are whole"))
+                  mentions(opened.missing, " of 6 recorded frames are complete"))
           << "cut at " << length;
     }
   }
@@ -194,7 +194,7 @@ TEST_F(Damage, ATornFirstBlockCostsThePicturesInIt) {
   const Opened opened = open_copy();
   EXPECT_EQ(opened.frames, (std::vector<std::uint64_t>{2, 3, 4, 5}));
   EXPECT_TRUE(mentions(opened.missing, "the pictures of frames 0 to 1 are missing"));
-  EXPECT_TRUE(mentions(opened.missing, "4 of 6 recorded frames are whole"));
+  EXPECT_TRUE(mentions(opened.missing, "4 of 6 recorded frames are complete"));
 }
 
 // Every byte before the first cluster in turn is zeroed or turned over: none costs a picture.
@@ -276,7 +276,7 @@ TEST_F(Damage, OneDamagedPictureCostsThatFrameOnly) {
   const Opened opened = open_copy();
   EXPECT_EQ(opened.frames.size(), std::size_t{frame_count} - 1);
   EXPECT_TRUE(mentions(opened.missing, "observer.mkv: the pictures of frame ")) << "sentence";
-  EXPECT_TRUE(mentions(opened.missing, "5 of 6 recorded frames are whole"));
+  EXPECT_TRUE(mentions(opened.missing, "5 of 6 recorded frames are complete"));
 }
 
 TEST_F(Damage, AHoleInTheVideoDoesNotShiftTheRest) {
@@ -310,7 +310,7 @@ TEST_F(Damage, ChangedLinesAreLeftOut) {
   write_content(copy() / "observer.jsonl", lines);
   const Opened opened = open_copy();
   EXPECT_EQ(opened.frames, (std::vector<std::uint64_t>{0, 1, 3, 4, 5}));
-  EXPECT_TRUE(mentions(opened.missing, "observer.jsonl: line 3 cannot be understood"));
+  EXPECT_TRUE(mentions(opened.missing, "observer.jsonl: line 3 unreadable"));
   EXPECT_TRUE(mentions(opened.missing, "1 picture of observer.mkv"));
 }
 
@@ -326,7 +326,7 @@ TEST_F(Damage, NumbersOfTheWrongKindAreDamage) {
     write_content(copy() / "observer.jsonl", lines + line + "\n");
     const Opened opened = open_copy();
     EXPECT_EQ(opened.frames.size(), std::size_t{frame_count});
-    EXPECT_TRUE(mentions(opened.missing, "line 7 cannot be understood")) << line;
+    EXPECT_TRUE(mentions(opened.missing, "line 7 unreadable")) << line;
   }
 }
 

@@ -45,7 +45,7 @@ TEST(NominalRate, CountsWhatIsMissing) {
   EXPECT_EQ(rate.gaps[1].after, 99u);
   EXPECT_EQ(rate.gaps[1].frames, 10);
   EXPECT_EQ(words_of(rate),
-            "30 frames a second; 11 are missing, after frame 52 and after frame 99");
+            "30 frames per second; 11 are missing, after frame 52 and after frame 99");
 }
 
 TEST(NominalRate, OfACameraIsItsOwnClocks) {

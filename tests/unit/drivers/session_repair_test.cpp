@@ -130,7 +130,7 @@ TEST_F(Repair, NamesAnAssetThatWasChanged) {
   write_content(take_ / stored, "another model");
   EXPECT_FALSE(repair_session(take_, repaired_).is_complete);
   const Session session = open_session(repaired_);
-  EXPECT_TRUE(mentions(session.missing, "model.glb: is not in the take, because the take was"));
+  EXPECT_TRUE(mentions(session.missing, "model.glb: missing from the take, because the take was"));
   EXPECT_FALSE(fs::exists(repaired_ / stored));
 }
 
@@ -138,7 +138,7 @@ TEST_F(Repair, LeavesOutAnEventThatIsTorn) {
   write_content(take_ / "events.jsonl", content_of(take_ / "events.jsonl") + "{\"timest");
   const session::Repair repair = repair_session(take_, repaired_);
   EXPECT_FALSE(repair.is_complete);
-  EXPECT_TRUE(mentions(repair.lacked, "events.jsonl: line 7 cannot be understood"));
+  EXPECT_TRUE(mentions(repair.lacked, "events.jsonl: line 7 unreadable"));
   EXPECT_EQ(content_of(repaired_ / "events.jsonl").find("{\"timest\n"), std::string::npos);
 }
 

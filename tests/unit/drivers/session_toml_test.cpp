@@ -173,7 +173,7 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
   EXPECT_NE(with("kind = \"srgb\"", "kind = \"log\"").find("observer.calibration.response.kind"),
             std::string::npos);
   EXPECT_NE(with("vignetting = [0.0, 0.0, 0.0]", "vignetting = [-0.5, 0.0, 0.0]")
-                .find("light.calibration.vignetting: leaves no"),
+                .find("light.calibration.vignetting: passes no"),
             std::string::npos);
   EXPECT_NE(with("dark_level = [0.0, 0.0, 0.0]", "dark_level = [0.0, 0.6, 0.0]")
                 .find("light.calibration.dark_level: 0.6 is not"),

@@ -211,20 +211,20 @@ const Mistake observer_mistakes[] = {
     {"observer", "lens", "f_number", "0.4", "0.4 is not allowed; allowed: finite number, 0.5 to"},
     {"observer", "lens", "f_number", "", "is missing; allowed: number, 0.5 to"},
     {"observer", "lens", "focus_distance_m", "0.03",
-     "the focus is not beyond the focal length; allowed: above 0.0353 m"},
+     "must exceed the focal length; allowed: above 0.0353 m"},
     {"observer", "response", "responsivity", "0",
      "0 is not allowed; allowed: finite number, 1e-12 to"},
     {"observer", "response", "kind", "\"log\"",
      "\"log\" is not allowed; allowed: \"srgb\" | \"linear\" | \"gamma\" | \"table\"", "log"},
     {"observer", "response", "gamma", "2.2",
-     "does not go with kind \"srgb\"; allowed with \"gamma\""},
+     "conflicts with kind \"srgb\"; allowed with \"gamma\""},
     {"observer", "response", "gamma", "0", "0 is not allowed; allowed: finite number, 0.1 to 10",
      "gamma"},
     {.camera = "observer",
      .table = "response",
      .key = "table",
      .value = "",
-     .words = "is missing with kind \"table\"" + rising,
+     .words = "is missing for kind \"table\"" + rising,
      .kind = "table",
      .recorded_key = "inverse_table"},
     {.camera = "observer",
@@ -252,7 +252,7 @@ const Mistake observer_mistakes[] = {
      .table = "response",
      .key = "table",
      .value = "[0, 1]",
-     .words = "does not go with kind \"linear\"; allowed with \"table\"",
+     .words = "conflicts with kind \"linear\"; allowed with \"table\"",
      .kind = "linear",
      .recorded_key = "inverse_table"},
 };
@@ -275,8 +275,8 @@ const Mistake light_mistakes[] = {
      .table = "intrinsics",
      .key = "vignetting",
      .value = "[-0.5, 0.0, 0.0]",
-     .words = "leaves no light at some angle; allowed: at least 0.01 of it up to max_angle_deg",
-     .recorded_words = "leaves no light at some angle; allowed: at least 0.01 of it up to "
+     .words = "passes no light at some angle; allowed: at least 0.01 of it up to max_angle_deg",
+     .recorded_words = "passes no light at some angle; allowed: at least 0.01 of it up to "
                        "max_angle_rad"},
     {"light_camera", "response", "clip_share", "0.4",
      "0.4 is not allowed; allowed: finite number, 0.5 to 1"},
@@ -284,7 +284,7 @@ const Mistake light_mistakes[] = {
      "0.6 is not allowed; allowed: finite number, 0 to 0.5"},
     {"light_camera", "pose", "world_from_camera",
      "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]]",
-     "is a mirroring or singular transform; allowed: a rotation and a shift"},
+     "mirrors or is singular; allowed: a rotation and a translation"},
     {"light_camera", "pose", "world_from_camera",
      "[[2, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]",
      "is not rigid, its axes are off by 3.0; allowed: unit axes at right angles"},
@@ -346,7 +346,7 @@ TEST(Calibration, RationalTermsArePrintedIfTheyAreNotZero) {
 TEST(Calibration, AFoldingFisheyeIsRefusedWhereItIsWrittenAndUsedWhereItIsRecorded) {
   const std::string key = "light_camera.intrinsics", k = "[-0.2, 0.0, 0.0, 0.0]";
   const std::string words =
-      "k: the picture folds back at 73.9 degrees off axis; allowed: a radius that grows up to "
+      "k: the lens model folds back at 73.9 degrees off axis; allowed: a growing radius up to "
       "max_angle_deg";
   const std::string set = edited(set_text, key, "k", k).first;
   EXPECT_NE(message_of([&] { set::parse_set(set, "stage.toml"); }).find(words), std::string::npos);

@@ -282,7 +282,7 @@ TEST(Import, AVideoWithMoreOrFewerFramesThanTimes) {
   write_video(shoot.folder() / "take.mkv", "gray", {noise_bytes(512, 1), noise_bytes(512, 2)}, 32,
               16, 25, false);
   shoot.json["observer"] = {{"video", "take.mkv"}, {"timestamps_ns", {1}}, {"exposure", 1}};
-  EXPECT_NE(shoot.error().find("frame 1: is one more than the 1 frames"), std::string::npos);
+  EXPECT_NE(shoot.error().find("frame 1: exceeds the 1 frames"), std::string::npos);
   shoot.json["observer"]["timestamps_ns"] = {1, 2, 3};
   EXPECT_NE(shoot.error().find("observer has 2 frames; 3 are described"), std::string::npos);
   shoot.json["observer"]["timestamps_ns"] = {1, 2};

@@ -256,7 +256,7 @@ TEST(ImportVideo, TheRateIsTheNominalOneAndTheTimecodeTheClips) {
   shoot.json["observer"] = {{"video", "take.mov"}, {"exposure", 1}};
   const ImportReport report = shoot.import();
   EXPECT_TRUE(std::ranges::any_of(report.notes, [](const std::string& note) {
-    return note == "observer: 30 frames a second; 1 frame is missing, after frame 19";
+    return note == "observer: 30 frames per second; 1 frame is missing, after frame 19";
   })) << report.notes.back();
   const session::Session opened = session::open_session(shoot.session());
   EXPECT_EQ(opened.info.timecode, (session::Timecode{"10:59:59:20", 30}));

@@ -119,7 +119,7 @@ TEST_F(UntrackedTake, PosesAreFoundWithoutRendering) {
   EXPECT_EQ(track_take(options, said_), 0);
   EXPECT_THAT(said_.str(), HasSubstr("3 of 4 frames tracked, corners off by "));
   EXPECT_THAT(said_.str(), HasSubstr("tag 3: seen in 3 frames, used for the camera in 3\n"));
-  EXPECT_THAT(said_.str(), HasSubstr("1 without a pose, as frame 2: "));
+  EXPECT_THAT(said_.str(), HasSubstr("1 without a pose, e.g. frame 2: "));
   std::istringstream lines(session::read_file(*options.out));
   int count = 0;
   for (std::string line; std::getline(lines, line); ++count) {
@@ -184,7 +184,7 @@ TEST_F(UntrackedTake, WithoutTagsSaysWhatToDo) {
     export_take({session_, out_}, said_);
     FAIL() << "a camera nobody knows was exported";
   } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("`previzd track` says why, and the set needs [[tag]]"));
+    EXPECT_THAT(error.what(), HasSubstr("`previzd track` says why; the set file needs [[tag]]"));
   }
 }
 

@@ -181,7 +181,7 @@ TEST_F(PictureFormats, DamagedRadianceFilesAreRefusedByName) {
   EXPECT_THAT(refusal("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 8 +X 16\n" + pixels),
               HasSubstr("CIE XYZ"));
   EXPECT_THAT(refusal(with_header(size, "EXPOSURE=0\n") + pixels),
-              HasSubstr("\"EXPOSURE=0\" is no brightness factor"));
+              HasSubstr("\"EXPOSURE=0\" is not a brightness factor"));
   EXPECT_THAT(refusal("#?RADIANCE\nFORMAT=32-bit_rle"), HasSubstr("ends in its header"));
   EXPECT_THAT(refusal(with_header(size) + bytes_of({2, 2, 0, 16, 128 + 17, 1})),
               HasSubstr("scan line 1 has a run that does not fit"));

@@ -64,7 +64,7 @@ TEST(AssetStore, NamesWhatCannotBeKeptAndKeepsTheRest) {
   ASSERT_EQ(delivered.missing.size(), 1u);
   EXPECT_EQ(delivered.missing[0].as_written, "a.glb");
   ASSERT_EQ(notes.size(), 1u);
-  EXPECT_TRUE(notes[0].starts_with("a.glb will not be in the takes: ")) << notes[0];
+  EXPECT_TRUE(notes[0].starts_with("a.glb will be missing from takes: ")) << notes[0];
 }
 
 TEST(AssetStore, RemovesWhatNoTakeAndNoSetNeeds) {

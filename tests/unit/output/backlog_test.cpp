@@ -187,7 +187,7 @@ TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
   offer();
   ASSERT_TRUE(wait_until("the take is begun", [&] { return recorder.status().frames == 1; }));
   disk.lock();
-  ASSERT_TRUE(wait_until("frames are left out", [&] {
+  ASSERT_TRUE(wait_until("frames are dropped", [&] {
     offer();
     return recorder.status().lost.frames > 3;
   }));
@@ -201,7 +201,7 @@ TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
   session::Session session = session::open_session(directory / "takes/12A_take001");
   const auto stream = session::open_stream(session, "observer");
   EXPECT_EQ(stream->records().size() + recorder.status().lost.frames, offered);
-  EXPECT_TRUE(session::mentions(session.missing, "frames of the cameras did not reach the disk"));
+  EXPECT_TRUE(session::mentions(session.missing, "camera frames did not reach the disk"));
   EXPECT_TRUE(heard.said("recording.most_behind_s"));
   EXPECT_EQ(heard.left_out(), (Causes{{"too far behind", recorder.status().lost.frames}}));
 }

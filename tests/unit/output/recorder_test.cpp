@@ -534,7 +534,7 @@ TEST(Recorder, OfADiskThatHangsKeepsAQueueOfBoundedSizeAndSaysSo) {
     return std::uint64_t{1'000'000'000};
   };
   options.note = [&](const report::Report& report) {
-    silences += report.text.find("does not answer") != std::string::npos;
+    silences += report.text.find("does not respond") != std::string::npos;
   };
   session::TrackRecord with_light = track_of(0);
   with_light.captured_light.emplace();

@@ -115,8 +115,8 @@ TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
   EXPECT_EQ(asset.file, rig.directory / "set/a.glb");
   EXPECT_EQ(asset.sha256, hash_of_a_model);
   EXPECT_FALSE(asset.why.empty());
-  EXPECT_TRUE(mentions(session.missing, "a.glb: is not in the take"));
-  EXPECT_TRUE(rig.heard.said("12A_take001 lacks a.glb"));
+  EXPECT_TRUE(mentions(session.missing, "a.glb: missing from the take"));
+  EXPECT_TRUE(rig.heard.said("12A_take001 is missing a.glb"));
 }
 
 TEST(Recorder, OfAStoreThatWasDeletedTakesTheFileOfTheSetIfItIsTheSame) {
@@ -146,7 +146,7 @@ TEST(Recorder, LeavesTheReserveToTakesAndNotToTheFilesOfTheSet) {
   rig.free_on_first = 103;  // the reserve of 100 bytes, and less than the model's 7
   Recorder recorder(rig.options_with_asset());
   ASSERT_TRUE(
-      wait_until("it is said", [&] { return rig.heard.said("a.glb will not be in the takes"); }));
+      wait_until("it is said", [&] { return rig.heard.said("a.glb will be missing from takes"); }));
   EXPECT_FALSE(std::filesystem::exists(kept_in(rig.first)));
   recorder.start();
   recorder.offer(picture(0));
@@ -178,7 +178,7 @@ TEST(Recorder, EndsATakeAndItselfWhileAFileOfTheSetCannotBeRead) {
   for (const char* take : {"12A_take001", "12A_take002"}) {
     const session::Session session = session::open_session(rig.first / take);
     ASSERT_EQ(session.missing.size(), 1u);
-    EXPECT_TRUE(mentions(session.missing, "dead.glb: is not in the take")) << session.missing[0];
+    EXPECT_TRUE(mentions(session.missing, "dead.glb: missing from the take")) << session.missing[0];
   }
 }
 
@@ -273,7 +273,7 @@ TEST(Recorder, LeavesOutWhatCannotBeRecordedAndGoesOn) {
   EXPECT_EQ(session.missing.size(), 2u);
   for (const std::string& words : session::words_of(status.lost))
     EXPECT_TRUE(mentions(session.missing, words)) << words;
-  EXPECT_TRUE(rig.heard.said("12A_take001 lacks what cannot be recorded: frame 100"));
+  EXPECT_TRUE(rig.heard.said("12A_take001 is missing what cannot be recorded: frame 100"));
 }
 
 // The first recording loses frames, rolls over twice, and is still being written when the next one
@@ -318,7 +318,7 @@ TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
   std::size_t takes_that_lack = 0;
   for (const char* name : {"12A_take001", "12A_take002", "12A_take003", "12A_take004"}) {
     const session::Session session = session::open_session(rig.first / name);
-    EXPECT_EQ(session.missing.empty(), !mentions(session.missing, "6 frames of the cameras"));
+    EXPECT_EQ(session.missing.empty(), !mentions(session.missing, "6 camera frames"));
     takes_that_lack += session.missing.empty() ? 0 : 1;
   }
   EXPECT_EQ(takes_that_lack, 1u);
@@ -420,7 +420,7 @@ TEST(Recorder, WhoseFirstFolderCannotBeReadFindsWhatIsInTheSecond) {
   EXPECT_EQ(recorder.status().salvaged,
             std::vector<std::string>{"12A_take007 was cut off; it has 3 frames"});
   EXPECT_EQ(recorder.status().interrupted, "12A_take007");
-  EXPECT_TRUE(rig.heard.said("takes from before cannot be looked at"));
+  EXPECT_TRUE(rig.heard.said("earlier takes cannot be checked"));
 }
 
 TEST(Recorder, FindsWhatIsOnADiskThatIsMountedLater) {

@@ -50,10 +50,10 @@ TEST(TakeFolders, TheFirstThatHasRoomAndDidNotFailIsChosen) {
   folders.forgive_all();
   free[second] = 3'000'000;
   EXPECT_EQ(refusal(folders), first.string() +
-                                  ": the disk is almost full, 4 MB are left and 5 MB are kept free "
+                                  ": the disk is almost full, 4 MB are free, 5 MB are reserved "
                                   "(recording.reserve_mb); " +
                                   second.string() +
-                                  ": the disk is almost full, 3 MB are left and 5 MB are kept free "
+                                  ": the disk is almost full, 3 MB are free, 5 MB are reserved "
                                   "(recording.reserve_mb)");
 }
 
@@ -199,7 +199,7 @@ TEST(Recorder, OfTwoDisksGoesOnWithoutAGapWhenTheFirstIsFull) {
   const std::uint64_t in_first = frames_of(disks.directory / "first/12A_take001", 0);
   EXPECT_EQ(in_first + frames_of(disks.directory / "second/12A_take002", in_first), offered);
   EXPECT_TRUE(
-      mentions(disks.notes, "the disk of 12A_take001 is almost full; recording goes on in " +
+      mentions(disks.notes, "the disk of 12A_take001 is almost full; recording continues in " +
                                 (disks.directory / "second/12A_take002").string()));
 }
 
@@ -226,8 +226,8 @@ TEST(Recorder, ThatCannotKeepWhatIsWishedBeforeTheButtonSaysSoOnce) {
   ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 10; }));
   const std::lock_guard lock(disks.mutex);
   EXPECT_EQ(std::ranges::count(disks.notes,
-                               "recording: a take begins 0.4 s before the button, and not 4.0 s: "
-                               "the memory for it is full (recording.queue_mb)"),
+                               "recording: takes begin 0.4 s before the button, not 4.0 s: "
+                               "the frame memory is full (recording.queue_mb)"),
             1);
 }
 
@@ -258,7 +258,7 @@ TEST(Recorder, WarnsOfADiskThatIsTooSlowForTheCameras) {
   }
   EXPECT_TRUE(wait_until("it is compared", [&] {
     const std::lock_guard lock(disks.mutex);
-    return mentions(disks.notes, "takes will lack frames; recording.codec = \"raw\" needs");
+    return mentions(disks.notes, "takes will miss frames; recording.codec = \"raw\" needs");
   }));
 }
 
@@ -293,7 +293,7 @@ TEST(Recorder, WhoseTakeIsGoneGoesOnOnTheNextDisk) {
   const session::Session left = session::open_session(rig.directory / "unmounted/12A_take001");
   EXPECT_TRUE(mentions(left.missing, "not closed"));
   const std::lock_guard lock(rig.mutex);
-  EXPECT_TRUE(mentions(rig.notes, "is no longer there; its disk was unmounted"));
+  EXPECT_TRUE(mentions(rig.notes, "is gone; its disk was unmounted"));
 }
 
 TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {

@@ -154,7 +154,7 @@ TEST(DeclaredLamp, ThatShinesElsewhereIsNotMeasured) {
   const LightPtr light = light_of(set);
   EXPECT_EQ(light->emissions.at("key"), glm::dvec3(0)) << "no brightness is made up";
   EXPECT_TRUE(std::ranges::any_of(light->lighting.report.notes, [](const std::string& note) {
-    return note.find("does not shine towards the light camera") != std::string::npos;
+    return note.find("faces away from the light camera") != std::string::npos;
   }));
 }
 
@@ -233,8 +233,8 @@ TEST(DeclaredLamp, OfARemovedObjectTakesItsLightAlong) {
   for (glm::vec3& corner : scene.meshes[0].positions) corner *= 30;
   expect_nothing_is_taken();
   EXPECT_EQ(claims_of(set, &scene, place).troubles,
-            std::vector<std::string>{"the light of \"ugly lamp\" is not taken out of the light "
-                                     "around the set: it is around the light camera"});
+            std::vector<std::string>{"the light of \"ugly lamp\" is not subtracted from the "
+                                     "environment light: it encloses the light camera"});
 }
 
 // A narrow lamp in the middle of a wide claim is its own.

@@ -208,7 +208,7 @@ TEST(LightStage, FramesThatCannotBeUsedAreLeftOutAndToldAndTheLightStays) {
   EXPECT_EQ(stage.light(), nullptr);
   auto troubles = stage.troubles();
   ASSERT_EQ(troubles.size(), 1u);
-  EXPECT_EQ(troubles[0], "light frame 77 is left out: it has 8x8 pixels, the calibration 64x64");
+  EXPECT_EQ(troubles[0], "light frame 77 is skipped: it has 8x8 pixels, the calibration 64x64");
   EXPECT_TRUE(stage.troubles().empty());
 
   stage.see(studio.photograph(1), 1);

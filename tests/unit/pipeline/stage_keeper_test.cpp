@@ -46,10 +46,11 @@ TEST_F(StageKeeperTest, AFailureIsReportedShownAndCountedUntilThePartWorksAgain)
   EXPECT_EQ(log_.str(), "");
   EXPECT_FALSE(keeper.attempt(fail));
   EXPECT_EQ(log_.str(),
-            "render: has failed and begins anew; what is recorded goes on: lamp fell down\n");
+            "render: has failed and is restarting; recording continues: lamp fell down\n");
   EXPECT_EQ(reports_.announced() + "\n", log_.str());  // what the bus says
   ASSERT_EQ(reports_.troubles().size(), 1u);
-  EXPECT_EQ(line_of(reports_.troubles()[0]), "render: has failed and begins anew: lamp fell down");
+  EXPECT_EQ(line_of(reports_.troubles()[0]),
+            "render: has failed and is restarting: lamp fell down");
   EXPECT_TRUE(reports_.troubles()[0].lasts);
   EXPECT_EQ(count_of("render: failed"), 1u);
   EXPECT_EQ(begun_anew, 0);
@@ -60,7 +61,7 @@ TEST_F(StageKeeperTest, AFailureIsReportedShownAndCountedUntilThePartWorksAgain)
   EXPECT_TRUE(has_worked);
   EXPECT_EQ(begun_anew, 1);
   EXPECT_FALSE(reports_.troubles()[0].lasts);
-  EXPECT_EQ(count_of("render: begun anew"), 1u);
+  EXPECT_EQ(count_of("render: restarted"), 1u);
   EXPECT_TRUE(keeper.attempt([] {}));
   EXPECT_EQ(begun_anew, 1);
 }
@@ -97,7 +98,7 @@ TEST_F(StageKeeperTest, WhatCannotBeBegunAnewIsTriedAgain) {
   }
   EXPECT_EQ(worked, 1);
   EXPECT_EQ(count_of("render: failed"), 3u);
-  const std::string failed = "render: has failed and begins anew; what is recorded goes on: ";
+  const std::string failed = "render: has failed and is restarting; recording continues: ";
   EXPECT_EQ(log_.str(),
             failed + "lamp fell down\n" + failed + "no memory\n" + "render: works again\n")
       << "the same failure is reported once";
@@ -109,19 +110,19 @@ TEST_F(StageKeeperTest, APartThatHadNothingToDoDoesNotWorkAgain) {
   EXPECT_FALSE(keeper.attempt(fail));
   now_ += milliseconds(1000);
   EXPECT_TRUE(keeper.attempt([&] { keeper.had_nothing_to_do(); }));
-  EXPECT_EQ(count_of("render: begun anew"), 0u);
+  EXPECT_EQ(count_of("render: restarted"), 0u);
   EXPECT_TRUE(reports_.troubles().at(0).lasts);
   now_ += std::chrono::hours(1);
   EXPECT_TRUE(liveness_.hung().empty()) << "it waits for the next work";
   EXPECT_TRUE(keeper.attempt([] {}));
-  EXPECT_EQ(count_of("render: begun anew"), 1u);
+  EXPECT_EQ(count_of("render: restarted"), 1u);
   EXPECT_FALSE(reports_.troubles().at(0).lasts);
 }
 
 TEST_F(StageKeeperTest, WhatIsThrownNeedBeNoError) {
   StageKeeper keeper = this->keeper();
   EXPECT_FALSE(keeper.attempt([] { throw 7; }));
-  EXPECT_NE(log_.str().find("something was thrown"), std::string::npos) << log_.str();
+  EXPECT_NE(log_.str().find("unknown exception"), std::string::npos) << log_.str();
 }
 
 TEST_F(StageKeeperTest, ATestRehearsesFailures) {

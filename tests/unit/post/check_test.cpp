@@ -72,7 +72,7 @@ class Check : public testing::Test {
   // The list of what is left out comes after that of what is used.
   void expect_in_list(const std::string& words, bool is_left_out) {
     const auto at = said_.find(words);
-    const auto left_out = said_.find("left out, because this set does not use it");
+    const auto left_out = said_.find("not used by this set, so switched off");
     ASSERT_NE(left_out, std::string::npos) << said_;
     ASSERT_NE(at, std::string::npos) << words << "\nis not in\n" << said_;
     EXPECT_EQ(at > left_out, is_left_out) << words;
@@ -81,7 +81,7 @@ class Check : public testing::Test {
 
 TEST_F(Check, RemarksThatBothFoldersOfTakesAreOnOneDisk) {
   ASSERT_EQ(check("[recording]\nsecond_directory='more'\n"), 0) << said_;
-  expect_said("recording.second_directory is on the disk of recording.directory now");
+  expect_said("recording.second_directory is now on the same disk as recording.directory");
   ASSERT_EQ(check("[recording]\nsecond_directory='/dev/shm/takes'\n"), 0) << said_;
   EXPECT_EQ(said_.find("second_directory"), std::string::npos) << said_;
 }
@@ -108,7 +108,7 @@ driver = "none"
 
 TEST_F(Check, SaysForHowLongTheDiskLasts) {
   ASSERT_EQ(check(live_set), 0) << said_;
-  expect_said("the cameras' pictures: about 104 MB a second, and about half of that recorded");
+  expect_said("the cameras' pictures: about 104 MB per second, and about half of that recorded");
   expect_said("takes go to " + (directory_ / "takes").string());
   expect_said(" free, enough for at least ");
   ASSERT_EQ(check(std::string(live_set) + "[recording]\ncodec='raw'\n"), 0) << said_;
@@ -156,7 +156,7 @@ presence = "virtual"
             0)
       << said_;
   expect_said("light camera  none");
-  expect_said("around the set: what the session's light camera saw, if it has one");
+  expect_said("environment: from the session's light camera, if it has one");
 }
 
 TEST_F(Check, DescribesWhatASetAsksFor) {
@@ -198,20 +198,20 @@ samples = 1500
   expect_said("carrier stick: 1 tag: 9 (50 mm)");
   expect_said("table: phantom, 1 triangle in 1 instance, from table.gltf");
   expect_said("ring: virtual, 1 triangle in 1 instance, from ring.gltf");
-  expect_said("spot: point, dimmed, gain 0.5 in the picture, 1 in the real scene");
+  expect_said("spot: point, dimmed, gain 0.5 in the composite, 1 on the real set");
   expect_said("1 500 samples per pixel");
-  expect_said("geometry: 2 triangles, or 2 with every copy of an object counted");
+  expect_said("geometry: 2 triangles, or 2 counting every copy of an object");
   expect_used("metal: an object is metal");
   expect_used("two worlds: an object is virtual or removed");
   expect_used("lamps: the set or a model has lamps");
-  expect_used("relighting: a lamp is added, taken away, dimmed");
-  expect_used("denoiser: noise is taken out");
+  expect_used("relighting: a lamp is added, switched off, dimmed");
+  expect_used("denoiser: noise is removed");
   expect_left_out("refraction: nothing is made of glass");
-  expect_left_out("removed objects: no real object is taken out of the picture");
+  expect_left_out("removed objects: no real object is removed from the picture");
   expect_left_out("lens: everything is in focus");
   expect_left_out("photons: no mirror or clear glass throws patterns of light");
   expect_said("scene in the GPU's memory: about 1 MiB");
-  expect_said("the observer has no calibration here");
+  expect_said("no film camera calibration here");
 }
 
 // 1920x1080 pixels of 1310 bytes with two frames on each side, and of 866 with one. On the card a
@@ -243,12 +243,12 @@ TEST_F(Check, NamesTheVariantsOfAnObject) {
   write("a.gltf", file);
   const std::string object = "[[object]]\nname='a'\nfile='a.gltf'\npresence='virtual'\n";
   ASSERT_EQ(check(object + "variant='by night'\n"), 0) << said_;
-  expect_said("from a.gltf, in its variant \"by night\"\n");
+  expect_said("from a.gltf, variant \"by night\"\n");
   expect_said("its variants, for the buttons: \"by day\", \"by night\"\n");
   ASSERT_EQ(check(object), 0) << said_;
   expect_used("glowing surfaces: a surface gives off light");  // it may, at the press of a button
   EXPECT_EQ(check(object + "variant='at noon'\n"), 1);
-  expect_said("a.gltf: there is no variant \"at noon\"; it has \"by day\", \"by night\"");
+  expect_said("a.gltf: no variant \"at noon\"; it has \"by day\", \"by night\"");
 }
 
 // A material may be of a kind that lets light through and let none through: the renderer then
@@ -261,10 +261,10 @@ TEST_F(Check, AgreesWithTheRendererThatSolidBlendingNeedsNoAlpha) {
   };
   write("a.gltf", triangle(material("1")));
   ASSERT_EQ(check(object), 0) << said_;
-  expect_left_out("alpha: no surface has holes or is a veil");
+  expect_left_out("alpha: no surface has holes or is see-through");
   write("a.gltf", triangle(material("0.5")));
   ASSERT_EQ(check(object), 0) << said_;
-  expect_used("alpha: a surface has holes or is a veil");
+  expect_used("alpha: a surface has holes or is see-through");
 }
 
 TEST_F(Check, SaysWhatIsColouredInside) {
@@ -274,7 +274,7 @@ TEST_F(Check, SaysWhatIsColouredInside) {
     "KHR_materials_volume": {"thicknessFactor": 0.01, "attenuationColor": [0, 1, 0],
                              "attenuationDistance": 0.1}})"));
   ASSERT_EQ(check("[[object]]\nname='a'\nfile='a.gltf'\npresence='virtual'\n"), 0) << said_;
-  expect_used("coloured glass: glass or a liquid colours light more the longer its way through");
+  expect_used("coloured glass: glass or a liquid tints light, the more the thicker it is");
 }
 
 TEST_F(Check, TakesSetAndCalibrationOfASession) {
@@ -292,10 +292,11 @@ TEST_F(Check, TakesSetAndCalibrationOfASession) {
   expect_said("recorded (");
   expect_said("its lamps light the set; the rest is blurred");
   expect_used(
-      "lamps: the set or a model has lamps, a surface glows, or lamps are found in the light");
+      "lamps: the set or a model has lamps, a surface glows, or lamps are found in the "
+      "environment light");
   expect_said("16x8, 35 mm lens at f/2.8, focus at 1.5 m");
   expect_used("lens: the aperture blurs what is out of focus");
-  expect_said("tracking is off: only a session that recorded poses can be used");
+  expect_said("tracking is off: only a session with recorded poses can be used");
 }
 
 // `render` refuses it later.
@@ -308,7 +309,7 @@ TEST_F(Check, ATakeWithoutLightIsAProblem) {
   std::ostringstream out;
   EXPECT_EQ(check_set(directory_ / "take", out), 1);
   said_ = out.str();
-  expect_said("the session has no light frames, and the set gives no lighting.environment: name");
+  expect_said("the session has no light frames, and the set file no lighting.environment: give");
 }
 
 // Twenty-two mistakes of beginners; what is allowed and odd is said, and the rest refused.
@@ -334,7 +335,7 @@ TEST_F(Check, FindsImplausibleUnits) {
           "focus_distance_m=1.8\n",
       "focal_length_mm = 0.035: it is in millimetres");
   odd("[observer]\ndriver='v4l2'\ndevice='a'\n[observer.camera]\nrate_hz=30.0\nexposure_s=0.5\n",
-      "exposes for 0.5 s, longer than a frame lasts at 30 a second (0.0333 s)");
+      "exposes for 0.5 s, longer than a frame lasts at 30 per second (0.0333 s)");
 }
 
 // The numbers of another picture size: a live set would be refused.

@@ -143,9 +143,9 @@ TEST_F(RenderDirectoryTest, AFileThatIsNotAsItWasWrittenIsDoneAgain) {
   const std::map<std::string, Frames> expected{
       {"its .exr has another size than when it was written", {1}},
       {"its .png has another size than when it was written", {2}},
-      {"its .exr has another content (SHA-256) than when it was written", {3}},
-      {"its .png has another content (SHA-256) than when it was written", {4}},
-      {"it has no whole line in frames.jsonl", {5}}};
+      {"its .exr has other content (SHA-256) than when it was written", {3}},
+      {"its .png has other content (SHA-256) than when it was written", {4}},
+      {"it has no complete line in frames.jsonl", {5}}};
   EXPECT_EQ(again.rejected(), expected);
 }
 

@@ -113,10 +113,10 @@ TEST_F(Takes, AreMarkedAllOrNone) {
   EXPECT_THAT(refusal([&] {
                 mark_takes({one_, folder_}, true, out_);
               }),
-              HasSubstr("is a folder of takes; name the takes in it"));
+              HasSubstr("is a folder of takes; give the takes in it"));
   EXPECT_FALSE(session::summary_of(one_).info.take->good);
   EXPECT_THAT(refusal([&] { mark_takes({folder_ / "12A_take003"}, true, out_); }),
-              HasSubstr("is not there"));
+              HasSubstr("not found"));
 }
 
 TEST_F(Takes, ThatAreRecordedAreLeftAlone) {
@@ -188,17 +188,17 @@ TEST_F(Takes, AreCopiedOnce) {
   const fs::path disk = directory_ / "disk";
   copy_takes({{one_}, disk}, out_, {});
   copy_takes({{one_, two_}, disk}, out_, {});
-  EXPECT_THAT(out_.str(), HasSubstr("12A_take001: was copied before"));
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take001: already copied"));
   // Another take of the name is not replaced, and neither is one that was marked meanwhile.
   mark_takes({two_}, true, out_);
   EXPECT_THAT(refusal([&] {
                 copy_takes({{two_}, disk}, out_, {});
               }),
-              HasSubstr("is no copy of this take as it is now"));
+              HasSubstr("is not a current copy of this take"));
   EXPECT_THAT(refusal([&] {
                 copy_takes({{one_}, folder_}, out_, {});
               }),
-              HasSubstr("lies in the take itself"));
+              HasSubstr("is inside the take"));
 }
 
 TEST_F(Takes, AStoppedCopyLeavesNothing) {
@@ -285,7 +285,7 @@ TEST_F(Takes, AreDeletedAndNothingElse) {
   EXPECT_FALSE(fs::exists(one_ / "session.toml"));
   EXPECT_FALSE(fs::exists(one_ / "observer.mkv"));
   EXPECT_FALSE(fs::exists(one_ / "assets"));
-  EXPECT_THAT(out_.str(), HasSubstr("still there: out"));
+  EXPECT_THAT(out_.str(), HasSubstr("not part of the take: out"));
   delete_takes({folder_ / "12A_take003"}, false, out_);
   EXPECT_FALSE(fs::exists(folder_ / "12A_take003"));
   EXPECT_TRUE(fs::exists(two_ / "session.toml"));
@@ -300,7 +300,7 @@ TEST_F(Takes, AGoodTakeIsNotDeletedUnasked) {
   EXPECT_THAT(refusal([&] {
                 delete_takes({one_, two_}, false, out_);
               }),
-              HasSubstr("12A_take002: is marked good; say --good"));
+              HasSubstr("12A_take002: is marked good; add --good"));
   EXPECT_TRUE(fs::exists(one_ / "session.toml"));
   delete_takes({two_}, true, out_);
   EXPECT_FALSE(fs::exists(two_));
@@ -325,7 +325,7 @@ TEST_F(Takes, AFolderOrASetFileNamesThem) {
   list_takes({stage / "set.toml"}, out_);
   EXPECT_THAT(out_.str(), HasSubstr("12A_take002"));
   EXPECT_THAT(refusal([&] { list_takes({directory_ / "nowhere"}, out_); }),
-              HasSubstr("is not there; name a folder of takes"));
+              HasSubstr("not found; give a folder of takes"));
 }
 
 TEST_F(Takes, NoTakeOfThatKindIsSaid) {
@@ -335,7 +335,7 @@ TEST_F(Takes, NoTakeOfThatKindIsSaid) {
               HasSubstr("no take in it is marked good; `previzd takes mark TAKE`"));
   options.session = directory_ / "nowhere";
   EXPECT_THAT(refusal([&] { render_takes(options, WhichTakes::all, out_); }),
-              HasSubstr("there is no take in it"));
+              HasSubstr("contains no takes"));
 }
 
 TEST_F(Takes, GoodOnesAreRenderedIntoAFolderEach) {

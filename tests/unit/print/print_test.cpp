@@ -267,17 +267,17 @@ TEST(PrintRefusals, SayWhatIsPossible) {
   tags.ids = "587";
   EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("it has 0 to 586"));
   tags.ids = "0", tags.family = "tag99";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("known are tag36h11"));
+  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("known: tag36h11"));
   tags.family = "tag36h11", tags.paper = "A5";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("known are A4, A3, Letter"));
+  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("known: A4, A3, Letter"));
   tags.paper = "A4", tags.size = "3m";
   EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("sheets of A4; at most 64"));
   tags.size = "80mm", tags.ids = "1,2,3";
   EXPECT_THAT(refused([&] { print_block(tags, out); }), HasSubstr("5 or 6 tags"));
-  EXPECT_THAT(refused([&] { print_stick(tags, out); }), HasSubstr("four tags around it"));
+  EXPECT_THAT(refused([&] { print_stick(tags, out); }), HasSubstr("rings of four tags"));
   BoardOptions board;
   board.board = "charuco:7x5:30mm:22mm:9x9_100";
-  EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("not a dictionary"));
+  EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("not a marker dictionary"));
   board.board = "aprilgrid:3x3:40mm:5mm:tagStandard41h12";
   EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("gap of 32 mm or more"));
   board.board = "aprilgrid:3x3:40mm:7mm:kalibr";  // a white cell about each of ten cells of 4 mm

@@ -86,7 +86,7 @@ TEST_F(Features, ADiffuseRealSceneNeedsNothing) {
   EXPECT_EQ(needed(), std::set<std::string>());
   set.lighting.from = set::LightFrom::camera;
   set.quality.denoise = true;
-  EXPECT_EQ(needed(), (std::set<std::string>{"denoiser", "light around the set"}));
+  EXPECT_EQ(needed(), (std::set<std::string>{"denoiser", "environment light"}));
 }
 
 TEST_F(Features, ASceneCountsMeshesOnceAndInstancesEach) {

@@ -55,7 +55,7 @@ TEST(History, OfAStillCameraHasTheSamplesOfOneLongFrame) {
     int others = 0;
     for (std::size_t i = 0; i < picture.samples.size(); ++i)
       others += std::abs(picture.samples[i] - expected.samples[i]) > 1 ? 1 : 0;
-    EXPECT_LT(others, 0.02 * 3 * width * height) << samples << " samples a frame";
+    EXPECT_LT(others, 0.02 * 3 * width * height) << samples << " samples per frame";
   }
 }
 

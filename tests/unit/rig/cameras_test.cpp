@@ -94,7 +94,7 @@ TEST_F(RigCameras, MistakesNameFileAndKey) {
   EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.faults: fault \"melt@3\""));
   set = replayed();
   set.observer.driver = "gopro";  // one that this build lacks
-  EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.driver: this build drives no"));
+  EXPECT_THAT(error_of(set), HasSubstr("stage.toml: observer.driver: this build supports no"));
   set = replayed();
   set.light_camera.driver = set::replay_driver;
   EXPECT_THAT(error_of(set), HasSubstr("the session has no light frames"));
@@ -109,7 +109,7 @@ TEST_F(RigCameras, ACameraThatIsNotThereIsWaitedFor) {
   const Cameras cameras = open_cameras(set);
   const CameraEvent event = cameras.observer->next(milliseconds(0));
   ASSERT_TRUE(std::holds_alternative<DeviceTrouble>(event));
-  EXPECT_THAT(std::get<DeviceTrouble>(event).what, HasSubstr("tried again until it is there"));
+  EXPECT_THAT(std::get<DeviceTrouble>(event).what, HasSubstr("retrying until it is available"));
   EXPECT_EQ(cameras.observer->counters().at("not opened"), 1u);
 }
 

@@ -84,7 +84,7 @@ TEST(Controls, SamplesGoOnFromTheGovernorsNumberAndTheRateCanBeHadBack) {
   EXPECT_EQ(controls.perform(*set::find_action("samples_up")).said, "4 samples");
   controls.use_governed(9);  // of a picture before the press
   EXPECT_EQ(controls.perform(*set::find_action("samples_down")).said, "3 samples");
-  EXPECT_EQ(controls.perform(*set::find_action("hold_rate")).said, "25 pictures a second are held");
+  EXPECT_EQ(controls.perform(*set::find_action("hold_rate")).said, "holding 25 frames per second");
   EXPECT_TRUE(controls.look().governed);
   EXPECT_EQ(controls.look().samples, set.quality.samples) << "a refinement begins with the set's";
   set.quality.fps = 0;
@@ -137,7 +137,7 @@ TEST(Controls, StepsThroughTheVariantsOfTheSelectedObject) {
   EXPECT_EQ(shown("vase"), "red");
   EXPECT_TRUE(pipeline::scene_state(set, controls.look().edits).objects.empty()) << "not moved";
   EXPECT_EQ(press("next_variant"), "vase: variant \"blue\" (3 of 3)");
-  EXPECT_EQ(press("next_variant"), "vase: as its file has it (1 of 3)");
+  EXPECT_EQ(press("next_variant"), "vase: no variant (1 of 3)");
   EXPECT_EQ(shown("vase"), "");
   EXPECT_EQ(press("previous_variant"), "vase: variant \"blue\" (3 of 3)");
   press("next_object");
@@ -320,7 +320,7 @@ TEST(Controls, ALampThatIsGoneIsNotChangedNorAnotherInItsPlace) {
   desk.controls.use_found({});
   const Outcome outcome = desk("light_down");
   EXPECT_TRUE(outcome.refused);
-  EXPECT_EQ(outcome.said, "found 1 is not found in the light now");
+  EXPECT_EQ(outcome.said, "found 1 is not in the current light");
   EXPECT_TRUE(desk.controls.look().edits.lights.empty());
   EXPECT_EQ(desk("next_light").said, "lamp: key");
 }
@@ -400,9 +400,9 @@ TEST(Controls, APushEndsARefinementBeforeItsKindIsKnown) {
 TEST(Controls, AveragingOverFramesIsTheSetsUntilItIsSwitched) {
   Desk desk;
   EXPECT_TRUE(desk.controls.look().accumulates);
-  EXPECT_EQ(desk("accumulate").said, "averaging over frames off");
+  EXPECT_EQ(desk("accumulate").said, "frame averaging off");
   EXPECT_FALSE(desk.controls.look().accumulates);
-  EXPECT_EQ(desk("accumulate").said, "averaging over frames on");
+  EXPECT_EQ(desk("accumulate").said, "frame averaging on");
   set::Set set;
   set.quality.accumulate = false;
   EXPECT_FALSE(Controls(set).look().accumulates);

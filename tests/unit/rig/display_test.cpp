@@ -261,9 +261,9 @@ TEST_F(RigDisplay, WithoutAScreenTheRigGoesOnAndSaysSoOnce) {
         news_, lock, [&] { return pictures_.size() >= 20; },
         [&] { return std::to_string(pictures_.size()) + " pictures"; });
   });
-  const auto first = log_.find("tried again until it is there");
+  const auto first = log_.find("retrying until it is available");
   EXPECT_NE(first, std::string::npos) << log_;
-  EXPECT_EQ(log_.find("tried again until it is there", first + 1), std::string::npos);
+  EXPECT_EQ(log_.find("retrying until it is available", first + 1), std::string::npos);
   EXPECT_GT(metrics_.stages.at("screen").dropped.at("no display"), 0u);
 }
 

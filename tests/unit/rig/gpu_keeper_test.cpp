@@ -65,11 +65,11 @@ TEST_F(GpuKeeperTest, ALossIsReportedShownAndCountedUntilTheDeviceIsOpenAgain) {
   EXPECT_TRUE(keeper().renew(render::DeviceLost("render: device lost")));
   EXPECT_EQ(calls_, "drop open drop open drop open build ");
   EXPECT_EQ(log_.str(),
-            "render: device lost; it is opened again\nno device fits\npictures again, on a GPU\n");
+            "render: device lost; reopening it\nno device fits\nrendering again, on a GPU\n");
   EXPECT_EQ(count_of("device lost"), 1u);
-  EXPECT_EQ(count_of("device opened again"), 1u);
+  EXPECT_EQ(count_of("device reopened"), 1u);
   ASSERT_EQ(reports_.troubles().size(), 1u);  // long enough to be read
-  EXPECT_EQ(line_of(reports_.troubles()[0]), "graphics device: is lost; it is opened again");
+  EXPECT_EQ(line_of(reports_.troubles()[0]), "graphics card: is lost; reopening it");
   EXPECT_FALSE(reports_.troubles()[0].lasts);
 }
 
@@ -91,7 +91,7 @@ TEST_F(GpuKeeperTest, WithoutADeviceTheSetStartsAndTheRenderThreadWaitsForIt) {
   EXPECT_EQ(calls_, "open drop open drop open build ");
   EXPECT_TRUE(keeper.await());
   EXPECT_EQ(calls_, "open drop open drop open build ");
-  EXPECT_EQ(count_of("device lost"), count_of("device opened again"));
+  EXPECT_EQ(count_of("device lost"), count_of("device reopened"));
 }
 
 TEST_F(GpuKeeperTest, ThatTheCpuStandsInStaysOnTheDisplay) {
@@ -99,7 +99,8 @@ TEST_F(GpuKeeperTest, ThatTheCpuStandsInStaysOnTheDisplay) {
   EXPECT_TRUE(keeper().renew(render::DeviceLost("render: device lost")));
   ASSERT_EQ(reports_.troubles().size(), 1u);
   EXPECT_TRUE(reports_.troubles()[0].lasts);
-  EXPECT_EQ(line_of(reports_.troubles()[0]), "graphics device: is gone; the CPU draws, slowly");
+  EXPECT_EQ(line_of(reports_.troubles()[0]),
+            "graphics card: is gone; rendering on the CPU, slowly");
 }
 
 // Also in the set that comes next, and where the CPU stands in from the start.
@@ -107,7 +108,8 @@ TEST_F(GpuKeeperTest, ThatTheCpuStandsInIsShownFromTheStart) {
   stands_in_ = true;
   keeper().start();
   ASSERT_EQ(reports_.troubles().size(), 1u);
-  EXPECT_EQ(line_of(reports_.troubles()[0]), "graphics device: is gone; the CPU draws, slowly");
+  EXPECT_EQ(line_of(reports_.troubles()[0]),
+            "graphics card: is gone; rendering on the CPU, slowly");
   stands_in_ = false;
   keeper().start();
   EXPECT_FALSE(reports_.troubles().at(0).lasts);
@@ -118,7 +120,7 @@ TEST_F(GpuKeeperTest, AStopEndsTheAttempts) {
   stops_ = true;
   EXPECT_FALSE(keeper().renew(render::DeviceLost("render: device lost")));
   EXPECT_EQ(calls_, "drop open drop ");
-  EXPECT_EQ(count_of("device opened again"), 0u);
+  EXPECT_EQ(count_of("device reopened"), 0u);
   EXPECT_TRUE(reports_.troubles().at(0).lasts);
 }
 

@@ -61,11 +61,11 @@ TEST_P(RigIsolation, AStageThatFailsBeginsAnewAndTheTakeLacksNothing) {
     press("record");
     until_said("12A_take001 is finished");
   });
-  EXPECT_EQ(count_said(stage + ": has failed and begins anew; what is recorded goes on: lamp fell"),
+  EXPECT_EQ(count_said(stage + ": has failed and is restarting; recording continues: lamp fell"),
             2)  // what is thrown twice in a row is reported once
       << log_.text();
   EXPECT_EQ(metrics_.counts.at(stage + ": failed"), 4u);
-  EXPECT_EQ(metrics_.counts.at(stage + ": begun anew"), 2u);
+  EXPECT_EQ(metrics_.counts.at(stage + ": restarted"), 2u);
   EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
 
   const std::filesystem::path take = directory_ / "takes/12A_take001";
@@ -77,9 +77,8 @@ TEST_P(RigIsolation, AStageThatFailsBeginsAnewAndTheTakeLacksNothing) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Stages, RigIsolation,
-                         testing::Values("conversion", "tracking", "lighting",
-                                         "light of the picture", "render", "display",
-                                         "pictures in the take", "screen"),
+                         testing::Values("conversion", "tracking", "lighting", "picture lighting",
+                                         "render", "display", "composite recording", "screen"),
                          [](const auto& name) {
                            std::string word = name.param;
                            std::erase(word, ' ');
@@ -118,7 +117,7 @@ TEST_F(RigLive, TheCrewSeesThePlateInARefinementWhoseRendererIsMadeAnew) {
     until([](const Shown& s) { return s.shot.samples == 2; });
     press("refine");
     until_mode(Mode::refine);
-    until_counted("frames that tracking rested");
+    until_counted("frames not tracked in this mode");
     fails = true;
     const auto is_plate = [](const Shown& s) {
       return s.shot.untouched == "the renderer has failed" && s.look.state.mode == Mode::refine;
@@ -193,7 +192,7 @@ TEST_F(RigLive, ACameraThatThrowsIsAskedAgain) {
     press("record");
     until([](const Shown& s) { return s.look.state.recording; });
     throws = true;
-    until_said("has failed: lamp fell down; it is asked again");
+    until_said("has failed: lamp fell down; trying again");
     const int before = until([](const Shown&) { return true; }).count;
     until([&](const Shown& s) { return s.count > before + 8; });
     press("record");
@@ -321,7 +320,7 @@ TEST_F(RigLive, ABusThatIsRestartedIsJoinedAgain) {
     press("record");
     until([](const Shown& s) { return s.look.state.recording; });
     bus.stop();
-    until_said("bus: has failed and begins anew");
+    until_said("bus: has failed and is restarting");
     bus.start();
     test::must_come("the rig answers again", answers);
     press("record");
@@ -402,7 +401,7 @@ TEST_F(RigLive, ReviewsThatAreToggledFollowEachOther) {
     press("review");
     until([](const Shown& s) { return s.look.state.mode == Mode::review && s.shot.samples == 2; });
   });
-  EXPECT_EQ(log_.text().find("was left, because"), std::string::npos) << log_.text();
+  EXPECT_EQ(log_.text().find("reading interrupted"), std::string::npos) << log_.text();
 }
 
 }  // namespace isolation_test

@@ -28,7 +28,7 @@ TEST_F(RigLive, MayEndOrChangeItsSetInAReview) {
     };
     review("12A_take001");
     press("reload_set");
-    until_said("loading the set file again");
+    until_said("reloading the set file");
     review("12A_take002");
   });
   EXPECT_EQ(count_said("button review: review"), 2);
@@ -175,7 +175,7 @@ TEST_F(RigLive, VariantsAreShownRecordedReviewedAndKept) {
       return s.look.edits == pipeline::Edits{} && s.shot.samples == 2 && variant_of(s) == "-";
     });
     EXPECT_EQ(kept.shot.counters.built_trees, before.shot.counters.built_trees)
-        << "the set was read again";
+        << "the set was reloaded";
     EXPECT_GT(kept.shot.counters.uploaded_materials, before.shot.counters.uploaded_materials);
   });
   EXPECT_EQ(set::load_set(directory_ / "set.toml").objects[1].variant, "lamp");

@@ -83,7 +83,7 @@ TEST_F(LiveLightTest, IsMadeOfTheLightCamerasFrames) {
 TEST_F(LiveLightTest, AFrameThatCannotBeUsedIsReportedShownAndCounted) {
   LiveLight light(parts(), camera(), ObserverCalibration{});
   EXPECT_EQ(run(light, {grey(8, 1), grey(8, 2)}), nullptr);
-  EXPECT_EQ(log_.str().find("light: light frame 1 is left out"), 0u) << log_.str();
+  EXPECT_EQ(log_.str().find("light: light frame 1 is skipped"), 0u) << log_.str();
   EXPECT_EQ(log_.str().find("light frame 2"), std::string::npos) << "said twice";
   EXPECT_EQ(metrics_.snapshot(1).stages.at("lighting").dropped.at("not usable"), 2u);
   ASSERT_EQ(reports_.troubles().size(), 1u);
@@ -138,16 +138,16 @@ TEST(CountPicture, WhatIsOddIsCountedAndReportedOnce) {
   shot.counters.rebuilt_trees = 1;
   for (int times = 0; times < 2; ++times) count_picture(shot, metrics, reports);
   EXPECT_EQ(metrics.snapshot(1).counts.at("plate untouched: " + shot.untouched), 2u);
-  EXPECT_EQ(metrics.snapshot(1).counts.at("samples negative"), 6u);
-  EXPECT_EQ(metrics.snapshot(1).counts.at("samples not finite"), 0u);
-  EXPECT_EQ(metrics.snapshot(1).counts.at("paths cut off before their end"), 4u);
-  EXPECT_EQ(metrics.snapshot(1).counts.at("trees of deforming meshes built anew"), 2u);
+  EXPECT_EQ(metrics.snapshot(1).counts.at("negative samples"), 6u);
+  EXPECT_EQ(metrics.snapshot(1).counts.at("non-finite samples"), 0u);
+  EXPECT_EQ(metrics.snapshot(1).counts.at("paths cut short"), 4u);
+  EXPECT_EQ(metrics.snapshot(1).counts.at("trees of deforming meshes rebuilt"), 2u);
   EXPECT_EQ(log.str(), "plate untouched: pose lost: no tag in the picture\n");
-  for (const char* reason : {"no pose explains tags 3 and 17", "no pose explains tags 4 and 8"}) {
+  for (const char* reason : {"no pose fits tags 3 and 17", "no pose fits tags 4 and 8"}) {
     shot.untouched = reason;
     count_picture(shot, metrics, reports);
   }
-  EXPECT_EQ(metrics.snapshot(1).counts.at("plate untouched: no pose explains tags  and "), 2u);
+  EXPECT_EQ(metrics.snapshot(1).counts.at("plate untouched: no pose fits tags  and "), 2u);
 }
 
 }  // namespace live_light_test

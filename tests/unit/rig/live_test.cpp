@@ -193,8 +193,8 @@ TEST_F(RigLive, TrackingAndLightEstimationRestInARefinement) {
     until([](const Shown& s) { return s.shot.samples == 2; });
     press("refine");
     until_mode(Mode::refine);
-    until_counted("frames that tracking rested");
-    until_counted("light frames that estimation rested");
+    until_counted("frames not tracked in this mode");
+    until_counted("light frames not evaluated in this mode");
   });
 }
 
@@ -211,8 +211,8 @@ TEST_F(RigLive, TrackingDoesNotRestInATake) {
     press("live");
     until_mode(Mode::live);
   });
-  EXPECT_FALSE(metrics_.counts.contains("frames that tracking rested"));
-  EXPECT_FALSE(metrics_.counts.contains("light frames that estimation rested"));
+  EXPECT_FALSE(metrics_.counts.contains("frames not tracked in this mode"));
+  EXPECT_FALSE(metrics_.counts.contains("light frames not evaluated in this mode"));
 }
 
 // The press ends the refinement at once, but what it asks for is known only once it cannot become
@@ -294,8 +294,8 @@ TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
     until([](const Shown& s) { return s.shot.samples == 2; });
     std::ofstream(directory_ / "set.toml") << "[quality]\nsamples = none\n";
     press("reload_set");
-    until_said("the set stays as it was");
-    until_said("button reload_set: the set stays as it was: ");  // and so says the bus
+    until_said("the old set stays in use");
+    until_said("button reload_set: the old set stays in use: ");  // and so says the bus
     const int before = until([](const Shown&) { return true; }).count;
     until([&](const Shown& s) { return s.count > before + 2; });  // it goes on
     std::string other = good;
@@ -325,7 +325,7 @@ TEST_F(RigLive, ASetThatCannotStartIsTriedOnce) {
     until([](const Shown& s) { return s.shot.samples == 2; });
     std::ofstream(directory_ / "set.toml")
         << other("[observer]\n", "[observer]\nfaults = [\"nonsense\"]\n");
-    until_said("back to the set as it was");  // the rig saw the file by itself
+    until_said("back to the previous set");  // the rig saw the file by itself
     // What must not happen cannot be waited for: its next looks at the file, one a second.
     std::this_thread::sleep_for(std::chrono::seconds(4));
     EXPECT_EQ(count_said("back to"), 1) << log_.text();
@@ -339,7 +339,7 @@ TEST_F(RigLive, AFolderOfTakesThatCannotBeWrittenIsReportedBeforeATakeNeedsIt) {
   write_set("second_directory = \"second/takes\"\n");
   std::ofstream(directory_ / "second") << "a file where the disk's folder should be";
   const std::string trouble =
-      (directory_ / "second/takes").string() + ": takes cannot be written there: it is no folder";
+      (directory_ / "second/takes").string() + ": is not writable for takes: it is not a folder";
   run([&] {
     until_said(trouble);
     press("record");
@@ -384,7 +384,7 @@ TEST_F(RigLive, RecordsOnAfterARestartUntilSomebodyEndsIt) {
   });
   before = shown_.count;
   run([&] {
-    until_said("12A_take001 was cut off; recording goes on in the next take");
+    until_said("12A_take001 was cut off; recording continues in the next take");
     until_recorded(true);
     press("acknowledge");
     until_said("button acknowledge: noted");

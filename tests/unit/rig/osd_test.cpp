@@ -111,10 +111,11 @@ TEST(OsdWords, FreeSpaceWarnsBeforeItIsGone) {
 TEST(OsdWords, TrackingInTrouble) {
   PictureFacts picture = tracked();
   picture.tags = 1;
-  picture.tracking_trouble = "tag 7: not where the map says";
+  picture.tracking_trouble = "tag 7: not where the set file says";
   OsdPage page = osd_page(in(Mode::live), &picture, pace);
   EXPECT_EQ(page.bottom_right.front(), (OsdText{"1 tag · ±0.83 mm", OsdTone::warning}));
-  EXPECT_EQ(page.notices, (Texts{{"tracking: tag 7: not where the map says", OsdTone::warning}}));
+  EXPECT_EQ(page.notices,
+            (Texts{{"tracking: tag 7: not where the set file says", OsdTone::warning}}));
 
   picture = {};
   picture.tracking_trouble = "no tag in the picture";
@@ -140,16 +141,15 @@ TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
   rig.lost = {.frames = 12, .shown = 0, .records = 3};
   rig.disk_silent_s = 5.2;
   rig.news.push_back({report::Severity::warning, "", "still recording; end the take first"});
-  EXPECT_EQ(
-      osd_page(rig, &picture, pace).notices,
-      (Texts{{"film camera: was unplugged; it is opened anew", OsdTone::alarm},
-             {"light camera: is stalled", OsdTone::alarm},
-             {"recording ended: the disk is almost full", OsdTone::alarm},
-             {"the disk has not answered for 5 s", OsdTone::alarm},
-             {"missing from the take: 12 frames of the cameras", OsdTone::alarm},
-             {"missing from the take: 3 lines of tracking, buttons and events", OsdTone::alarm},
-             {moved},
-             {"still recording; end the take first", OsdTone::warning}}));
+  EXPECT_EQ(osd_page(rig, &picture, pace).notices,
+            (Texts{{"film camera: was unplugged; it is opened anew", OsdTone::alarm},
+                   {"light camera: is stalled", OsdTone::alarm},
+                   {"recording ended: the disk is almost full", OsdTone::alarm},
+                   {"disk not responding for 5 s", OsdTone::alarm},
+                   {"missing from the take: 12 camera frames", OsdTone::alarm},
+                   {"missing from the take: 3 tracking, button and event lines", OsdTone::alarm},
+                   {moved},
+                   {"still recording; end the take first", OsdTone::warning}}));
 }
 
 TEST(OsdWords, ADiskThatAnswersWithinTwoSecondsIsNoNews) {
@@ -189,7 +189,7 @@ TEST(OsdWords, ATrackingThatIsHeld) {
   shot.shown_pose = tracking::ShownPose{glm::dmat4(1), {}, 0.32};
   const PictureFacts facts = facts_of(shot);
   const OsdPage page = osd_page(in(Mode::live), &facts, pace);
-  EXPECT_EQ(page.bottom_right.at(0), (OsdText{"tracking held 0.3 s", OsdTone::warning}));
+  EXPECT_EQ(page.bottom_right.at(0), (OsdText{"predicted pose 0.3 s", OsdTone::warning}));
   EXPECT_EQ(page.notices, (Texts{{"tracking: no tag in the picture", OsdTone::warning}}));
 }
 

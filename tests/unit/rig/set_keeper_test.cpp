@@ -78,12 +78,12 @@ TEST_F(SetKeeperTest, ASetWithAFaultLeavesTheOldOneAndSaysWhy) {
   write("b.toml", "set.name = 3\n");
   const std::optional<std::string> why_not = change(sets, 0);
   ASSERT_TRUE(why_not);
-  EXPECT_EQ(why_not->find("the set stays as it was: "), 0u);
+  EXPECT_EQ(why_not->find("the old set stays in use: "), 0u);
   EXPECT_NE(why_not->find("b.toml:1:12: set.name: "), std::string::npos) << *why_not;
   EXPECT_EQ(why_not->find('\n'), std::string::npos);
   EXPECT_FALSE(sets.has_next());
   EXPECT_EQ(sets.running().set.name, "good");
-  EXPECT_TRUE(says("\nthe set stays as it was\n")) << log_.str();
+  EXPECT_TRUE(says("\nthe old set stays in use\n")) << log_.str();
   ASSERT_EQ(reports_.troubles().size(), 1u);
   EXPECT_EQ(line_of(reports_.troubles()[0]), *why_not);
   EXPECT_THROW(keeper(), Error);
@@ -118,7 +118,7 @@ TEST_F(SetKeeperTest, ASetThatDoesNotStartIsTriedOnce) {
   sets.begin_next();
   EXPECT_TRUE(sets.go_back("there is no camera"));
   EXPECT_EQ(sets.running().set.name, "old");
-  EXPECT_TRUE(says("there is no camera\nback to the set as it was: ")) << log_.str();
+  EXPECT_TRUE(says("there is no camera\nback to the previous set: ")) << log_.str();
   look(sets);
   look(sets);
   EXPECT_FALSE(sets.is_reading());
@@ -134,7 +134,7 @@ TEST_F(SetKeeperTest, ReadsNoPipe) {
   sets.begin_change(0);
   const std::optional<std::string> why_not = ended(sets);
   ASSERT_TRUE(why_not);
-  EXPECT_NE(why_not->find("is no file, but a folder, a pipe or a device"), std::string::npos)
+  EXPECT_NE(why_not->find("is not a file, but a folder, a pipe or a device"), std::string::npos)
       << *why_not;
   EXPECT_EQ(sets.running().set.name, "old");
 }
@@ -149,10 +149,10 @@ TEST_F(SetKeeperTest, AChangedSetThatIsDroppedIsReadAgain) {
     look(sets);
     ASSERT_TRUE(sets.is_reading());
     EXPECT_EQ(ended(sets), std::nullopt);
-    EXPECT_EQ(sets.drop_next("a take runs"), "the set stays as it was: a take runs");
+    EXPECT_EQ(sets.drop_next("a take runs"), "the old set stays in use: a take runs");
     EXPECT_FALSE(sets.has_next());
   }
-  EXPECT_TRUE(says("the set stays as it was: a take runs\n")) << log_.str();
+  EXPECT_TRUE(says("the old set stays in use: a take runs\n")) << log_.str();
 }
 
 constexpr const char* stage = R"(# The desk.
@@ -182,8 +182,8 @@ TEST_F(SetKeeperTest, ChangesOutlastTheSameFileAndNoOther) {
   sets.leave(edits);
   sets.begin_next();
   EXPECT_EQ(sets.edits(), a_stop_down("key"));
-  EXPECT_TRUE(says("\"gone\" was changed by buttons and is no longer in the set"));
-  EXPECT_TRUE(says("\"vase\" was changed by buttons and is no longer in the set"));
+  EXPECT_TRUE(says("\"gone\" was changed by buttons but is no longer in the set"));
+  EXPECT_TRUE(says("\"vase\" was changed by buttons but is no longer in the set"));
   change(sets, 1);
   sets.begin_next();
   EXPECT_EQ(sets.edits(), pipeline::Edits{});
@@ -254,7 +254,7 @@ TEST_F(SetKeeperTest, ChangesThatComeToNothingAreNotWritten) {
   edits.lights["key"].stops = 0;
   const std::optional<std::string> why_not = keep(sets, edits);
   ASSERT_TRUE(why_not);
-  EXPECT_NE(why_not->find("come to nothing"), std::string::npos) << *why_not;
+  EXPECT_NE(why_not->find("have no effect"), std::string::npos) << *why_not;
   EXPECT_FALSE(std::filesystem::exists(folder_ / "b.toml.1.old"));
 }
 
@@ -264,7 +264,7 @@ TEST_F(SetKeeperTest, KeepsNothingOverAChangedFile) {
   write("b.toml", std::string(stage) + "# by hand\n");
   const std::optional<std::string> why_not = keep(sets, a_stop_down("key"));
   ASSERT_TRUE(why_not);
-  EXPECT_NE(why_not->find("was changed since it was read"), std::string::npos) << *why_not;
+  EXPECT_NE(why_not->find("has changed since it was loaded"), std::string::npos) << *why_not;
   EXPECT_EQ(session::read_file(folder_ / "b.toml"), std::string(stage) + "# by hand\n");
   EXPECT_FALSE(sets.has_next());
 }

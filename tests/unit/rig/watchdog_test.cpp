@@ -45,7 +45,7 @@ TEST_F(RigLive, TheWatchdogStarvesWhileAThreadHangs) {
     systemd.until("WATCHDOG=1");
     {
       const std::lock_guard hang(gate);
-      until_said("does not answer any more: display");
+      until_said("stopped responding: display");
       systemd.skip();
       press("samples_up");  // the loop answers
       systemd.until("STATUS=button samples_up");
@@ -99,7 +99,7 @@ TEST(ServiceTest, AsksForMoreTimeUntilItIsReadyAndWhileItStops) {
   for (int times = 0; times < 3; ++times) systemd.until("EXTEND_TIMEOUT_USEC=");
   pulse.begin(std::chrono::milliseconds(-1));  // it hangs
   test::must_come("the hang is reported",
-                  [&] { return log.str() == "does not answer any more: main loop\n"; });
+                  [&] { return log.str() == "stopped responding: main loop\n"; });
   systemd.skip();
   EXPECT_EQ(systemd.next(300), "");
 }

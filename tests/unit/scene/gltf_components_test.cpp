@@ -33,7 +33,7 @@ TEST_F(GltfComponents, OfPositionsAreFloatsOrSmallIntegers) {
                         "with KHR_mesh_quantization integers of 1 or 2 bytes"));
   triangle<std::uint16_t>("POSITION", ushort_, "VEC3", {0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0}, false);
   EXPECT_THAT(load().notes,
-              ElementsAre(HasSubstr("POSITION of unsigned shorts belongs to KHR_mesh_quantization, "
+              ElementsAre(HasSubstr("POSITION of unsigned shorts needs KHR_mesh_quantization, "
                                     "which the file does not name in extensionsUsed")));
   gltf.json["extensionsUsed"] = {"KHR_mesh_quantization"};
   EXPECT_THAT(load().notes, IsEmpty());

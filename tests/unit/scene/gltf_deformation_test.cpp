@@ -192,7 +192,7 @@ TEST_F(GltfDeformations, AShapeThatCannotBeShownIsNotSeen) {
       scene.deformations[0].joints[joint].joint_from_mesh[3].x = far;
       const Placement placement = place(scene, {}, state);
       EXPECT_EQ(placement.instances[0].presence, 0u) << far;
-      EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" has no shape")));
+      EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" cannot be shown")));
     }
   }
 }
@@ -207,7 +207,7 @@ TEST_F(GltfDeformations, AShapeThatReachesTooFarIsNotSeen) {
   state.animation_s = 1;
   const Placement placement = place(scene, {}, state);
   EXPECT_EQ(placement.instances[0].presence, 0u);
-  EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" has no shape")));
+  EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" cannot be shown")));
 }
 
 // A joint may be anywhere if the weights of its vertices make up for it, but the bounds of the mesh
@@ -268,7 +268,8 @@ TEST_F(GltfDeformations, OfASkinsCopiesOneIsKept) {
   gltf.json["extensionsUsed"] = {"EXT_mesh_gpu_instancing"};
   const Scene scene = load();
   EXPECT_EQ(scene.instances.size(), 1u);
-  EXPECT_THAT(scene.notes, Contains(HasSubstr("a skin places its mesh; of its 3 copies one is")));
+  EXPECT_THAT(scene.notes,
+              Contains(HasSubstr("a skin places its mesh; only one of its 3 copies is")));
 }
 
 TEST_F(GltfDeformations, AreRefusedWhereTheyMakeNoSense) {
@@ -279,9 +280,9 @@ TEST_F(GltfDeformations, AreRefusedWhereTheyMakeNoSense) {
     gltf.json[Json::json_pointer(pointer)] = value;
     return error();
   };
-  EXPECT_THAT(refusal("/nodes/0/skin", 4), HasSubstr("there is no skin 4"));
+  EXPECT_THAT(refusal("/nodes/0/skin", 4), HasSubstr("no skin 4"));
   EXPECT_THAT(refusal("/skins/0/joints", {1}), HasSubstr("follows joint 1, but there are 1"));
-  EXPECT_THAT(refusal("/skins/0/joints", {1, 9}), HasSubstr("there is no node 9"));
+  EXPECT_THAT(refusal("/skins/0/joints", {1, 9}), HasSubstr("no node 9"));
   EXPECT_THAT(refusal("/skins/0/joints", {1, 2, 1}), HasSubstr("fewer inverse bind matrices"));
   EXPECT_THAT(refusal("/skins/0/inverseBindMatrices", 0), HasSubstr("4 by 4 floats"));
   gltf.json = sound;

@@ -75,8 +75,8 @@ TEST_F(GltfFiles, IgnoresRequiredExtensionsThatOnlyChangeLooks) {
     gltf.json[key] = {"KHR_materials_unlit"};
   EXPECT_THAT(load().notes,
               ElementsAre(HasSubstr("\"KHR_materials_unlit\", which the file requires, is not "
-                                    "supported; ignored: what should have one colour in any light "
-                                    "is lit like all else (materials: \"sign\")")));
+                                    "supported; ignored: unlit materials are lit like all others "
+                                    "(materials: \"sign\")")));
 }
 
 TEST_F(GltfFiles, RefusesOtherVersionsByName) {
@@ -173,8 +173,7 @@ TEST_F(GltfFiles, NamesFilesThatAreNoGltf) {
   set.objects = {object};
   EXPECT_THROW(
       try { scene::load_scene(set); } catch (const Error& thrown) {
-        EXPECT_THAT(thrown.what(),
-                    HasSubstr("missing.glb: cannot be opened: there is no such file"));
+        EXPECT_THAT(thrown.what(), HasSubstr("missing.glb: cannot be opened: file not found"));
         throw;
       },
       Error);

@@ -155,7 +155,7 @@ TEST_F(GltfMaterials, ReadsSheen) {
   use(sheen_of({{"sheenColorFactor", {0, 2, 0}}}));
   EXPECT_THAT(load().notes,
               ElementsAre(HasSubstr("\"velvet\": sheenColorFactor is out of range"),
-                          HasSubstr("\"velvet\": its sheenRoughnessFactor is taken as 0.07")));
+                          HasSubstr("\"velvet\": its sheenRoughnessFactor is raised to 0.07")));
 }
 
 TEST_F(GltfMaterials, ReadsAnisotropy) {
@@ -178,10 +178,9 @@ TEST_F(GltfMaterials, ReadsAnisotropy) {
   gltf.root("plain", gltf.triangle_mesh(pan));
   const scene::Scene scene = load();
   EXPECT_FALSE(scene::is_anisotropic(scene.materials.at(1)));
-  EXPECT_THAT(
-      scene.notes,
-      ElementsAre(HasSubstr("\"pan\": as it lets light through, its anisotropy is left out"),
-                  HasSubstr("has no TEXCOORD_0 that says which way its anisotropy runs")));
+  EXPECT_THAT(scene.notes,
+              ElementsAre(HasSubstr("\"pan\": it transmits light, so its anisotropy is ignored"),
+                          HasSubstr("has no TEXCOORD_0 for its anisotropy direction")));
 }
 
 TEST_F(GltfMaterials, ReadsTheColourOfGloss) {
@@ -212,8 +211,8 @@ TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
   EXPECT_EQ(m.roughness, 0);
   EXPECT_EQ(m.ior, 1);
   EXPECT_THAT(scene.notes,
-              Contains(HasSubstr("material 0 \"odd\": its base colour is out of range; brought to "
-                                 "the nearest allowed (2 times)")));
+              Contains(HasSubstr("material 0 \"odd\": its base colour is out of range; nearest "
+                                 "allowed value used (2 times)")));
   EXPECT_EQ(scene.notes.size(), 4u);
 }
 
@@ -391,7 +390,7 @@ TEST_F(GltfMaterials, LeavesOutExtensionsWhoseTextureCannotBeRead) {
   for (int i = 0; i < 5; ++i) {
     const std::string name = gltf.json["materials"][static_cast<std::size_t>(i)]["name"];
     EXPECT_THAT(scene.notes, Contains(HasSubstr("\"" + name + "\": " + name +
-                                                " is left out, since "
+                                                " is ignored, because "
                                                 "its texture cannot be read")));
   }
 }
@@ -443,7 +442,7 @@ TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
     return error();
   };
   EXPECT_EQ(message_of({{"uri", "lost.png"}}),
-            file + ": image 0 \"lost.png\": there is no such file, or it is empty");
+            file + ": image 0 \"lost.png\": not found, or empty");
   EXPECT_EQ(message_of({{"name", "text"},
                         {"uri", "data:text/plain;base64," + base64({'n', 'o', '!', '!'})}}),
             file + ": image 0 \"text\": is neither PNG nor JPEG");
@@ -500,7 +499,7 @@ TEST_F(GltfMaterials, LeavesOutTexturesInFormatsOfExtensions) {
   const scene::Scene scene = load();
   EXPECT_EQ(scene.materials.at(0).base_color_texture, scene::no_texture);
   EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("\"EXT_texture_webp\" is not supported; ignored"),
-                                       HasSubstr("texture 0: has no PNG or JPEG image; left out")));
+                                       HasSubstr("texture 0: has no PNG or JPEG image; ignored")));
 }
 
 // The levels of 2^27 texels have a third more.

@@ -184,7 +184,7 @@ TEST_F(GltfMesh, NotesEmptyMeshesAndSkipsThem) {
   EXPECT_THAT(scene.notes, Contains(HasSubstr("mesh 0: has no primitives; skipped")));
   EXPECT_THAT(scene.notes, Contains(HasSubstr("is empty; skipped")));
   EXPECT_THAT(scene.notes, Contains(HasSubstr("has no positions; skipped")));
-  EXPECT_THAT(scene.notes, Contains(HasSubstr("has nothing to see in it")));
+  EXPECT_THAT(scene.notes, Contains(HasSubstr("has nothing visible in it")));
 }
 
 TEST_F(GltfMesh, SharesGeometryBetweenNodesAndMaterials) {
@@ -229,8 +229,7 @@ TEST_F(GltfMesh, NamesFileMeshAndPrimitiveOfBadIndicesAndAccessors) {
   EXPECT_EQ(
       message_of({{"attributes", {{"POSITION", positions}}}, {"indices", gltf.indices({0, 1, 4})}}),
       at + ": index 4 is outside its 4 vertices");
-  EXPECT_EQ(message_of({{"attributes", {{"POSITION", 99}}}}),
-            at + ", positions: there is no accessor 99");
+  EXPECT_EQ(message_of({{"attributes", {{"POSITION", 99}}}}), at + ", positions: no accessor 99");
   EXPECT_EQ(message_of({{"attributes", {{"POSITION", gltf.uvs({3, {0, 0}})}}}}),
             at + ", positions: must have 3 components an element");
   EXPECT_EQ(message_of({{"attributes", {{"POSITION", positions}}},

@@ -139,7 +139,7 @@ TEST_F(GltfNodes, TakesTheDefaultSceneElseTheFirstElseAllRoots) {
   gltf.json["scene"] = 1;
   EXPECT_THAT(names(), ElementsAre("a", "child"));
   gltf.json["scene"] = 2;
-  EXPECT_THAT(error(), HasSubstr("its default scene 2 is not there"));
+  EXPECT_THAT(error(), HasSubstr("its default scene 2 does not exist"));
 }
 
 TEST_F(GltfNodes, FiltersByNameWithWhatHangsBelow) {
@@ -171,7 +171,7 @@ TEST_F(GltfNodes, RefusesWhatIsNoTree) {
   gltf.json["nodes"][1]["children"] = {0};
   EXPECT_THAT(error(), HasSubstr("has two parents or is its own ancestor"));
   gltf.json["nodes"][1]["children"] = {7};
-  EXPECT_THAT(error(), HasSubstr("there is no node 7"));
+  EXPECT_THAT(error(), HasSubstr("no node 7"));
   gltf.json["nodes"][1].erase("children");
   gltf.json["nodes"][1]["matrix"] = {1, 2, 3};
   EXPECT_THAT(error(), HasSubstr("node 1 \"b\": its transform has 3 numbers"));
@@ -251,7 +251,7 @@ TEST_F(GltfNodes, PutsLightsIntoTheWorld) {
   EXPECT_EQ(load().lights[0].gain_mixed, 0);
   EXPECT_EQ(load().lights[0].gain_real, 1);
   gltf.json["nodes"][0]["extensions"]["KHR_lights_punctual"]["light"] = 4;
-  EXPECT_THAT(error(), HasSubstr("node 0 \"lamp\": there is no light 4"));
+  EXPECT_THAT(error(), HasSubstr("node 0 \"lamp\": no light 4"));
 }
 
 }  // namespace gltf_node_test

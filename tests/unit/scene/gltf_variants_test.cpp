@@ -77,11 +77,11 @@ TEST_F(GltfVariants, TheSetChoosesOneByName) {
 TEST_F(GltfVariants, OneThatIsNotThereIsRefusedWithThoseThatAre) {
   add_triangle(painted());
   object.variant = "green";
-  EXPECT_THAT(error(), AllOf(HasSubstr("test.gltf: there is no variant \"green\""),
+  EXPECT_THAT(error(), AllOf(HasSubstr("test.gltf: no variant \"green\""),
                              HasSubstr("it has \"red\", \"blue\"")));
   gltf.json["extensions"].erase("KHR_materials_variants");
   gltf.json["meshes"][0]["primitives"][0].erase("extensions");
-  EXPECT_THAT(error(), HasSubstr("there is no variant \"green\"; it has none"));
+  EXPECT_THAT(error(), HasSubstr("no variant \"green\"; it has none"));
 }
 
 // Buttons change virtual objects only.
@@ -127,7 +127,7 @@ TEST_F(GltfVariants, NamesThatAreMissingOrRepeatedBecomeNumbers) {
   const scene::Scene scene = load();
   EXPECT_THAT(scene.variants.at(0).names, ElementsAre("red", "variant 2", "variant 3"));
   EXPECT_THAT(scene.notes,
-              Contains(HasSubstr("variant 1 has no name of its own; called \"variant 2\"")));
+              Contains(HasSubstr("variant 1 has no unique name; called \"variant 2\"")));
 }
 
 TEST_F(GltfVariants, DamagedOnesAreRefused) {
@@ -139,7 +139,8 @@ TEST_F(GltfVariants, DamagedOnesAreRefused) {
     gltf.json.erase("nodes");
     gltf.json.erase("scenes");
     add_triangle(mappings);
-    EXPECT_THAT(error(), AnyOf(HasSubstr("is not there"), HasSubstr("it must be a whole number")))
+    EXPECT_THAT(error(),
+                AnyOf(HasSubstr("a missing variant"), HasSubstr("it must be a whole number")))
         << mappings;
   }
 }

@@ -176,7 +176,7 @@ TEST(Placement, AVariantIsOfTheMaterialsOfItsObjectAlone) {
   EXPECT_EQ(placement.instances[2].material, 4u);
   ASSERT_EQ(placement.unknown.size(), 2u);
   EXPECT_EQ(placement.unknown[0],
-            "object \"torch\" was shown as its variant \"gilded\"; it has none such");
+            "object \"torch\" was shown in variant \"gilded\", which it does not have");
 }
 
 TEST(Placement, NamesTheSetHasNotAreTold) {

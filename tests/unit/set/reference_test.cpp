@@ -25,7 +25,7 @@ std::string contents(const std::filesystem::path& file) {
 
 TEST(SetReference, IsTheCommittedFile) {
   EXPECT_EQ(contents(config / "reference.toml"), reference_toml())
-      << "config/reference.toml is stale: write it anew with `ninja reference`";
+      << "config/reference.toml is stale: write it again with `ninja reference`";
 }
 
 // Prints every key's value in the set, in the file's form: equal prints are equal sets.

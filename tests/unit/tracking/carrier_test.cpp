@@ -119,7 +119,7 @@ TEST(Carriers, DoNotFindTheCamera) {
   const auto tracker = make_apriltag_tracker(held.settings, held.scene.lens);
   const Track track = tracker->track(picture(seen, random));
   EXPECT_EQ(track.status, TrackStatus::lost);
-  EXPECT_EQ(track.reason, "no tag of the stage in the picture");
+  EXPECT_EQ(track.reason, "no tag of this set in the picture");
   EXPECT_FALSE(track.carriers[0].pose);
 }
 

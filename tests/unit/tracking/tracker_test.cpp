@@ -95,7 +95,7 @@ TEST(Tracker, SaysWhyItIsLost) {
   EXPECT_NE(reason(empty).find("no tag"), std::string::npos);
   TagScene strange = scene;
   strange.tags = {flat_tag(77, 0.08, {0, 0, 0})};
-  EXPECT_NE(reason(strange).find("not in the map: tag 77"), std::string::npos);
+  EXPECT_NE(reason(strange).find("not in the set file: tag 77"), std::string::npos);
   TagScene larger = scene;
   larger.lens = test::plain_lens(500, 360, 450);
   EXPECT_NE(reason(larger).find("500x360"), std::string::npos);
@@ -132,7 +132,8 @@ TEST(Tracker, ReportsAMovedTag) {
   const Track track = tracker->track(picture(moved, random));
   ASSERT_EQ(track.status, TrackStatus::tracked) << track.reason;
   EXPECT_EQ(track.pose->tags, (std::vector<int>{0, 2, 3}));
-  EXPECT_NE(track.reason.find("tag 1: not where the map says"), std::string::npos) << track.reason;
+  EXPECT_NE(track.reason.find("tag 1: not where the set file says"), std::string::npos)
+      << track.reason;
   EXPECT_LT(distance(track.pose->world_from_camera, scene.world_from_camera), 0.003);
 }
 
@@ -145,7 +146,7 @@ TEST(Tracker, TwoTagsAtOddsAreNotGuessedAbout) {
   const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
   const Track track = tracker->track(picture(moved, random));
   EXPECT_EQ(track.status, TrackStatus::lost);
-  EXPECT_NE(track.reason.find("contradict"), std::string::npos) << track.reason;
+  EXPECT_NE(track.reason.find("disagree"), std::string::npos) << track.reason;
 }
 
 // Normalised errors of whole pictures: mean of n chi-squares of 6 degrees, standard error

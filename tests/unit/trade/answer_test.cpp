@@ -151,7 +151,7 @@ TEST(TradeAnswer, SaysTheRateThatIsShownWhereNoneHolds) {
   Simulated simulated;
   const auto answers = answer({25, 0.1}, {}, {}, {}, simulated.probe(1000));
   EXPECT_FALSE(answers[0].is_met);
-  EXPECT_NE(answers[0].words.find("more than this machine makes beside tracking and lighting"),
+  EXPECT_NE(answers[0].words.find("more than this machine can do beside tracking and lighting"),
             std::string::npos)
       << answers[0].words;
 }

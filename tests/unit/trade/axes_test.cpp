@@ -88,7 +88,7 @@ TEST(TradeAxes, CarriesEachFeatureThatIsNotNeededAndChangesNoPicture) {
   const std::uint32_t needed = gpu::FEATURE_GLOSSY | gpu::FEATURE_PHOTONS;
   const TradePlan plan = plan_trade({}, trade_axes({}, needed), {parts_axis});
   const auto& entries = plan.axes.at(0).entries;
-  EXPECT_EQ(entries.front().variant, "left out");
+  EXPECT_EQ(entries.front().variant, "off");
   std::size_t carried = 0;
   for (const render::Feature& feature : render::features()) {
     const auto entry = std::ranges::find(entries, feature.name, &TradePlan::Entry::variant);

@@ -165,7 +165,7 @@ TEST_F(Trade, RefusesWhatCannotBeTraded) {
   wrong.frame = test::small_take_unlit;
   expect_refused(wrong, "frame 0: no light frame");
   wrong.frame = 80;
-  expect_refused(wrong, "the last observer frame is 7");
+  expect_refused(wrong, "the last frame is 7");
   for (const double scale : {0.0, 1.5, std::nan("")}) {
     wrong = options();
     wrong.scale = scale;
@@ -173,10 +173,10 @@ TEST_F(Trade, RefusesWhatCannotBeTraded) {
   }
   wrong = options();
   wrong.directory = directory_ / "set.toml";
-  expect_refused(wrong, "is not a directory");
+  expect_refused(wrong, "is not a folder");
   wrong = options();
   wrong.axes = {"colour"};
-  expect_refused(wrong, "--axes colour: there is no such axis; estimator, ");
+  expect_refused(wrong, "--axes colour: unknown axis; estimator, ");
   wrong = options();
   wrong.samples = {0};
   expect_refused(wrong, "--samples 0: must be from 1");
@@ -245,7 +245,7 @@ TEST_F(Trade, GoesOnFromItsLastTable) {
   const TradeReport first = run_trade(once, out_);
   out_.str("");
   const TradeReport second = run_trade(once, out_);
-  EXPECT_NE(out_.str().find("goes on from the last table"), std::string::npos);
+  EXPECT_NE(out_.str().find("continuing the last table"), std::string::npos);
   EXPECT_EQ(out_.str().find("round 1 of 1"), std::string::npos) << out_.str();
   EXPECT_EQ(second.reference_samples, first.reference_samples);
   for (std::size_t m = 0; m < first.methods.size(); ++m)
@@ -266,7 +266,7 @@ TEST_F(Trade, GoesOnFromItsLastTable) {
   rewrite_set("[quality]", "[estimator]\nmax_depth = 3\n\n[quality]");
   out_.str("");
   run_trade(once, out_);
-  EXPECT_NE(out_.str().find("everything is measured anew"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("measuring everything again"), std::string::npos) << out_.str();
   EXPECT_NE(out_.str().find("round 1 of 2"), std::string::npos);
 }
 
@@ -279,12 +279,12 @@ TEST_F(Trade, ADamagedMemoryIsSaidAndNotUsed) {
   std::filesystem::resize_file(reference, std::filesystem::file_size(reference) / 2);
   out_.str("");
   run_trade(once, out_);
-  EXPECT_NE(out_.str().find("it ends early; everything is measured anew"), std::string::npos)
+  EXPECT_NE(out_.str().find("it ends early; measuring everything again"), std::string::npos)
       << out_.str();
   std::ofstream(directory_ / "out" / "trade.json") << "{]";
   out_.str("");
   EXPECT_NO_THROW(run_trade(once, out_));
-  EXPECT_NE(out_.str().find("everything is measured anew"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("measuring everything again"), std::string::npos) << out_.str();
 }
 
 }  // namespace trade_test
