@@ -20,6 +20,12 @@ struct CameraFromWorld {
   glm::dvec3 translation{0};
 };
 
+// Returns the rotation by |turn| rad about the axis `turn`.
+glm::dmat3 rotation_by(const glm::dvec3& turn);
+
+// Returns the rotation without the rounding errors of many products.
+glm::dmat3 orthonormal(const glm::dmat3& rotation);
+
 glm::dmat4 world_from_camera(const CameraFromWorld& pose);
 CameraFromWorld camera_from_world(const glm::dmat4& world_from_camera);
 // Returns the angle of the rotation between two poses, rad.
