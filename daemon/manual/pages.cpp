@@ -102,7 +102,7 @@ set file: The description of one stage: cameras, tags, objects, lamps and settin
 slate: The name of scene and shot, from which the names of takes are made.
 standby: The mode in which the screen is dark and nothing is rendered; the cameras stay open.
 tag: A printed AprilTag by which the film camera is located.
-take: A recording, from two seconds before the button was pressed until it was pressed again.
+take: A recording, by default from two seconds before the button was pressed until it was pressed again.
 variant: One of the looks of an object that its file names, with materials of its own (KHR_materials_variants).
 virtual object: A thing that exists only in the composite.
 )",

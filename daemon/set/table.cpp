@@ -215,7 +215,7 @@ Keys light_keys(LightDraft& d) {
       {"gain_real", &l.gain_real, gain, "Brightness on the real set: 1 for a real lamp, 0 for one that is added."},
       {"tint", &l.tint, gain, "Colour of its light in the composite over that on the real set: one factor for each of red, green and blue.", optional("[1.0, 0.8, 0.6]")},
       {"captured", &d.captured, plain, "Whether the light around the set shows this lamp too. It is then taken out of it, so that it does not shine twice, and dimming or removing it changes the light. Default: true for a lamp with gain_real above 0 and no carrier where the light comes from a light camera.", optional("false")},
-      {"cone_deg", &l.cone_rad, deg.within(0.01, 60), "With captured = true: what is taken out is a cone of this half angle around the lamp. Default: its outline as the light camera sees it, and 1 degree around that.", optional("5.0")},
+      {"cone_deg", &l.cone_rad, deg.within(0.01, 60), "With captured = true: what is taken out is a cone of this half angle around the lamp. Default: its outline as the light camera sees it, and 1 degree around that; for a lamp without a size, also the whole bright region there, if that is no larger than a cone of 10 degrees.", optional("5.0")},
   };
 }
 
