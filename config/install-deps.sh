@@ -24,7 +24,7 @@ packages=(
   # main loop, service, D-Bus
   libsystemd-dev dbus-daemon
   # tests
-  libgtest-dev libgmock-dev libbenchmark-dev libusbredirparser-dev groff-base poppler-utils
+  libgtest-dev libgmock-dev libusbredirparser-dev groff-base poppler-utils
   # package, and its test in a bare system
   dpkg-dev file lintian mmdebstrap systemd
 )

@@ -3,31 +3,22 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <opencv2/core.hpp>
 
+#include "daemon/tracking/least_squares.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
 namespace {
 
 using Selection = std::vector<std::vector<bool>>;
+using Residuals = std::vector<std::vector<glm::dvec2>>;
 
-constexpr int most_iterations = 200;
 constexpr int most_rejections = 10;
 constexpr double rejection_sigmas = 4.5;
 constexpr double least_rejection_px = 1;
 // This is the median of |e| for a two-dimensional Gaussian of deviation 1 (Rayleigh): sqrt(2 ln 2).
 constexpr double rayleigh_median = 1.1774;
-
-tracking::CameraFromWorld moved(const tracking::CameraFromWorld& pose, const double* step) {
-  const glm::dvec3 turn(step[0], step[1], step[2]);
-  const double angle = glm::length(turn);
-  const glm::dquat q =
-      angle > 0 ? glm::angleAxis(angle, turn / angle) : glm::dquat(1.0, 0.0, 0.0, 0.0);
-  return {glm::mat3_cast(glm::normalize(q * glm::quat_cast(pose.rotation))),
-          pose.translation + glm::dvec3(step[3], step[4], step[5])};
-}
 
 // If most of a view does not fit, the rest of the view cannot be trusted either.
 void leave_out_poor_views(Selection& used) {
@@ -41,50 +32,51 @@ constexpr double relative_step = 1e-5;
 
 class Problem {
  public:
-  Problem(const std::vector<View>& views, const Projection& projection)
-      : views_(views), projection_(projection) {}
+  // The normal equations are in the order lens, pose of view 0, 1, ...
+  struct Equations {
+    double cost = 0;      // infinite if a used corner cannot be seen
+    Residuals residuals;  // of every corner, used or not
+    cv::Mat1d information, gradient;
+  };
 
-  // Returns the residuals of every corner, used or not; nothing if a used corner cannot be seen.
-  std::optional<std::vector<std::vector<glm::dvec2>>> residuals(const Bundle& bundle,
-                                                                const Selection& used) const {
-    std::vector<std::vector<glm::dvec2>> all(views_.size());
+  Selection used;
+
+  // Selects the corners that the lens can see at the start; something mistaken for a board may
+  // start behind the camera.
+  Problem(const std::vector<View>& views, const Projection& projection, const Bundle& start)
+      : views_(views), projection_(projection) {
+    const Residuals seen = residuals(start);
+    for (const auto& view : seen) {
+      used.emplace_back();
+      for (const glm::dvec2& residual : view) used.back().push_back(std::isfinite(residual.x));
+    }
+    leave_out_poor_views(used);
+  }
+
+  Equations evaluate(const Bundle& bundle) const {
+    Equations equations{0, residuals(bundle), {}, {}};
+    for (std::size_t v = 0; v < used.size(); ++v)
+      for (std::size_t i = 0; i < used[v].size(); ++i)
+        if (used[v][i])
+          equations.cost += glm::dot(equations.residuals[v][i], equations.residuals[v][i]);
+    return equations;
+  }
+
+  Residuals residuals(const Bundle& bundle) const {
+    Residuals all(views_.size());
     for (std::size_t v = 0; v < views_.size(); ++v)
       for (std::size_t i = 0; i < views_[v].points.size(); ++i) {
         const auto pixel = projection_(bundle.lens, in_camera(bundle, v, i));
-        if (!pixel && used[v][i]) return std::nullopt;
         all[v].push_back(pixel ? views_[v].pixels[i] - *pixel : glm::dvec2(HUGE_VAL));
       }
     return all;
   }
 
-  // Selects the corners that the lens can see; something mistaken for a board may start behind the
-  // camera.
-  Selection visible(const Bundle& bundle) const {
-    Selection seen(views_.size());
-    for (std::size_t v = 0; v < views_.size(); ++v)
-      for (std::size_t i = 0; i < views_[v].points.size(); ++i)
-        seen[v].push_back(projection_(bundle.lens, in_camera(bundle, v, i)).has_value());
-    leave_out_poor_views(seen);
-    return seen;
-  }
-
-  static double cost(const std::vector<std::vector<glm::dvec2>>& residuals, const Selection& used) {
-    double sum = 0;
-    for (std::size_t v = 0; v < used.size(); ++v)
-      for (std::size_t i = 0; i < used[v].size(); ++i)
-        if (used[v][i]) sum += glm::dot(residuals[v][i], residuals[v][i]);
-    return sum;
-  }
-
-  // Builds the normal equations in the order lens, pose of view 0, 1, ...: information * step =
-  // gradient.
-  void linearise(const Bundle& bundle, const Selection& used,
-                 const std::vector<std::vector<glm::dvec2>>& residuals, cv::Mat1d& information,
-                 cv::Mat1d& gradient) const {
+  void linearise(const Bundle& bundle, Equations& equations) const {
     const int lens_size = int(bundle.lens.size());
     const int size = lens_size + 6 * int(views_.size());
-    information = cv::Mat1d::zeros(size, size);
-    gradient = cv::Mat1d::zeros(size, 1);
+    equations.information = cv::Mat1d::zeros(size, size);
+    equations.gradient = cv::Mat1d::zeros(size, 1);
     cv::Mat1d row(2, lens_size + 6);
     for (std::size_t v = 0; v < views_.size(); ++v) {
       const int first = lens_size + 6 * int(v);
@@ -92,14 +84,29 @@ class Problem {
       for (std::size_t i = 0; i < used[v].size(); ++i) {
         if (!used[v][i]) continue;
         derivative(bundle, v, i, row);
+        const glm::dvec2& off = equations.residuals[v][i];
         for (int a = 0; a < row.cols; ++a) {
-          gradient(column(a)) += row(0, a) * residuals[v][i].x + row(1, a) * residuals[v][i].y;
+          equations.gradient(column(a)) += row(0, a) * off.x + row(1, a) * off.y;
           for (int b = 0; b <= a; ++b)
-            information(column(a), column(b)) += row(0, a) * row(0, b) + row(1, a) * row(1, b);
+            equations.information(column(a), column(b)) +=
+                row(0, a) * row(0, b) + row(1, a) * row(1, b);
         }
       }
     }
-    cv::completeSymm(information, true);
+    cv::completeSymm(equations.information, true);
+  }
+
+  static Bundle moved(Bundle bundle, const cv::Mat1d& step) {
+    const int lens_size = int(bundle.lens.size());
+    for (int p = 0; p < lens_size; ++p) bundle.lens[std::size_t(p)] += step(p);
+    for (std::size_t v = 0; v < bundle.poses.size(); ++v) {
+      const double* by = step[lens_size + 6 * int(v)];
+      tracking::CameraFromWorld& pose = bundle.poses[v];
+      pose.rotation =
+          tracking::orthonormal(tracking::rotation_by({by[0], by[1], by[2]}) * pose.rotation);
+      pose.translation += glm::dvec3(by[3], by[4], by[5]);
+    }
+    return bundle;
   }
 
  private:
@@ -160,76 +167,14 @@ class Problem {
   const Projection& projection_;
 };
 
-Bundle stepped(const Bundle& bundle, const cv::Mat1d& step) {
-  Bundle next = bundle;
-  const int lens_size = int(bundle.lens.size());
-  for (int p = 0; p < lens_size; ++p) next.lens[std::size_t(p)] += step(p);
-  for (std::size_t v = 0; v < bundle.poses.size(); ++v)
-    next.poses[v] = moved(bundle.poses[v], step[lens_size + 6 * int(v)]);
-  return next;
-}
-
-// Returns the scales that bring the diagonal to 1, so that pixels and polynomial coefficients have
-// equal weight.
-cv::Mat1d scales(const cv::Mat1d& information) {
-  cv::Mat1d scale(information.rows, 1);
-  for (int i = 0; i < information.rows; ++i)
-    scale(i) = information(i, i) > 0 ? 1 / std::sqrt(information(i, i)) : 1;
-  return scale;
-}
-
-// Holds the poses of views without a used corner: their block is set to 1.
-void hold_unseen(cv::Mat1d& information) {
-  for (int i = 0; i < information.rows; ++i)
-    if (information(i, i) == 0) information(i, i) = 1;
-}
-
-// Runs Levenberg-Marquardt (Nocedal and Wright, "Numerical Optimization", 10.3), damped on the
-// diagonal.
-Bundle minimised(const Problem& problem, Bundle bundle, const Selection& used) {
-  auto residuals = problem.residuals(bundle, used);
-  if (!residuals) throw Error("the board's corners lie where no lens can see them");
-  double cost = Problem::cost(*residuals, used), damping = 1e-3;
-  cv::Mat1d information, gradient, step;
-  for (int i = 0; i < most_iterations; ++i) {
-    problem.linearise(bundle, used, *residuals, information, gradient);
-    hold_unseen(information);
-    const cv::Mat1d scale = scales(information);
-    const cv::Mat1d scaled = information.mul(scale * scale.t());
-    double gain = 0;
-    for (; damping < 1e12; damping *= 10) {
-      const cv::Mat1d damped = scaled + damping * cv::Mat1d::eye(scaled.size());
-      if (!cv::solve(damped, gradient.mul(scale), step, cv::DECOMP_CHOLESKY)) continue;
-      const Bundle next = stepped(bundle, step.mul(scale));
-      const auto tried = problem.residuals(next, used);
-      const double tried_cost = tried ? Problem::cost(*tried, used) : HUGE_VAL;
-      if (!(tried_cost <= cost)) continue;
-      gain = cost - tried_cost;
-      cost = tried_cost;
-      bundle = next;
-      residuals = tried;
-      damping = std::max(damping / 10, 1e-12);
-      break;
-    }
-    if (gain <= 1e-12 * cost) return bundle;
-  }
-  return bundle;
-}
-
-double rms(const std::vector<std::vector<glm::dvec2>>& residuals, const Selection* used) {
+double rms(const Residuals& residuals, std::size_t corners) {
   double sum = 0;
-  std::size_t count = 0;
-  for (std::size_t v = 0; v < residuals.size(); ++v)
-    for (std::size_t i = 0; i < residuals[v].size(); ++i) {
-      if (used && !(*used)[v][i]) continue;
-      sum += glm::dot(residuals[v][i], residuals[v][i]);
-      ++count;
-    }
-  return count ? std::sqrt(sum / double(count)) : 0;
+  for (const auto& view : residuals)
+    for (const glm::dvec2& residual : view) sum += glm::dot(residual, residual);
+  return std::sqrt(sum / double(corners));
 }
 
-double robust_sigma_px(const std::vector<std::vector<glm::dvec2>>& residuals,
-                       const Selection& used) {
+double robust_sigma_px(const Residuals& residuals, const Selection& used) {
   std::vector<double> lengths;
   for (std::size_t v = 0; v < residuals.size(); ++v)
     for (std::size_t i = 0; i < residuals[v].size(); ++i)
@@ -239,7 +184,7 @@ double robust_sigma_px(const std::vector<std::vector<glm::dvec2>>& residuals,
   return *middle / rayleigh_median;
 }
 
-Selection within(const std::vector<std::vector<glm::dvec2>>& residuals, double limit_px) {
+Selection within(const Residuals& residuals, double limit_px) {
   Selection used(residuals.size());
   for (std::size_t v = 0; v < residuals.size(); ++v)
     for (const glm::dvec2& residual : residuals[v])
@@ -258,37 +203,40 @@ std::vector<double> block(const cv::Mat1d& matrix, int first, int size) {
 
 // Returns the covariance of all parameters, (J^T J)^-1 sigma^2.
 cv::Mat1d covariance(const Problem& problem, const BundleFit& fit) {
-  cv::Mat1d information, gradient, inverse;
-  problem.linearise(fit.bundle, fit.used, fit.residuals, information, gradient);
-  hold_unseen(information);
-  const cv::Mat1d scale = scales(information);
-  if (!cv::invert(information.mul(scale * scale.t()), inverse, cv::DECOMP_CHOLESKY))
+  Problem::Equations equations{0, fit.residuals, {}, {}};
+  problem.linearise(fit.bundle, equations);
+  const auto inverse = tracking::inverse_of(equations.information);
+  if (!inverse)
     throw Error(
         "the views are too alike to fit a lens: film the board tilted, close, and all over the "
         "picture");
-  return inverse.mul(scale * scale.t()) * (fit.sigma_px * fit.sigma_px);
+  return *inverse * (fit.sigma_px * fit.sigma_px);
 }
 
 }  // namespace
 
 BundleFit fit_bundle(const std::vector<View>& views, Bundle start, const Projection& projection) {
-  const Problem problem(views, projection);
+  Problem problem(views, projection, start);
   BundleFit fit;
   fit.bundle = std::move(start);
-  Selection used = problem.visible(fit.bundle);
+  double squares = 0;
   for (int round = 0; round < most_rejections; ++round) {
-    fit.bundle = minimised(problem, fit.bundle, used);
-    fit.residuals = *problem.residuals(fit.bundle, used);
-    const double limit = rejection_sigmas * robust_sigma_px(fit.residuals, used);
-    const Selection next = within(fit.residuals, std::max(limit, least_rejection_px));
-    if (next == used) break;
-    used = next;
+    auto minimum = tracking::least_squares(problem, std::move(fit.bundle), {.most_trials = 200});
+    if (minimum.why == tracking::Stopped::outside)
+      throw Error("the board's corners lie where no lens can see them");
+    fit.bundle = std::move(minimum.at);
+    fit.residuals = std::move(minimum.equations.residuals);
+    squares = minimum.equations.cost;
+    fit.used = problem.used;
+    const double limit = rejection_sigmas * robust_sigma_px(fit.residuals, fit.used);
+    problem.used = within(fit.residuals, std::max(limit, least_rejection_px));
+    if (problem.used == fit.used) break;
   }
 
   std::size_t views_used = 0;
-  for (std::size_t v = 0; v < used.size(); ++v) {
-    const auto count = std::size_t(std::ranges::count(used[v], true));
-    fit.corners += used[v].size();
+  for (std::size_t v = 0; v < fit.used.size(); ++v) {
+    const auto count = std::size_t(std::ranges::count(fit.used[v], true));
+    fit.corners += fit.used[v].size();
     fit.corners_used += count;
     if (count) ++views_used;
     if (!count) fit.views_left_out.push_back(v);
@@ -296,10 +244,9 @@ BundleFit fit_bundle(const std::vector<View>& views, Bundle start, const Project
   const double freedom =
       2.0 * double(fit.corners_used) - double(fit.bundle.lens.size()) - 6.0 * double(views_used);
   if (!(freedom > 0)) throw Error("fewer corners than lens parameters; film more views");
-  fit.used = used;
-  fit.rms_px = rms(fit.residuals, &used);
-  fit.rms_all_px = rms(fit.residuals, nullptr);
-  fit.sigma_px = std::sqrt(Problem::cost(fit.residuals, used) / freedom);
+  fit.rms_px = std::sqrt(squares / double(fit.corners_used));
+  fit.rms_all_px = rms(fit.residuals, fit.corners);
+  fit.sigma_px = std::sqrt(squares / freedom);
   const cv::Mat1d all = covariance(problem, fit);
   const int lens_size = int(fit.bundle.lens.size());
   fit.lens_covariance = block(all, 0, lens_size);

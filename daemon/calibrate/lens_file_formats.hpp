@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "daemon/calibrate/lens_file.hpp"
+#include "daemon/calibrate/file_lens.hpp"
 
 namespace previz::calibrate::lens_formats {
 

@@ -12,6 +12,7 @@
 #include <optional>
 #include <vector>
 
+#include "daemon/tracking/least_squares.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
@@ -135,36 +136,41 @@ glm::dvec3 pinhole_direction(const PinholeIntrinsics& lens, const glm::dvec2& pi
   return glm::normalize(glm::dvec3(*normalised, 1));
 }
 
-constexpr int fisheye_size = 8;  // fx, fy, cx, cy, k1..k4
+struct FisheyeProblem {
+  using Equations = tracking::NormalEquations<8>;  // fx, fy, cx, cy, k1..k4
+  const std::vector<Ray>& rays;
 
-// One step of Gauss-Newton; returns the sum of squares before it.
-double step_fisheye(const std::vector<Ray>& rays, FisheyeIntrinsics& lens) {
-  cv::Mat1d jacobian(2 * int(rays.size()), fisheye_size, 0.0), residual(2 * int(rays.size()), 1), x;
-  for (int i = 0; i < int(rays.size()); ++i) {
-    const auto& [pixel, direction] = rays[std::size_t(i)];
-    const double off_z = std::hypot(direction.x, direction.y);
-    const double angle = std::atan2(off_z, direction.z);
-    const glm::dvec2 around =
-        off_z > 0 ? glm::dvec2(direction.x, direction.y) / off_z : glm::dvec2(0);
-    const glm::dvec2 off = pixel - fisheye_pixel(lens, direction);
-    for (int axis = 0; axis < 2; ++axis) {
-      const int row = 2 * i + axis;
-      const double focal = axis ? lens.fy : lens.fx, centre = axis ? lens.cy : lens.cx;
-      jacobian(row, axis) = (fisheye_pixel(lens, direction)[axis] - centre) / focal;
-      jacobian(row, 2 + axis) = 1;
-      for (int c = 0; c < 4; ++c)
-        jacobian(row, 4 + c) = focal * around[axis] * std::pow(angle, 2 * c + 3);
-      residual(row) = off[axis];
+  Equations evaluate(const FisheyeIntrinsics& lens) const {
+    Equations sum;
+    for (const auto& [pixel, direction] : rays) {
+      const double off_z = std::hypot(direction.x, direction.y);
+      const double angle = std::atan2(off_z, direction.z);
+      const glm::dvec2 around =
+          off_z > 0 ? glm::dvec2(direction.x, direction.y) / off_z : glm::dvec2(0);
+      const glm::dvec2 drawn = fisheye_pixel(lens, direction), off = pixel - drawn;
+      cv::Matx<double, 2, 8> jacobian = cv::Matx<double, 2, 8>::zeros();
+      for (int axis = 0; axis < 2; ++axis) {
+        const double focal = axis ? lens.fy : lens.fx, centre = axis ? lens.cy : lens.cx;
+        jacobian(axis, axis) = (drawn[axis] - centre) / focal;
+        jacobian(axis, 2 + axis) = 1;
+        for (int c = 0; c < 4; ++c)
+          jacobian(axis, 4 + c) = focal * around[axis] * std::pow(angle, 2 * c + 3);
+      }
+      sum.add(jacobian, cv::Matx21d(off.x, off.y));
+      sum.cost += glm::dot(off, off);
     }
+    return sum;
   }
-  cv::solve(jacobian, residual, x, cv::DECOMP_SVD);
-  lens.fx += x(0);
-  lens.fy += x(1);
-  lens.cx += x(2);
-  lens.cy += x(3);
-  for (int c = 0; c < 4; ++c) lens.k[std::size_t(c)] += x(4 + c);
-  return residual.dot(residual);
-}
+
+  static FisheyeIntrinsics moved(FisheyeIntrinsics lens, const cv::Matx<double, 8, 1>& step) {
+    lens.fx += step(0);
+    lens.fy += step(1);
+    lens.cx += step(2);
+    lens.cy += step(3);
+    for (int c = 0; c < 4; ++c) lens.k[std::size_t(c)] += step(4 + c);
+    return lens;
+  }
+};
 
 double farthest_corner_rad(const PinholeIntrinsics& lens) {
   double angle = 0;
@@ -201,14 +207,7 @@ Refit<FisheyeIntrinsics> refit_as_fisheye(const PinholeIntrinsics& lens) {
   const auto rays = rays_of(lens.width, lens.height, fitted_side, direction_of);
   Refit<FisheyeIntrinsics> refit;
   refit.lens = {lens.width, lens.height, lens.fx, lens.fy, lens.cx, lens.cy};
-  double last = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < most_steps; ++i) {
-    FisheyeIntrinsics stepped = refit.lens;
-    const double squares = step_fisheye(rays, stepped);
-    if (!(squares < last)) break;
-    last = squares;
-    refit.lens = stepped;
-  }
+  refit.lens = tracking::least_squares(FisheyeProblem{rays}, refit.lens, {}).at;
   const double corner = farthest_corner_rad(lens);
   const double fold = monotonic_limit_rad(refit.lens.k);
   refit.lens.max_angle_rad = std::min(corner + 1e-6, fold * (1 - 1e-9));

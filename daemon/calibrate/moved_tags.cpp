@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 #include <opencv2/core.hpp>
 
 #include "daemon/calibrate/report.hpp"
+#include "daemon/tracking/least_squares.hpp"
 
 namespace previz::calibrate {
 namespace {
@@ -66,55 +66,44 @@ double cost_of(const OneTag& one, const Range& range, const glm::dmat4& place) {
   return sum;
 }
 
-// Moves a place by a rotation and a shift along the tag's own axes.
-glm::dmat4 shifted(const glm::dmat4& place, const cv::Vec6d& by) {
-  const glm::dvec3 w(by[0], by[1], by[2]);
-  const double angle = glm::length(w);
-  glm::dmat4 motion = angle > 0 ? glm::mat4_cast(glm::angleAxis(angle, w / angle)) : glm::dmat4(1);
-  motion[3] = glm::dvec4(by[3], by[4], by[5], 1);
-  return place * motion;
-}
+// Some of the sightings, with weights of the robust loss and derivatives by central differences.
+struct PlaceProblem {
+  const OneTag& one;
+  const Range& range;
 
-// Fits the place to some of the sightings: Gauss-Newton with weights of the robust loss,
-// derivatives by central differences.
-glm::dmat4 fitted_place(const OneTag& one, const Range& range, glm::dmat4 place) {
-  constexpr int rounds = 12;
-  constexpr double small = 1e-6;
-  const double scale = 8 * moved_loss * moved_loss;
-  double cost = cost_of(one, range, place), damping = 1e-4;
-  for (int round = 0; round < rounds; ++round) {
-    cv::Matx66d normal = cv::Matx66d::zeros();
-    cv::Vec6d rhs = cv::Vec6d::all(0);
-    for (std::size_t i = range.first; i < range.second; ++i) {
+  tracking::NormalEquations<6> evaluate(const glm::dmat4& place) const {
+    constexpr double small = 1e-6, scale = 8 * moved_loss * moved_loss;
+    tracking::NormalEquations<6> sum;
+    sum.cost = cost_of(one, range, place);
+    for (std::size_t i = range.first; i < range.second && std::isfinite(sum.cost); ++i) {
       const std::size_t s = one.sightings[i];
-      const Place r = off(one, s, place);
       cv::Matx<double, 8, 6> by;
       for (int c = 0; c < 6; ++c) {
         cv::Vec6d motion = cv::Vec6d::all(0);
         motion[c] = small;
         const Place slope =
-            (off(one, s, shifted(place, -motion)) - off(one, s, shifted(place, motion))) *
+            (off(one, s, moved(place, -motion)) - off(one, s, moved(place, motion))) *
             (1 / (2 * small));
         for (int k = 0; k < 8; ++k) by(k, c) = slope(k);
       }
+      const Place r = off(one, s, place);
       const double variance = variance_of(one, s);
-      const double weight = 1 / (variance * (1 + r.dot(r) / variance / scale));
-      normal += weight * by.t() * by;
-      rhs += weight * (by.t() * r);
+      sum.add(by, r, 1 / (variance * (1 + r.dot(r) / variance / scale)));
     }
-    for (int c = 0; c < 6; ++c) normal(c, c) *= 1 + damping;
-    const glm::dmat4 next = shifted(place, normal.inv(cv::DECOMP_CHOLESKY) * rhs);
-    const double next_cost = cost_of(one, range, next);
-    if (!(next_cost < cost)) {
-      damping *= 100;
-      continue;
-    }
-    const bool done = cost - next_cost < 1e-6 * cost;
-    cost = next_cost;
-    place = next;
-    if (done) break;
+    return sum;
   }
-  return place;
+
+  // Moves a place by a rotation and a shift along the tag's own axes.
+  static glm::dmat4 moved(const glm::dmat4& place, const cv::Matx61d& by) {
+    glm::dmat4 motion(tracking::rotation_by({by(0), by(1), by(2)}));
+    motion[3] = glm::dvec4(by(3), by(4), by(5), 1);
+    return place * motion;
+  }
+};
+
+glm::dmat4 fitted_place(const OneTag& one, const Range& range, const glm::dmat4& place) {
+  const tracking::LeastSquaresLimits limits{.most_trials = 12, .settled_gain = 1e-6};
+  return tracking::least_squares(PlaceProblem{one, range}, place, limits).at;
 }
 
 // A walk that is cut in two: a place before and one after.

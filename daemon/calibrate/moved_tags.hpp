@@ -4,9 +4,19 @@
 #include <optional>
 #include <string>
 
-#include "daemon/calibrate/tag_survey.hpp"
+#include "daemon/calibrate/tag_bundle.hpp"
 
 namespace previz::calibrate {
+
+// A tag that lies elsewhere in some pictures than in the others.
+struct MovedTag {
+  int id = 0;
+  // The last picture of its first place and the first one of its second; empty: no two places
+  // explain what was seen.
+  std::string until, since;
+  double distance_m = 0, angle_rad = 0;  // between the two places
+  double off_px = 0;                     // how far off its corners are where they are worst
+};
 
 // Returns the tag whose sightings are explained worst by one place, if there is one whose corners
 // moved by more than sighting_gate_px(): between two places, or without order. The cameras are

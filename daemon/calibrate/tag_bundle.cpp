@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
 #include <opencv2/core.hpp>
 
+#include "daemon/tracking/least_squares.hpp"
 #include "daemon/tracking/pose_starts.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
@@ -14,9 +14,8 @@
 namespace previz::calibrate {
 namespace {
 
-constexpr int tag_size = 7;         // rotation, shift, logarithm of the size
-constexpr double size_prior = 0.2;  // standard deviation of that logarithm
-constexpr int most_adjustments = 60;
+constexpr int tag_size = 7;          // rotation, shift, logarithm of the size
+constexpr double size_prior = 0.2;   // standard deviation of that logarithm
 constexpr double behind_cost = 1e4;  // of a coordinate, for a tag behind its camera
 
 using TagRow = cv::Matx<double, 8, tag_size>;
@@ -27,15 +26,6 @@ using TagVector = cv::Matx<double, tag_size, 1>;
 using LensRow = cv::Matx<double, 8, lens_size>;
 using CameraLens = cv::Matx<double, 6, lens_size>;
 using TagLens = cv::Matx<double, tag_size, lens_size>;
-
-glm::dmat3 turned_by(const glm::dvec3& w) {
-  const double angle = glm::length(w);
-  return angle > 0 ? glm::mat3_cast(glm::angleAxis(angle, w / angle)) : glm::dmat3(1.0);
-}
-
-glm::dmat3 orthonormal(const glm::dmat3& rotation) {
-  return glm::mat3_cast(glm::normalize(glm::quat_cast(rotation)));
-}
 
 // Computes the derivative of one pixel by the lens's parameters, which project a point of the
 // normalised image plane (OpenCV's documentation of calib3d gives the model).
@@ -122,11 +112,23 @@ class TagProblem {
     return sum;
   }
 
+  TagEquations evaluate(const TagsAndLens& at) const { return equations(at, false); }
+
+  void linearise(const TagsAndLens& at, TagEquations& all) const { all = equations(at, true); }
+
+  std::optional<TagsAndLens> stepped(const TagsAndLens& at, const TagEquations& all,
+                                     double damping) const {
+    cv::Mat1d matrix, rhs;
+    reduce(all, damping, matrix, rhs);
+    const auto steps = tracking::damped_step(matrix, rhs, 0);
+    return steps ? std::optional(after(at, all, damping, *steps)) : std::nullopt;
+  }
+
   // Returns where the lens's unknowns begin in the reduced equations, behind those of the tags.
   int lens_at() const { return tag_size * int(walk_.ids.size()); }
 
   // Returns the normal matrix and right side of tags and lens after the cameras are eliminated;
-  // unknowns that are held, or that nothing was seen of, have 1 on the diagonal.
+  // unknowns that are held, or that nothing was seen of, have rows of 0.
   void reduce(const TagEquations& all, double damping, cv::Mat1d& matrix, cv::Mat1d& rhs) const {
     const int size = lens_at() + lens_size;
     matrix = cv::Mat1d::zeros(size, size);
@@ -146,14 +148,6 @@ class TagProblem {
       if (!by_picture_[p].empty()) eliminate(all, p, damping, matrix, rhs);
     for (int r = 0; r < lens_at(); ++r)
       for (int c = lens_at(); c < size; ++c) matrix(c, r) = matrix(r, c);
-    for (int r = 0; r < size; ++r)
-      if (diagonal(all, r) == 0) matrix(r, r) = 1;
-  }
-
-  // Returns the diagonal of the normal matrix before the elimination; 0: the unknown is held.
-  double diagonal(const TagEquations& all, int row) const {
-    if (row >= lens_at()) return all.lens(row - lens_at(), row - lens_at());
-    return all.tags[std::size_t(row / tag_size)](row % tag_size, row % tag_size);
   }
 
   // Returns the unknowns after the step of tags and lens, and the steps of the cameras that follow.
@@ -168,7 +162,8 @@ class TagProblem {
       glm::dmat4& place = next.world_from_tag[t];
       const glm::dmat3 rotation(place);
       const glm::dvec3 shift = rotation * glm::dvec3(step[3], step[4], step[5]);
-      const glm::dmat3 turned = orthonormal(rotation * turned_by({step[0], step[1], step[2]}));
+      const glm::dmat3 turned =
+          tracking::orthonormal(rotation * tracking::rotation_by({step[0], step[1], step[2]}));
       for (int c = 0; c < 3; ++c) place[c] = glm::dvec4(turned[c], 0);
       place[3] += glm::dvec4(shift, 0);
       next.sizes_m[t] *= std::exp(step[6]);
@@ -182,8 +177,8 @@ class TagProblem {
       }
       const cv::Vec6d step = damped_inverse(all.cameras[p], damping) * rhs;
       tracking::CameraFromWorld& camera = next.cameras[p];
-      const glm::dmat3 turn = turned_by({step[0], step[1], step[2]});
-      camera.rotation = orthonormal(turn * camera.rotation);
+      const glm::dmat3 turn = tracking::rotation_by({step[0], step[1], step[2]});
+      camera.rotation = tracking::orthonormal(turn * camera.rotation);
       camera.translation = turn * camera.translation + glm::dvec3(step[3], step[4], step[5]);
     }
     return result;
@@ -323,48 +318,22 @@ class TagProblem {
 };
 
 // Returns the inverse of the reduced equations: the covariances of tags and lens.
-cv::Mat1d reduced_inverse(const TagProblem& problem, const TagEquations& all) {
-  cv::Mat1d matrix, rhs, inverse;
+cv::Mat1d reduced_inverse(const TagProblem& problem, const TagsAndLens& at) {
+  TagEquations all = problem.evaluate(at);
+  problem.linearise(at, all);
+  cv::Mat1d matrix, rhs;
   problem.reduce(all, 0, matrix, rhs);
-  // The diagonal is brought to 1, so that radians, metres and logarithms have equal weight.
-  cv::Mat1d scale(matrix.rows, 1);
-  for (int r = 0; r < matrix.rows; ++r)
-    scale(r) = matrix(r, r) > 0 ? 1 / std::sqrt(matrix(r, r)) : 1;
-  const cv::Mat1d scales_of_both = scale * scale.t();
-  if (!cv::invert(matrix.mul(scales_of_both), inverse, cv::DECOMP_CHOLESKY))
+  const auto inverse = tracking::inverse_of(matrix);
+  if (!inverse)
     throw Error("the pictures do not fix the tags' positions: film them from more sides");
-  inverse = inverse.mul(scales_of_both);
-  for (int r = 0; r < matrix.rows; ++r)
-    if (problem.diagonal(all, r) == 0) {
-      inverse.row(r).setTo(0);
-      inverse.col(r).setTo(0);
-    }
-  return inverse;
+  return *inverse;
 }
 
 }  // namespace
 
 TagsAndLens adjust_tags_and_lens(const TagWalk& walk, TagsAndLens at, const TagAdjustment& how) {
-  const TagProblem problem(walk, how);
-  double damping = 1e-3;
-  for (int i = 0; i < most_adjustments; ++i) {
-    const TagEquations all = problem.equations(at, true);
-    double gain = 0;
-    for (; damping < 1e9; damping *= 10) {
-      cv::Mat1d matrix, rhs, steps;
-      problem.reduce(all, damping, matrix, rhs);
-      if (!cv::solve(matrix, rhs, steps, cv::DECOMP_CHOLESKY)) continue;
-      TagsAndLens next = problem.after(at, all, damping, steps);
-      const double cost = problem.equations(next, false).cost;
-      if (!(cost <= all.cost)) continue;
-      gain = all.cost - cost;
-      at = std::move(next);
-      damping = std::max(damping / 10, 1e-9);
-      break;
-    }
-    if (gain <= 1e-9 * all.cost) break;
-  }
-  return at;
+  const tracking::LeastSquaresLimits limits{.settled_gain = 1e-9};
+  return tracking::least_squares(TagProblem(walk, how), std::move(at), limits).at;
 }
 
 TagPlaces adjust_tags(const TagWalk& walk, const PinholeIntrinsics& lens, TagPlaces places,
@@ -377,7 +346,7 @@ TagPlaces adjust_tags(const TagWalk& walk, const PinholeIntrinsics& lens, TagPla
 std::vector<TagCovariance> tag_covariances(const TagWalk& walk, const PinholeIntrinsics& lens,
                                            const TagPlaces& places, const TagAdjustment& how) {
   const TagProblem problem(walk, how);
-  const cv::Mat1d inverse = reduced_inverse(problem, problem.equations({places, lens}, true));
+  const cv::Mat1d inverse = reduced_inverse(problem, {places, lens});
   std::vector<TagCovariance> covariances(walk.ids.size());
   for (std::size_t t = 0; t < walk.ids.size(); ++t)
     for (int r = 0; r < tag_size; ++r)
@@ -389,7 +358,7 @@ std::vector<TagCovariance> tag_covariances(const TagWalk& walk, const PinholeInt
 
 LensMatrix lens_covariance(const TagWalk& walk, const TagsAndLens& at, const TagAdjustment& how) {
   const TagProblem problem(walk, how);
-  const cv::Mat1d inverse = reduced_inverse(problem, problem.equations(at, true));
+  const cv::Mat1d inverse = reduced_inverse(problem, at);
   LensMatrix covariance;
   for (int r = 0; r < lens_size; ++r)
     for (int c = 0; c < lens_size; ++c)
@@ -400,7 +369,7 @@ LensMatrix lens_covariance(const TagWalk& walk, const TagsAndLens& at, const Tag
 double chi_square(const TagWalk& walk, const TagsAndLens& at, const TagAdjustment& how) {
   TagAdjustment squares = how;
   squares.loss_scale = 0;
-  return TagProblem(walk, squares).equations(at, false).cost;
+  return TagProblem(walk, squares).evaluate(at).cost;
 }
 
 double sighting_gate_px(const TagSighting& sighting, double model_error_px) {

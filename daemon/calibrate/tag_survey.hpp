@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/calibrate/moved_tags.hpp"
 #include "daemon/calibrate/tag_bundle.hpp"
 
 namespace previz::calibrate {
@@ -37,16 +38,6 @@ struct SurveyedTag {
   int pictures = 0;                                     // that its place is based on
   double views_rad = 0;  // largest angle between two directions from which it was seen
   double rms_px = 0;     // of its corners' distances
-};
-
-// A tag that lies elsewhere in some pictures than in the others.
-struct MovedTag {
-  int id = 0;
-  // The last picture of its first place and the first one of its second; empty: no two places
-  // explain what was seen.
-  std::string until, since;
-  double distance_m = 0, angle_rad = 0;  // between the two places
-  double off_px = 0;                     // how far off its corners are where they are worst
 };
 
 struct TagSurvey {

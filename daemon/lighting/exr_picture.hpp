@@ -1,4 +1,4 @@
-// Reads linear RGB pictures from OpenEXR files: environments, and what the lighting stage dumps.
+// Reads linear RGB pictures from OpenEXR files, which are environments.
 #pragma once
 
 #include "daemon/lighting/linear_picture.hpp"

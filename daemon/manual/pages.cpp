@@ -102,7 +102,7 @@ set file: The description of one set: cameras, tags, objects, lamps and settings
 slate: The name of scene and shot, from which takes are named.
 standby: The mode in which the screen is dark and nothing is rendered; the cameras stay open.
 tag: A printed AprilTag by which the film camera is located.
-take: A recording, from two seconds before the button was pressed until it was pressed again.
+take: A recording, by default from two seconds before the button was pressed until it was pressed again.
 variant: One of an object's looks that its file defines, with its own materials (KHR_materials_variants).
 virtual object: A thing that exists only in the composite.
 )",

@@ -1,7 +1,8 @@
 // This table lists the renderer's features: the name of each, when a frame needs it, which bit the
 // shaders are specialised on, and what `previzd check` says about it. The pipelines, `check` and
 // `trade` all use this table (shaders/README.md, "Only what the scene requires"). A new feature of
-// materials is one row here and its shader.
+// materials needs a bit in shaders/lib/render_shared.h, a row here, and code that reads and draws
+// it.
 #pragma once
 
 #include <bitset>

@@ -38,7 +38,6 @@ class GpuKeeper {
   // Builds the renderer, and opens the device if it was lost before this set. Where there is none,
   // await() does both. Throws whatever else keeps the renderer from being built.
   void start();
-  bool is_built() const { return is_built_; }
 
   // Call these from the render thread: nobody waits for that thread, and frames still reach the
   // recorder. Both return false if a stop came first.

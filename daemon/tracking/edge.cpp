@@ -10,6 +10,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "daemon/tracking/least_squares.hpp"
 #include "daemon/tracking/photometry.hpp"
 #include "drivers/calibration/pinhole.hpp"
 
@@ -42,8 +43,7 @@ struct Sample {
 // pixel, but the fit would use it to absorb one side of a blur that is not Gaussian, which moves
 // the line by tenths.
 constexpr int kEndA = 0, kEndB = 1, kBlack = 2, kWhite = 3, kBlur = 4, kShade = 5, kParameters = 6;
-using Vector = cv::Vec<double, kParameters>;
-using Matrix = cv::Matx<double, kParameters, kParameters>;
+using Vector = cv::Matx<double, kParameters, 1>;
 
 // The priors' standard deviations, for parameters that short edges do not determine: relative
 // shading over the edge's length, and blur in px.
@@ -113,22 +113,22 @@ std::vector<Sample> gather(const Luminance& luminance, const PinholeIntrinsics& 
 }
 
 double predict(const Vector& p, const Sample& s, Vector* gradient) {
-  const double distance = (s.offset - p[kEndA] * (1 - s.along) - p[kEndB] * s.along) * s.scale;
+  const double distance = (s.offset - p(kEndA) * (1 - s.along) - p(kEndB) * s.along) * s.scale;
   double by_s, by_blur;
-  const double c = edge_coverage(distance, s.nx, s.ny, p[kBlur], &by_s, &by_blur, s.how);
-  const double plain = p[kBlack] + (p[kWhite] - p[kBlack]) * c;
-  const double shade = 1 + p[kShade] * (s.along - 0.5);
+  const double c = edge_coverage(distance, s.nx, s.ny, p(kBlur), &by_s, &by_blur, s.how);
+  const double plain = p(kBlack) + (p(kWhite) - p(kBlack)) * c;
+  const double shade = 1 + p(kShade) * (s.along - 0.5);
   const double light = plain * shade;
   const double slope = light < 1 ? 1 : 0;  // the sensor clips
   if (gradient) {
-    const double step = (p[kWhite] - p[kBlack]) * shade;
+    const double step = (p(kWhite) - p(kBlack)) * shade;
     const double by_distance = slope * step * by_s;
-    (*gradient)[kEndA] = -by_distance * (1 - s.along) * s.scale;
-    (*gradient)[kEndB] = -by_distance * s.along * s.scale;
-    (*gradient)[kBlack] = slope * shade * (1 - c);
-    (*gradient)[kWhite] = slope * shade * c;
-    (*gradient)[kBlur] = slope * step * by_blur;
-    (*gradient)[kShade] = slope * plain * (s.along - 0.5);
+    (*gradient)(kEndA) = -by_distance * (1 - s.along) * s.scale;
+    (*gradient)(kEndB) = -by_distance * s.along * s.scale;
+    (*gradient)(kBlack) = slope * shade * (1 - c);
+    (*gradient)(kWhite) = slope * shade * c;
+    (*gradient)(kBlur) = slope * step * by_blur;
+    (*gradient)(kShade) = slope * plain * (s.along - 0.5);
   }
   return std::min(light, 1.0);
 }
@@ -143,69 +143,50 @@ double tukey_weight(double r, double cutoff) {
   return q < 1 ? (1 - q) * (1 - q) : 0;
 }
 
-const Vector& prior_information() {
-  static const Vector v = [] {
-    Vector p = Vector::all(0);
-    p[kBlur] = 1 / (kBlurPrior * kBlurPrior);
-    p[kShade] = 1 / (kShadePrior * kShadePrior);
-    return p;
-  }();
-  return v;
-}
-
-struct System {
-  double cost = 0;
-  Matrix information = Matrix::zeros();
-  Vector rhs = Vector::all(0);
-};
-
-System linearise(std::vector<Sample>& samples, const Vector& p, double cutoff, double noise) {
-  System sum;
+NormalEquations<kParameters> linearise(std::vector<Sample>& samples, const Vector& p, double cutoff,
+                                       double noise) {
+  static const Vector priors(0, 0, 0, 0, 1 / (kBlurPrior * kBlurPrior),
+                             1 / (kShadePrior * kShadePrior));
+  NormalEquations<kParameters> sum;
   for (Sample& s : samples) {
     Vector g;
     const double r = s.value - predict(p, s, &g);
     s.weight = tukey_weight(r, cutoff);
     sum.cost += tukey_loss(r, cutoff);
     for (int i = 0; i < kParameters; ++i) {
-      sum.rhs[i] += s.weight * r * g[i];
-      for (int j = 0; j <= i; ++j) sum.information(i, j) += s.weight * g[i] * g[j];
+      sum.gradient(i) += s.weight * r * g(i);
+      for (int j = 0; j <= i; ++j) sum.information(i, j) += s.weight * g(i) * g(j);
     }
   }
   for (int i = 0; i < kParameters; ++i) {
-    const double prior = noise * noise * prior_information()[i];
-    sum.cost += 0.5 * prior * p[i] * p[i];
+    const double prior = noise * noise * priors(i);
+    sum.cost += 0.5 * prior * p(i) * p(i);
     sum.information(i, i) += prior;
-    sum.rhs[i] -= prior * p[i];
+    sum.gradient(i) -= prior * p(i);
     for (int j = 0; j < i; ++j) sum.information(j, i) = sum.information(i, j);
   }
   return sum;
 }
 
-// Runs Levenberg-Marquardt; returns false if the result is not finite.
-bool minimise(std::vector<Sample>& samples, double cutoff, double noise, int iterations,
-              Vector* p) {
-  double damping = 1e-3;
-  System now = linearise(samples, *p, cutoff, noise);
-  for (int i = 0; i < iterations && damping < 1e6; ++i) {
-    Matrix h = now.information;
-    for (int k = 0; k < kParameters; ++k) h(k, k) = h(k, k) * (1 + damping) + 1e-15;
-    const cv::Matx<double, kParameters, 1> step = h.solve(now.rhs, cv::DECOMP_CHOLESKY);
-    Vector next = *p + Vector(step.val);
-    next[kBlur] = std::clamp(std::abs(next[kBlur]), 1e-3, kMaxBlurPx);
-    next[kBlack] = std::max(next[kBlack], 0.0);
-    const System then = linearise(samples, next, cutoff, noise);
-    if (!std::isfinite(then.cost)) return false;
-    if (then.cost > now.cost) {
-      damping *= 10;
-      continue;
-    }
-    *p = next;
-    now = then;
-    damping = std::max(1e-9, damping * 0.1);
-    if (std::abs(step(kEndA)) + std::abs(step(kEndB)) < 1e-4) break;
+struct EdgeProblem {
+  std::vector<Sample>& samples;
+  double cutoff, noise;
+
+  NormalEquations<kParameters> evaluate(const Vector& p) const {
+    return linearise(samples, p, cutoff, noise);
   }
-  return true;
-}
+
+  static Vector moved(const Vector& p, const Vector& step) {
+    Vector next = p + step;
+    next(kBlur) = std::clamp(std::abs(next(kBlur)), 1e-3, kMaxBlurPx);
+    next(kBlack) = std::max(next(kBlack), 0.0);
+    return next;
+  }
+
+  static bool settled(const Vector& from, const Vector& to) {
+    return std::abs(to(kEndA) - from(kEndA)) + std::abs(to(kEndB) - from(kEndB)) < 1e-4;
+  }
+};
 
 double percentile(std::vector<double> values, double q) {
   const auto nth = values.begin() + std::ptrdiff_t(q * double(values.size() - 1));
@@ -234,10 +215,10 @@ Vector coarse_start(const std::vector<Sample>& samples) {
     for (int step = -kSearchSteps; step <= kSearchSteps; ++step) {
       const double shift = step * kSearchStepPx;
       Vector p = Vector::all(0);
-      p[kBlack] = percentile(values, 0.1);
-      p[kWhite] = bright;
-      p[kBlur] = 0.5;
-      p[kEndA] = p[kEndB] = shift;
+      p(kBlack) = percentile(values, 0.1);
+      p(kWhite) = bright;
+      p(kBlur) = 0.5;
+      p(kEndA) = p(kEndB) = shift;
       double squares = 0;
       for (const Sample& s : samples) {
         const double r = s.value - predict(p, s, nullptr);
@@ -250,7 +231,7 @@ Vector coarse_start(const std::vector<Sample>& samples) {
 }
 
 bool visible(const Vector& p) {
-  return srgb_encode(p[kWhite]) - srgb_encode(p[kBlack]) > kMinContrast;
+  return srgb_encode(p(kWhite)) - srgb_encode(p(kBlack)) > kMinContrast;
 }
 
 struct NormalAt {
@@ -329,30 +310,32 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
     if (samples.size() < 12) return *why = "cut by the picture's border", std::nullopt;
     if (round == 0) p = coarse_start(samples);
     if (!visible(p)) return *why = "without contrast", std::nullopt;
-    const double contrast = p[kWhite] - p[kBlack];
+    const double contrast = p(kWhite) - p(kBlack);
     const double least_noise = kMinNoise * contrast;
     // The cutoff is wide at first, so that a shifted start does not make outliers of good pixels.
     const double cutoff = round == 0 ? 10 * contrast : std::max(6 * noise, 0.15 * contrast);
-    if (!minimise(samples, cutoff, std::max(noise, least_noise), round == 0 ? 15 : 8, &p))
-      return *why = "impossible to fit", std::nullopt;
+    const auto minimum = least_squares(EdgeProblem{samples, cutoff, std::max(noise, least_noise)},
+                                       p, {round == 0 ? 15 : 8});
+    if (minimum.why == Stopped::outside) return *why = "impossible to fit", std::nullopt;
+    p = minimum.at;
     noise = std::max(least_noise, 1.4826 * median_residual(samples, p));
 
-    line = make_line(line.a + line.normal * p[kEndA], line.b + line.normal * p[kEndB],
+    line = make_line(line.a + line.normal * p(kEndA), line.b + line.normal * p(kEndB),
                      line.a + line.normal * 1e3);
-    total_shift += std::max(std::abs(p[kEndA]), std::abs(p[kEndB]));
-    if (round < 2) p[kEndA] = p[kEndB] = 0;
-    if (total_shift > 1.5 * kSearchPx + 2 * p[kBlur])
+    total_shift += std::max(std::abs(p(kEndA)), std::abs(p(kEndB)));
+    if (round < 2) p(kEndA) = p(kEndB) = 0;
+    if (total_shift > 1.5 * kSearchPx + 2 * p(kBlur))
       return *why = "not where the detector saw it", std::nullopt;
     // The fit stays clear of the next printed cell and of the corners by the reach of the blur, and
     // uses the same depth on both sides, so that a blur that is not Gaussian cannot shift the line.
-    const double free = std::min(guess.dark_depth_px, guess.bright_depth_px) - 0.5 - 2 * p[kBlur];
-    dark = bright = std::clamp(free, 1.2, 1.5 + 3 * p[kBlur]);
-    margin = std::min(0.25 * line.length, 1 + 2.5 * p[kBlur]);
+    const double free = std::min(guess.dark_depth_px, guess.bright_depth_px) - 0.5 - 2 * p(kBlur);
+    dark = bright = std::clamp(free, 1.2, 1.5 + 3 * p(kBlur));
+    margin = std::min(0.25 * line.length, 1 + 2.5 * p(kBlur));
   }
 
   if (!visible(p)) return *why = "without contrast", std::nullopt;
-  const double contrast = p[kWhite] - p[kBlack];
-  const System system = linearise(samples, p, std::max(6 * noise, 0.15 * contrast), noise);
+  const double contrast = p(kWhite) - p(kBlack);
+  const auto equations = linearise(samples, p, std::max(6 * noise, 0.15 * contrast), noise);
   double weight = 0, squares = 0;
   std::size_t outliers = 0;
   for (const Sample& s : samples) {
@@ -365,7 +348,7 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
   const double rms =
       std::max(kMinNoise * contrast, std::sqrt(squares / std::max(1.0, weight - kParameters)));
   if (rms > 0.2 * contrast) return *why = "unclear", std::nullopt;
-  const Matrix covariance = system.information.inv(cv::DECOMP_CHOLESKY) * (rms * rms);
+  const auto covariance = *inverse_of(equations.information, cv::DECOMP_SVD) * (rms * rms);
   // If many samples are clipped, the true white is only a guess, and with it the place where half
   // of it is reached: the variance grows.
   const auto whites = std::count_if(samples.begin(), samples.end(),
@@ -377,7 +360,7 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
   fit.var_a = covariance(kEndA, kEndA) + clipped;
   fit.cov_ab = covariance(kEndA, kEndB) + clipped / 2;
   fit.var_b = covariance(kEndB, kEndB) + clipped;
-  fit.blur_px = p[kBlur];
+  fit.blur_px = p(kBlur);
   fit.contrast = contrast;
   fit.noise = rms;
   if (!(fit.var_a > 0 && fit.var_b > 0)) return *why = "impossible to fit", std::nullopt;

@@ -6,6 +6,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <opencv2/core.hpp>
 
+#include "daemon/tracking/least_squares.hpp"
 #include "daemon/tracking/pose_starts.hpp"
 #include "drivers/calibration/pinhole.hpp"
 
@@ -18,7 +19,6 @@ constexpr double kCornerFloorPx = 0.03;
 constexpr double kDecisiveDrop = 4;
 
 using Vector6 = cv::Matx<double, 6, 1>;
-using Matrix6 = cv::Matx<double, 6, 6>;
 using Whitening = cv::Matx<double, 8, 8>;  // lower triangular; whitened = W * residual
 
 glm::dvec3 corner_in_world(const TagObservation& tag, std::size_t i) {
@@ -55,19 +55,18 @@ struct Prepared {
   Whitening whiten;
 };
 
-// Computes measured - projected (x0,y0,..) and, where asked for, the derivative by a small motion
-// of the camera.
+// Computes measured - projected (x0,y0,..) and the derivative by a small motion of the camera.
+// Returns false if the tag is behind the camera.
 bool residual(const Prepared& tag, const PinholeIntrinsics& lens, const CameraFromWorld& pose,
               cv::Matx<double, 8, 1>* r, cv::Matx<double, 8, 6>* jacobian) {
   for (std::size_t i = 0; i < 4; ++i) {
     const glm::dvec3 x = pose.rotation * tag.world[i] + pose.translation;
     if (!(x.z > 1e-9)) return false;
     glm::dmat2 by_ray;
-    const glm::dvec2 pixel = distort(lens, {x.x / x.z, x.y / x.z}, jacobian ? &by_ray : nullptr);
+    const glm::dvec2 pixel = distort(lens, {x.x / x.z, x.y / x.z}, &by_ray);
     const int row = int(2 * i);
     (*r)(row) = tag.corners[i].x - pixel.x;
     (*r)(row + 1) = tag.corners[i].y - pixel.y;
-    if (!jacobian) continue;
     const glm::dvec2 by_x = by_ray[0] / x.z, by_y = by_ray[1] / x.z;
     const glm::dvec2 by_z = -(by_ray[0] * x.x + by_ray[1] * x.y) / (x.z * x.z);
     for (int k = 0; k < 2; ++k) {
@@ -83,16 +82,6 @@ bool residual(const Prepared& tag, const PinholeIntrinsics& lens, const CameraFr
   return true;
 }
 
-CameraFromWorld moved(const CameraFromWorld& pose, const Vector6& step) {
-  const glm::dvec3 w(step(0), step(1), step(2)), v(step(3), step(4), step(5));
-  const double angle = glm::length(w);
-  const glm::dmat3 back =
-      angle > 0 ? glm::mat3_cast(glm::angleAxis(-angle, w / angle)) : glm::dmat3(1.0);
-  CameraFromWorld next{back * pose.rotation, back * (pose.translation - v)};
-  next.rotation = glm::mat3_cast(glm::normalize(glm::quat_cast(next.rotation)));
-  return next;
-}
-
 // The cost function: whitened squares, or a redescending loss of each tag's distance in px (Geman
 // and McClure), which drops tags at odds with the rest as `scale_px` shrinks.
 struct Loss {
@@ -100,11 +89,8 @@ struct Loss {
   double scale_px = 0;
 };
 
-struct Accumulated {
-  double cost = HUGE_VAL;
-  Matrix6 information = Matrix6::zeros();
-  Vector6 rhs = Vector6::zeros();
-};
+using Accumulated = NormalEquations<6>;
+using PoseMinimum = Minimum<CameraFromWorld, Accumulated>;
 
 class Problem {
  public:
@@ -124,75 +110,57 @@ class Problem {
   }
 
   Accumulated accumulate(const std::vector<std::size_t>& used, const CameraFromWorld& pose,
-                         Loss loss, bool derivatives) const {
+                         Loss loss) const {
     Accumulated sum;
-    double cost = 0;
     for (std::size_t index : used) {
       const Prepared& tag = tags_[index];
       cv::Matx<double, 8, 1> r;
       cv::Matx<double, 8, 6> j;
-      if (!residual(tag, lens_, pose, &r, derivatives ? &j : nullptr)) return {};
-      double weight = 1;
+      if (!residual(tag, lens_, pose, &r, &j)) {
+        sum.cost = HUGE_VAL;
+        return sum;
+      }
       if (loss.robust) {
         const double e2 = r.dot(r) / 4, c2 = loss.scale_px * loss.scale_px;
-        weight = c2 / (c2 + e2) * (c2 / (c2 + e2));
-        cost += 4 * e2 * c2 / (c2 + e2);
+        sum.add(j, r, c2 / (c2 + e2) * (c2 / (c2 + e2)));
+        sum.cost += 4 * e2 * c2 / (c2 + e2);
       } else {
         r = tag.whiten * r;
-        if (derivatives) j = tag.whiten * j;
-        cost += r.dot(r);
+        sum.add<8>(tag.whiten * j, r);
+        sum.cost += r.dot(r);
       }
-      if (!derivatives) continue;
-      sum.information += weight * (j.t() * j);
-      sum.rhs += weight * (j.t() * r);
     }
-    if (std::isfinite(cost)) sum.cost = cost;
     return sum;
   }
 
-  // Runs Levenberg-Marquardt until it stops. Returns nothing if the start is behind the camera.
-  std::optional<CameraFromWorld> minimise(const std::vector<std::size_t>& used,
-                                          CameraFromWorld pose, Loss loss, int iterations) const {
-    double damping = 1e-4;
-    Accumulated now = accumulate(used, pose, loss, true);
-    if (!std::isfinite(now.cost)) return std::nullopt;
-    for (int i = 0; i < iterations && damping < 1e10; ++i) {
-      Matrix6 h = now.information;
-      for (int k = 0; k < 6; ++k) h(k, k) += damping * h(k, k) + 1e-300;
-      const Vector6 step = h.solve(now.rhs, cv::DECOMP_CHOLESKY);
-      const CameraFromWorld next = moved(pose, step);
-      const Accumulated then = accumulate(used, next, loss, true);
-      if (!(then.cost <= now.cost)) {
-        damping *= 10;
-        continue;
-      }
-      const bool settled = now.cost - then.cost <= 1e-12 * now.cost;
-      pose = next;
-      now = then;
-      damping = std::max(1e-12, damping / 10);
-      if (settled) break;
-    }
-    return pose;
+  // Returns nothing if the start is behind the camera.
+  std::optional<PoseMinimum> minimise(const std::vector<std::size_t>& used,
+                                      const CameraFromWorld& start, Loss loss, int trials) const {
+    const auto minimum = least_squares(OfTags{*this, used, loss}, start, {trials, 1e-4});
+    return minimum.why == Stopped::outside ? std::nullopt : std::optional(minimum);
   }
 
  private:
+  struct OfTags {
+    const Problem& problem;
+    const std::vector<std::size_t>& used;
+    Loss loss;
+
+    Accumulated evaluate(const CameraFromWorld& pose) const {
+      return problem.accumulate(used, pose, loss);
+    }
+
+    static CameraFromWorld moved(const CameraFromWorld& pose, const Vector6& step) {
+      const glm::dmat3 back = rotation_by({-step(0), -step(1), -step(2)});
+      return {orthonormal(back * pose.rotation),
+              back * (pose.translation - glm::dvec3(step(3), step(4), step(5)))};
+    }
+  };
+
   const PinholeIntrinsics& lens_;
   const std::vector<TagObservation>& observations_;
   std::vector<Prepared> tags_;
 };
-
-// Inverts a positive definite matrix whose rows have different units.
-Matrix6 inverse_scaled(const Matrix6& m) {
-  Vector6 scale;
-  Matrix6 n = m;
-  for (int i = 0; i < 6; ++i) scale(i) = 1 / std::sqrt(std::max(m(i, i), 1e-300));
-  for (int i = 0; i < 6; ++i)
-    for (int j = 0; j < 6; ++j) n(i, j) *= scale(i) * scale(j);
-  n = n.inv(cv::DECOMP_SVD);
-  for (int i = 0; i < 6; ++i)
-    for (int j = 0; j < 6; ++j) n(i, j) *= scale(i) * scale(j);
-  return n;
-}
 
 double rms_px(const std::vector<TagObservation>& tags, const PinholeIntrinsics& lens,
               const CameraFromWorld& pose, const std::vector<std::size_t>& used) {
@@ -204,18 +172,16 @@ double rms_px(const std::vector<TagObservation>& tags, const PinholeIntrinsics& 
   return std::sqrt(squares / double(used.size()));
 }
 
-FittedPose describe(const Problem& problem, const std::vector<TagObservation>& tags,
-                    const PinholeIntrinsics& lens, const CameraFromWorld& pose,
-                    const std::vector<std::size_t>& used) {
+FittedPose describe(const PoseMinimum& minimum, const std::vector<TagObservation>& tags,
+                    const PinholeIntrinsics& lens, const std::vector<std::size_t>& used) {
   FittedPose fit;
-  fit.pose = pose;
+  fit.pose = minimum.at;
   fit.used = used;
-  const Accumulated sum = problem.accumulate(used, pose, {}, true);
-  fit.chi_square = sum.cost;
+  fit.chi_square = minimum.equations.cost;
   fit.degrees_of_freedom = int(8 * used.size()) - 6;
-  fit.rms_px = rms_px(tags, lens, pose, used);
-  const Matrix6 covariance = inverse_scaled(sum.information);
-  std::copy(covariance.val, covariance.val + 36, fit.covariance.begin());
+  fit.rms_px = rms_px(tags, lens, fit.pose, used);
+  const auto covariance = inverse_of(minimum.equations.information, cv::DECOMP_SVD);
+  if (covariance) std::copy(covariance->val, covariance->val + 36, fit.covariance.begin());
   return fit;
 }
 
@@ -235,9 +201,9 @@ std::vector<FittedPose> minima(const Problem& problem, const std::vector<TagObse
                                const std::vector<CameraFromWorld>& starts) {
   std::vector<FittedPose> found;
   for (const CameraFromWorld& start : starts) {
-    const auto pose = problem.minimise(used, start, {}, 50);
-    if (!pose) continue;
-    FittedPose fit = describe(problem, tags, lens, *pose, used);
+    const auto minimum = problem.minimise(used, start, {}, 50);
+    if (!minimum) continue;
+    FittedPose fit = describe(*minimum, tags, lens, used);
     if (!std::isfinite(fit.rms_px)) continue;
     if (std::none_of(found.begin(), found.end(),
                      [&](const FittedPose& f) { return same_pose(f.pose, fit.pose); }))
@@ -272,13 +238,13 @@ std::optional<CameraFromWorld> agree(const Problem& problem,
   const double gate_px = consistency_gate_px(lens);
   const double widest = 0.5 * (lens.width + lens.height);
   double scale = std::clamp(2 * errors[errors.size() / 2], gate_px, std::max(gate_px, widest));
-  std::optional<CameraFromWorld> pose = start;
-  while (pose) {
-    pose = problem.minimise(all, *pose, {true, scale}, 6);
-    if (scale <= 0.5 * gate_px) break;
+  CameraFromWorld pose = start;
+  while (const auto minimum = problem.minimise(all, pose, {true, scale}, 6)) {
+    pose = minimum->at;
+    if (scale <= 0.5 * gate_px) return pose;
     scale = std::max(0.5 * gate_px, scale / 2.5);
   }
-  return pose;
+  return std::nullopt;
 }
 
 struct Consensus {
@@ -293,19 +259,19 @@ void let_go(const Problem& problem, const std::vector<TagObservation>& tags,
   while (consensus->used.size() >= 3) {
     const auto joint = problem.minimise(consensus->used, consensus->pose, {}, 30);
     if (!joint) return;
-    const double limit = rms_px(tags, lens, *joint, consensus->used) / kDecisiveDrop;
+    const double limit = rms_px(tags, lens, joint->at, consensus->used) / kDecisiveDrop;
     if (limit < kCornerFloorPx) return;
     Consensus least;
     double least_rms = limit;
     for (std::size_t i = 0; i < consensus->used.size(); ++i) {
-      Consensus without{consensus->used, *joint};
+      Consensus without{consensus->used, joint->at};
       without.used.erase(without.used.begin() + std::ptrdiff_t(i));
-      const auto pose = problem.minimise(without.used, *joint, {}, 30);
+      const auto pose = problem.minimise(without.used, joint->at, {}, 30);
       if (!pose) continue;
-      const double rms = rms_px(tags, lens, *pose, without.used);
+      const double rms = rms_px(tags, lens, pose->at, without.used);
       if (rms >= least_rms) continue;
       least_rms = rms;
-      without.pose = *pose;
+      without.pose = pose->at;
       least = without;
     }
     if (least.used.empty()) return;
@@ -322,34 +288,15 @@ double model_error_px(Problem& problem, const PinholeIntrinsics& lens, const Con
   CameraFromWorld pose = consensus.pose;
   while (error < consistency_gate_px(lens)) {
     problem.set_model_error(error);
-    pose = problem.minimise(consensus.used, pose, {}, 20).value_or(pose);
-    if (problem.accumulate(consensus.used, pose, {}, false).cost <= expected) break;
+    const auto minimum = problem.minimise(consensus.used, pose, {}, 20);
+    if (minimum && minimum->equations.cost <= expected) break;
+    if (minimum) pose = minimum->at;
     error *= 1.2;
   }
   return error;
 }
 
 }  // namespace
-
-glm::dmat4 world_from_camera(const CameraFromWorld& pose) {
-  const glm::dmat3 r = glm::transpose(pose.rotation);
-  glm::dmat4 m(r);
-  m[3] = glm::dvec4(-(r * pose.translation), 1);
-  return m;
-}
-
-CameraFromWorld camera_from_world(const glm::dmat4& world_from_camera) {
-  const glm::dmat3 r = glm::transpose(glm::dmat3(world_from_camera));
-  return {r, -(r * glm::dvec3(world_from_camera[3]))};
-}
-
-double rotation_between(const CameraFromWorld& a, const CameraFromWorld& b) {
-  // The angle follows from the difference's Frobenius norm, which is accurate for small angles,
-  // where acos of the trace is not.
-  const glm::dmat3 d = a.rotation - b.rotation;
-  const double norm2 = glm::dot(d[0], d[0]) + glm::dot(d[1], d[1]) + glm::dot(d[2], d[2]);
-  return 2 * std::asin(std::min(1.0, std::sqrt(norm2 / 8)));
-}
 
 double tag_error_px(const TagObservation& tag, const CameraFromWorld& pose,
                     const PinholeIntrinsics& lens) {

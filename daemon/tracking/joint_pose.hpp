@@ -9,29 +9,11 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/tracking/corners.hpp"
+#include "daemon/tracking/camera_pose.hpp"
+#include "daemon/tracking/tag_observation.hpp"
 #include "drivers/calibration.hpp"
 
 namespace previz::tracking {
-
-// A point is transformed by x_camera = rotation * x_world + translation (m).
-struct CameraFromWorld {
-  glm::dmat3 rotation{1.0};
-  glm::dvec3 translation{0};
-};
-
-glm::dmat4 world_from_camera(const CameraFromWorld& pose);
-CameraFromWorld camera_from_world(const glm::dmat4& world_from_camera);
-// Returns the angle of the rotation between two poses, rad.
-double rotation_between(const CameraFromWorld& a, const CameraFromWorld& b);
-
-struct TagObservation {
-  int id = 0;
-  double size_m = 0;
-  glm::dmat4 world_from_tag{1.0};
-  CornerPixels corners{};
-  std::array<double, 64> covariance{};  // px^2, from the picture
-};
 
 struct FittedPose {
   CameraFromWorld pose;

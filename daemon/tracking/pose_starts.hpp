@@ -3,7 +3,9 @@
 
 #include <vector>
 
-#include "daemon/tracking/joint_pose.hpp"
+#include "daemon/tracking/camera_pose.hpp"
+#include "daemon/tracking/tag_observation.hpp"
+#include "drivers/calibration.hpp"
 
 namespace previz::tracking {
 

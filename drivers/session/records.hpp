@@ -42,7 +42,7 @@ struct Losses {
   friend bool operator==(const Losses&, const Losses&) = default;
 };
 
-// Returns what was lost: "12 frames of the cameras", "3 pictures that were shown". Empty: nothing.
+// Returns what was lost: "12 camera frames", "3 composite frames". Empty: nothing.
 std::vector<std::string> words_of(const Losses& lost);
 
 // A file that the set needs and the session does not have.
