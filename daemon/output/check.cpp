@@ -1,4 +1,4 @@
-#include "daemon/post/check_recording.hpp"
+#include "daemon/output/check.hpp"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -14,7 +14,7 @@
 #include "drivers/error.hpp"
 #include "drivers/session/summary.hpp"
 
-namespace previz::post {
+namespace previz::output {
 namespace {
 
 namespace fs = std::filesystem;
@@ -96,7 +96,7 @@ std::vector<Folder> folders_of(const set::Recording& recording) {
 
 std::optional<double> free_bytes(const fs::path& folder) {
   try {
-    return static_cast<double>(output::free_on_disk_of(folder, {}));
+    return static_cast<double>(free_on_disk_of(folder, {}));
   } catch (const fs::filesystem_error&) {  // it is said of the folder itself
     return std::nullopt;
   }
@@ -112,7 +112,7 @@ std::optional<double> lasting_s(const set::Recording& recording, const fs::path&
 
 void look_at_disk(const set::Recording& recording, const Folder& folder, double bytes_a_second,
                   Lines& lines) {
-  const fs::path there = output::existing_part(folder.path);
+  const fs::path there = existing_part(folder.path);
   if (::access(there.c_str(), W_OK) != 0)
     lines.push_back(fmt::format(
         "{}: you may not write to {}; takes are written by the user who runs the rig: the "
@@ -133,12 +133,11 @@ void look_at_disk(const set::Recording& recording, const Folder& folder, double 
 void look_at_preroll(const set::Recording& recording, double bytes_a_second,
                      std::uint64_t memory_bytes, Lines& lines) {
   const double queue = megabyte * recording.queue_mb.value_or(0);
-  if (recording.queue_mb && queue > static_cast<double>(output::most_queue_bytes(memory_bytes)))
+  if (recording.queue_mb && queue > static_cast<double>(most_queue_bytes(memory_bytes)))
     lines.push_back(fmt::format(
         "recording.queue_mb = {:g}: this computer has {}; three quarters of it are used",
         *recording.queue_mb, size_in_words(static_cast<double>(memory_bytes))));
-  const double room =
-      0.5 * static_cast<double>(output::queue_bytes(recording.queue_mb, memory_bytes));
+  const double room = 0.5 * static_cast<double>(queue_bytes(recording.queue_mb, memory_bytes));
   const double needed = recording.preroll_s * bytes_a_second;
   if (needed > room)
     lines.push_back(fmt::format(
@@ -161,7 +160,7 @@ Lines why_nothing_is_recorded(const set::Set& set) {
   Lines lines;
   for (const Folder& folder : folders_of(set.recording)) {
     std::error_code unknown;
-    const fs::path there = output::existing_part(folder.path);
+    const fs::path there = existing_part(folder.path);
     if (fs::exists(there, unknown) && !fs::is_directory(there, unknown))
       lines.push_back(
           fmt::format("{}: {}: {} is a file; allowed: a folder, which is created if it "
@@ -178,7 +177,7 @@ Lines remarks_on_recording(const set::Set& set, std::uint64_t memory_bytes) {
   for (const Folder& folder : folders_of(recording))
     look_at_disk(recording, folder, bytes_a_second, lines);
   if (recording.second_directory &&
-      output::are_on_one_disk(recording.directory, *recording.second_directory))
+      are_on_one_disk(recording.directory, *recording.second_directory))
     lines.emplace_back(
         "recording.second_directory is now on the same disk as recording.directory: if that is "
         "full or fails, recording stops");
@@ -186,7 +185,14 @@ Lines remarks_on_recording(const set::Set& set, std::uint64_t memory_bytes) {
   return lines;
 }
 
-void print_recording(const set::Set& set, std::ostream& out) {
+void check(const set::CheckedSet& checked, set::Findings& findings) {
+  if (checked.is_take) return;
+  std::ranges::copy(why_nothing_is_recorded(checked.set), std::back_inserter(findings.problems));
+  std::ranges::copy(remarks_on_recording(checked.set, memory_bytes()),
+                    std::back_inserter(findings.remarks));
+}
+
+void describe(const set::Set& set, std::ostream& out) {
   const set::Recording& recording = set.recording;
   const ExpectedFrames expected = expected_frames(set);
   out << "\nrecording\n";
@@ -209,4 +215,4 @@ void print_recording(const set::Set& set, std::ostream& out) {
   }
 }
 
-}  // namespace previz::post
+}  // namespace previz::output

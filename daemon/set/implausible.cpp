@@ -1,4 +1,4 @@
-#include "daemon/post/implausible.hpp"
+#include "daemon/set/implausible.hpp"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 
 #include "daemon/set/names.hpp"
 
-namespace previz::post {
+namespace previz::set {
 namespace {
 
 using Lines = std::vector<std::string>;
@@ -20,7 +20,7 @@ constexpr double most_stretch = 1.2;         // of pixels; an anamorphic lens is
 constexpr double middle_share = 0.5;         // of the picture, in which the principal point lies
 constexpr double shutter_tolerance = 1.001;  // a shutter that is open all the time
 
-void look_at_tag(const set::Tag& tag, Lines& lines) {
+void look_at_tag(const Tag& tag, Lines& lines) {
   const double size = tag.size_m;
   if (size > largest_tag_m)
     lines.push_back(
@@ -71,7 +71,7 @@ void look_at_lens(const ThinLens& lens, Lines& lines) {
         lens.focus_distance_m));
 }
 
-void look_at_shutter(const std::string& camera, const set::CameraWish& wish, Lines& lines) {
+void look_at_shutter(const std::string& camera, const CameraWish& wish, Lines& lines) {
   if (!wish.settings.rate_hz) return;
   std::vector<double> times = wish.bracket_s;
   if (wish.settings.exposure_s) times.push_back(*wish.settings.exposure_s);
@@ -84,12 +84,12 @@ void look_at_shutter(const std::string& camera, const set::CameraWish& wish, Lin
         camera, longest, *wish.settings.rate_hz, frame_s));
 }
 
-void look_at_size(const std::string& camera, const set::CameraWish& wish, const std::string& driver,
+void look_at_size(const std::string& camera, const CameraWish& wish, const std::string& driver,
                   int width, int height, Lines& lines) {
   const CameraSettings& settings = wish.settings;
   const bool differs =
       settings.width && settings.height && (*settings.width != width || *settings.height != height);
-  if (driver != set::replay_driver && differs)
+  if (driver != replay_driver && differs)
     lines.push_back(fmt::format(
         "[{0}.camera] is {1}x{2} and [{0}.intrinsics] is for {3}x{4}: calibrate the camera at the "
         "size that it is used with (previzd calibrate {5}); only if it scales the whole picture, "
@@ -101,11 +101,11 @@ void look_at_size(const std::string& camera, const set::CameraWish& wish, const 
 
 }  // namespace
 
-std::vector<std::string> implausible(const set::Set& set) {
+std::vector<std::string> implausible(const Set& set) {
   Lines lines;
-  for (const set::Tag& tag : set.tracking.tags) look_at_tag(tag, lines);
-  for (const set::Carrier& carrier : set.tracking.carriers)
-    for (const set::Tag& tag : carrier.tags) look_at_tag(tag, lines);
+  for (const Tag& tag : set.tracking.tags) look_at_tag(tag, lines);
+  for (const Carrier& carrier : set.tracking.carriers)
+    for (const Tag& tag : carrier.tags) look_at_tag(tag, lines);
   if (const auto& camera = set.observer.calibration) {
     look_at_intrinsics(camera->intrinsics, lines);
     if (camera->lens) look_at_lens(*camera->lens, lines);
@@ -120,7 +120,7 @@ std::vector<std::string> implausible(const set::Set& set) {
   return lines;
 }
 
-std::vector<std::string> other_sizes(const set::Set& set) {
+std::vector<std::string> other_sizes(const Set& set) {
   Lines lines;
   if (const auto& camera = set.observer.calibration)
     look_at_size("observer", set.observer.camera, set.observer.driver, camera->intrinsics.width,
@@ -131,4 +131,4 @@ std::vector<std::string> other_sizes(const set::Set& set) {
   return lines;
 }
 
-}  // namespace previz::post
+}  // namespace previz::set

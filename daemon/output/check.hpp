@@ -1,4 +1,5 @@
-// What the recordings of a set ask of this computer's disks and memory, as these are now.
+// The recorder's part of `previzd check`: what the recordings of a set ask of this computer's disks
+// and memory, as these are now.
 #pragma once
 
 #include <cstdint>
@@ -7,9 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "daemon/set/check.hpp"
 #include "daemon/set/set.hpp"
 
-namespace previz::post {
+namespace previz::output {
 
 // What a set's cameras are expected to deliver, from its settings or from the sessions that are
 // replayed. The pictures' bytes are estimated by the name of their format: 2 a pixel if none is
@@ -30,7 +32,11 @@ std::vector<std::string> why_nothing_is_recorded(const set::Set& set);
 // memory too small for the time before the button. `memory_bytes` is the computer's.
 std::vector<std::string> remarks_on_recording(const set::Set& set, std::uint64_t memory_bytes);
 
-// Prints where takes go, how much is free there and for how long it lasts.
-void print_recording(const set::Set& set, std::ostream& out);
+// Does both for `previzd check`. A take says how it was recorded, and nothing more is recorded by
+// its set.
+void check(const set::CheckedSet& checked, set::Findings& findings);
 
-}  // namespace previz::post
+// Prints where takes go, how much is free there and for how long it lasts.
+void describe(const set::Set& set, std::ostream& out);
+
+}  // namespace previz::output

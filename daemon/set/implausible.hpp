@@ -7,7 +7,7 @@
 
 #include "daemon/set/set.hpp"
 
-namespace previz::post {
+namespace previz::set {
 
 // Returns a line for each, with its key, what is odd about it, and what was probably meant:
 //   tags      a side below 5 mm or above 0.5 m, or a place farther than 100 m
@@ -17,10 +17,10 @@ namespace previz::post {
 //   [.lens]   a focal length, f-number or focus distance of no lens
 //   cameras   a shutter time longer than a frame lasts
 //   places    the light camera farther than 100 m
-std::vector<std::string> implausible(const set::Set& set);
+std::vector<std::string> implausible(const Set& set);
 
 // Returns a line for each camera whose picture has another size than its intrinsics: a live set
 // cannot run so.
-std::vector<std::string> other_sizes(const set::Set& set);
+std::vector<std::string> other_sizes(const Set& set);
 
-}  // namespace previz::post
+}  // namespace previz::set

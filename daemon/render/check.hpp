@@ -1,0 +1,15 @@
+// The renderer's part of `previzd check`.
+#pragma once
+
+#include <iosfwd>
+
+#include "daemon/scene/scene.hpp"
+#include "daemon/set/set.hpp"
+
+namespace previz::render {
+
+// Prints the features that the set uses and those that are switched off, and estimates what a frame
+// asks of the GPU without measuring it; `previzd trade` measures.
+void describe(const set::Set& set, const scene::Scene& scene, std::ostream& out);
+
+}  // namespace previz::render

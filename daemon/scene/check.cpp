@@ -1,0 +1,102 @@
+#include "daemon/scene/check.hpp"
+
+#include <algorithm>
+#include <numbers>
+#include <ostream>
+
+#include "daemon/scene/load.hpp"
+#include "daemon/set/names.hpp"
+#include "daemon/set/problems.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::scene {
+
+using set::plural;
+using set::words;
+
+std::optional<Scene> check(const set::CheckedSet& checked, set::Findings& findings) {
+  const set::Set& set = checked.set;
+  try {
+    return load_scene(set);
+  } catch (const Error& whole) {
+    const auto before = findings.problems.size();
+    for (const auto& object : set.objects) {
+      auto alone = set;
+      alone.objects = {object};
+      alone.surfaces.clear();  // clears the other objects' too
+      findings.attempt([&] { load_scene(alone); });
+    }
+    if (findings.problems.size() == before)
+      findings.problems.push_back(whole.what());  // too much only together
+    return std::nullopt;
+  }
+}
+
+void remark_on(const Scene& scene, const set::Set& set, set::Findings& findings) {
+  for (const auto& note : scene.notes) findings.remarks.push_back(note);
+  const auto has = [&](set::Presence presence) {
+    return std::ranges::find(set.objects, presence, &set::Object::presence) != set.objects.end();
+  };
+  const bool relit = std::ranges::any_of(scene.lights, &set::Light::is_relit);
+  if (!has(set::Presence::virtual_object) && !has(set::Presence::removed) && !relit)
+    findings.remarks.push_back(
+        "nothing is virtual, removed or relit: the composite will equal the plate");
+  else if (!has(set::Presence::phantom))
+    findings.remarks.push_back(
+        "no phantom: nothing real can catch shadows or hide a virtual object");
+}
+
+void describe_objects(const set::Set& set, const Scene& scene, std::ostream& out) {
+  if (set.objects.empty()) return;
+  std::vector<std::uint64_t> triangles(set.objects.size()), instances(set.objects.size());
+  for (const auto& instance : scene.instances) {
+    ++instances[instance.object];
+    triangles[instance.object] += scene.meshes[instance.mesh].triangles.size();
+  }
+  out << "\nobjects\n";
+  for (std::size_t i = 0; i < set.objects.size(); ++i) {
+    const auto& object = set.objects[i];
+    out << "  " << object.name << ": " << set::name_of(object.presence) << ", "
+        << plural(triangles[i], "triangle") << " in " << plural(instances[i], "instance")
+        << ", from " << object.file_as_written;
+    if (!object.variant.empty()) out << ", variant \"" << set::printable(object.variant) << '"';
+    out << '\n';
+    const Variants* variants = variants_of(scene, i);
+    if (!variants) continue;
+    out << "    its variants, for the buttons:";
+    const char* separator = " ";
+    for (const std::string& name : variants->names) {
+      out << separator << '"' << set::printable(name) << '"';
+      separator = ", ";
+    }
+    out << '\n';
+  }
+}
+
+void describe_lamps(const set::Set& set, const Scene& scene, std::ostream& out) {
+  const auto print = [&](const std::string& name, const std::string& kind, double mixed,
+                         double real, const glm::dvec3& tint, const std::string& more) {
+    const char* change = real == 0                          ? "added"
+                         : mixed * tint == glm::dvec3(real) ? "as it is"
+                         : mixed == 0                       ? "switched off"
+                         : mixed < real                     ? "dimmed"
+                         : mixed > real                     ? "brightened"
+                                                            : "tinted";
+    out << "  " << (name.empty() ? "(no name)" : name) << ": " << kind << ", " << change
+        << words(", gain ", mixed, " in the composite, ", real, " on the real set");
+    if (tint != glm::dvec3(1)) out << words(", tint ", tint.r, ' ', tint.g, ' ', tint.b);
+    out << more << '\n';
+  };
+  for (const auto& light : scene.lights)
+    print(light.name, set::name_of(light.type), light.gain_mixed, light.gain_real, light.tint,
+          light.captured ? words("; subtracted from the environment light",
+                                 light.measured ? ", which gives its brightness" : "")
+                         : "");
+  for (const auto& lamp : set.captured_lamps)
+    print(lamp.name,
+          words("within ", lamp.cone_rad * 180 / std::numbers::pi,
+                " degrees of its direction in the environment light"),
+          lamp.gain_mixed, 1, lamp.tint, "; subtracted from it");
+}
+
+}  // namespace previz::scene

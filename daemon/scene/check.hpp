@@ -1,0 +1,22 @@
+// The scene's part of `previzd check`.
+#pragma once
+
+#include <iosfwd>
+#include <optional>
+
+#include "daemon/scene/scene.hpp"
+#include "daemon/set/check.hpp"
+
+namespace previz::scene {
+
+// Loads the scene; where that fails, finds the problems of each object's file and returns nothing.
+std::optional<Scene> check(const set::CheckedSet& checked, set::Findings& findings);
+
+// Remarks on what was ignored in the files, and on sets whose picture is the plate's.
+void remark_on(const Scene& scene, const set::Set& set, set::Findings& findings);
+
+// Print the objects with their triangles and variants, and the lamps.
+void describe_objects(const set::Set& set, const Scene& scene, std::ostream& out);
+void describe_lamps(const set::Set& set, const Scene& scene, std::ostream& out);
+
+}  // namespace previz::scene
