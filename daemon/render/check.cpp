@@ -39,11 +39,11 @@ void print_picture_memory(const set::Quality& quality, const PinholeIntrinsics& 
                           std::ostream& out) {
   const bool averaged_live = quality.denoise && quality.accumulate;
   const bool averaged_offline = quality.denoise && quality.neighbours > 0;
-  std::uint64_t picture_bytes = picture_bytes(intrinsics.width, intrinsics.height, false);
+  std::uint64_t bytes = picture_bytes(intrinsics.width, intrinsics.height, false);
   if (averaged_live || averaged_offline)
-    picture_bytes += history_bytes(intrinsics.width, intrinsics.height);
+    bytes += history_bytes(intrinsics.width, intrinsics.height);
   out << words("  picture in the GPU's memory: about ",
-               std::ceil(static_cast<double>(picture_bytes) / mebibyte), " MiB\n");
+               std::ceil(static_cast<double>(bytes) / mebibyte), " MiB\n");
   if (averaged_offline)
     out << words("  frames that are averaged offline in the computer's memory: about ",
                  std::ceil(static_cast<double>(kept_bytes(
