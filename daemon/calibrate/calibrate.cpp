@@ -2,15 +2,15 @@
 
 #include <fmt/ostream.h>
 
-#include "daemon/calibrate/board_guess.hpp"
-#include "daemon/calibrate/coverage.hpp"
-#include "daemon/calibrate/fisheye.hpp"
 #include "daemon/calibrate/known_camera.hpp"
-#include "daemon/calibrate/lens_prior.hpp"
-#include "daemon/calibrate/light_pose.hpp"
-#include "daemon/calibrate/observer.hpp"
-#include "daemon/calibrate/report.hpp"
-#include "daemon/calibrate/residual_plot.hpp"
+#include "daemon/calibrate/lens/board_guess.hpp"
+#include "daemon/calibrate/lens/coverage.hpp"
+#include "daemon/calibrate/lens/fisheye.hpp"
+#include "daemon/calibrate/lens/lens_prior.hpp"
+#include "daemon/calibrate/lens/light_pose.hpp"
+#include "daemon/calibrate/lens/observer.hpp"
+#include "daemon/calibrate/lens/report.hpp"
+#include "daemon/calibrate/lens/residual_plot.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/error.hpp"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/calibrate/response_fit.hpp"
+#include "daemon/calibrate/sensor/response_fit.hpp"
 #include "daemon/render/renderer.hpp"
 
 namespace previz::calibrate {

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "daemon/calibrate/balance_fit.hpp"
 #include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/report.hpp"
-#include "daemon/calibrate/surface_pixels.hpp"
+#include "daemon/calibrate/lens/report.hpp"
+#include "daemon/calibrate/sensor/balance_fit.hpp"
+#include "daemon/calibrate/sensor/surface_pixels.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/set/print.hpp"

@@ -3,10 +3,10 @@
 #include <cmath>
 
 #include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/lens_file.hpp"
-#include "daemon/calibrate/lens_file_check.hpp"
-#include "daemon/calibrate/lens_refit.hpp"
-#include "daemon/calibrate/report.hpp"
+#include "daemon/calibrate/lens/lens_file.hpp"
+#include "daemon/calibrate/lens/lens_file_check.hpp"
+#include "daemon/calibrate/lens/lens_refit.hpp"
+#include "daemon/calibrate/lens/report.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/error.hpp"
 #include "drivers/keys/value.hpp"

@@ -1,8 +1,8 @@
 #include <fmt/ostream.h>
 
 #include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/lens_fit.hpp"
-#include "daemon/calibrate/report.hpp"
+#include "daemon/calibrate/lens/lens_fit.hpp"
+#include "daemon/calibrate/lens/report.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"

@@ -2,13 +2,13 @@
 
 #include <cmath>
 
-#include "daemon/calibrate/brackets.hpp"
 #include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/clip_fit.hpp"
 #include "daemon/calibrate/known_camera.hpp"
-#include "daemon/calibrate/report.hpp"
-#include "daemon/calibrate/response_fit.hpp"
-#include "daemon/calibrate/source.hpp"
+#include "daemon/calibrate/lens/report.hpp"
+#include "daemon/calibrate/lens/source.hpp"
+#include "daemon/calibrate/sensor/brackets.hpp"
+#include "daemon/calibrate/sensor/clip_fit.hpp"
+#include "daemon/calibrate/sensor/response_fit.hpp"
 #include "daemon/lighting/response.hpp"
 #include "daemon/set/print.hpp"
 

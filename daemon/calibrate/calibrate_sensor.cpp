@@ -1,10 +1,10 @@
 #include <fmt/ostream.h>
 
 #include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/dark_fit.hpp"
 #include "daemon/calibrate/known_camera.hpp"
-#include "daemon/calibrate/report.hpp"
-#include "daemon/calibrate/vignetting_fit.hpp"
+#include "daemon/calibrate/lens/report.hpp"
+#include "daemon/calibrate/sensor/dark_fit.hpp"
+#include "daemon/calibrate/sensor/vignetting_fit.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 

@@ -3,7 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <map>
 
-#include "daemon/calibrate/board.hpp"
+#include "daemon/calibrate/lens/board.hpp"
 
 namespace previz::calibrate {
 namespace {

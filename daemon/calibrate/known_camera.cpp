@@ -1,6 +1,6 @@
 #include "daemon/calibrate/known_camera.hpp"
 
-#include "daemon/calibrate/source.hpp"
+#include "daemon/calibrate/lens/source.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/set/load.hpp"
 #include "drivers/error.hpp"

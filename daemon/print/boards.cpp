@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <opencv2/aruco/charuco.hpp>
 
-#include "daemon/calibrate/marker_dictionary.hpp"
+#include "daemon/calibrate/lens/marker_dictionary.hpp"
 #include "daemon/print/tag_cells.hpp"
 #include "drivers/error.hpp"
 

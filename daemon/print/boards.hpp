@@ -1,7 +1,7 @@
 // Draws the boards that `previzd calibrate` looks for.
 #pragma once
 
-#include "daemon/calibrate/board.hpp"
+#include "daemon/calibrate/lens/board.hpp"
 #include "daemon/print/drawing.hpp"
 
 namespace previz::print {

@@ -2,7 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
-#include "daemon/calibrate/board.hpp"
+#include "daemon/calibrate/lens/board.hpp"
 
 namespace previz::print {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <fmt/ostream.h>
 
-#include "daemon/calibrate/length.hpp"
+#include "daemon/calibrate/lens/length.hpp"
 #include "daemon/print/boards.hpp"
 #include "daemon/print/pdf.hpp"
 #include "daemon/print/tags.hpp"

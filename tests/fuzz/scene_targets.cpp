@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "daemon/calibrate/lens_file.hpp"
-#include "daemon/calibrate/lens_file_check.hpp"
+#include "daemon/calibrate/lens/lens_file.hpp"
+#include "daemon/calibrate/lens/lens_file_check.hpp"
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/scene/deformation.hpp"

@@ -6,7 +6,7 @@
 #include <optional>
 #include <random>
 
-#include "daemon/calibrate/views.hpp"
+#include "daemon/calibrate/lens/views.hpp"
 #include "daemon/tracking/joint_pose.hpp"
 #include "tests/support/units.hpp"
 

@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "daemon/calibrate/tag_bundle.hpp"
+#include "daemon/calibrate/tags/tag_bundle.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::test {

@@ -8,8 +8,8 @@
 #include <fstream>
 #include <random>
 
-#include "daemon/calibrate/balance_fit.hpp"
 #include "daemon/calibrate/calibrate.hpp"
+#include "daemon/calibrate/sensor/balance_fit.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"

@@ -6,9 +6,9 @@
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "daemon/calibrate/board.hpp"
-#include "daemon/calibrate/board_finder.hpp"
-#include "daemon/calibrate/board_guess.hpp"
+#include "daemon/calibrate/lens/board.hpp"
+#include "daemon/calibrate/lens/board_finder.hpp"
+#include "daemon/calibrate/lens/board_guess.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 

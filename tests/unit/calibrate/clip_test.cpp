@@ -9,7 +9,7 @@
 #include <sstream>
 
 #include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/clip_fit.hpp"
+#include "daemon/calibrate/sensor/clip_fit.hpp"
 #include "daemon/lighting/response.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"

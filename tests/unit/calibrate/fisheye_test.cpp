@@ -8,9 +8,9 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
-#include "daemon/calibrate/coverage.hpp"
-#include "daemon/calibrate/fisheye.hpp"
-#include "daemon/calibrate/light_pose.hpp"
+#include "daemon/calibrate/lens/coverage.hpp"
+#include "daemon/calibrate/lens/fisheye.hpp"
+#include "daemon/calibrate/lens/light_pose.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/calibration/fisheye.hpp"

@@ -11,9 +11,9 @@
 #include <sstream>
 
 #include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/lens_file.hpp"
-#include "daemon/calibrate/lens_file_check.hpp"
-#include "daemon/calibrate/lens_refit.hpp"
+#include "daemon/calibrate/lens/lens_file.hpp"
+#include "daemon/calibrate/lens/lens_file_check.hpp"
+#include "daemon/calibrate/lens/lens_refit.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration/fisheye.hpp"

@@ -12,10 +12,10 @@
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
-#include "daemon/calibrate/board_finder.hpp"
 #include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/observer.hpp"
-#include "daemon/calibrate/views.hpp"
+#include "daemon/calibrate/lens/board_finder.hpp"
+#include "daemon/calibrate/lens/observer.hpp"
+#include "daemon/calibrate/lens/views.hpp"
 #include "daemon/tracking/photometry.hpp"
 
 namespace previz::calibrate {

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "daemon/calibrate/lens_fit.hpp"
+#include "daemon/calibrate/lens/lens_fit.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"

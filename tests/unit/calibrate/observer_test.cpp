@@ -7,10 +7,10 @@
 #include <opencv2/core.hpp>
 #include <sstream>
 
-#include "daemon/calibrate/coverage.hpp"
-#include "daemon/calibrate/observer.hpp"
-#include "daemon/calibrate/report.hpp"
-#include "daemon/calibrate/residual_plot.hpp"
+#include "daemon/calibrate/lens/coverage.hpp"
+#include "daemon/calibrate/lens/observer.hpp"
+#include "daemon/calibrate/lens/report.hpp"
+#include "daemon/calibrate/lens/residual_plot.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"

@@ -9,10 +9,10 @@
 #include <opencv2/calib3d.hpp>
 #include <sstream>
 
-#include "daemon/calibrate/coverage.hpp"
-#include "daemon/calibrate/fisheye.hpp"
-#include "daemon/calibrate/observer.hpp"
-#include "daemon/calibrate/source.hpp"
+#include "daemon/calibrate/lens/coverage.hpp"
+#include "daemon/calibrate/lens/fisheye.hpp"
+#include "daemon/calibrate/lens/observer.hpp"
+#include "daemon/calibrate/lens/source.hpp"
 #include "tests/support/shared_data.hpp"
 
 namespace previz::calibrate {

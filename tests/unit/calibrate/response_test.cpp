@@ -6,8 +6,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 
-#include "daemon/calibrate/brackets.hpp"
-#include "daemon/calibrate/response_fit.hpp"
+#include "daemon/calibrate/sensor/brackets.hpp"
+#include "daemon/calibrate/sensor/response_fit.hpp"
 #include "daemon/lighting/response.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"

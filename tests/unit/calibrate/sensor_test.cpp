@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "daemon/calibrate/dark_fit.hpp"
-#include "daemon/calibrate/vignetting_fit.hpp"
+#include "daemon/calibrate/sensor/dark_fit.hpp"
+#include "daemon/calibrate/sensor/vignetting_fit.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"

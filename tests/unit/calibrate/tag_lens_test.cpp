@@ -4,9 +4,9 @@
 
 #include <cstdio>
 
-#include "daemon/calibrate/observer.hpp"
-#include "daemon/calibrate/tag_lens.hpp"
-#include "daemon/calibrate/tag_tables.hpp"
+#include "daemon/calibrate/lens/observer.hpp"
+#include "daemon/calibrate/tags/tag_lens.hpp"
+#include "daemon/calibrate/tags/tag_tables.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"

@@ -13,10 +13,10 @@
 #include <sstream>
 
 #include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/moved_tags.hpp"
-#include "daemon/calibrate/tag_survey.hpp"
-#include "daemon/calibrate/tag_tables.hpp"
-#include "daemon/calibrate/tag_walk.hpp"
+#include "daemon/calibrate/tags/moved_tags.hpp"
+#include "daemon/calibrate/tags/tag_survey.hpp"
+#include "daemon/calibrate/tags/tag_tables.hpp"
+#include "daemon/calibrate/tags/tag_walk.hpp"
 #include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"

@@ -11,11 +11,11 @@
 #include <sstream>
 
 #include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/moved_tags.hpp"
-#include "daemon/calibrate/source.hpp"
-#include "daemon/calibrate/tag_lens.hpp"
-#include "daemon/calibrate/tag_survey.hpp"
-#include "daemon/calibrate/tag_walk.hpp"
+#include "daemon/calibrate/lens/source.hpp"
+#include "daemon/calibrate/tags/moved_tags.hpp"
+#include "daemon/calibrate/tags/tag_lens.hpp"
+#include "daemon/calibrate/tags/tag_survey.hpp"
+#include "daemon/calibrate/tags/tag_walk.hpp"
 #include "daemon/set/load.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/shared_data.hpp"

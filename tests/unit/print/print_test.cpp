@@ -11,7 +11,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
-#include "daemon/calibrate/board_finder.hpp"
+#include "daemon/calibrate/lens/board_finder.hpp"
 #include "daemon/print/boards.hpp"
 #include "daemon/print/pdf.hpp"
 #include "daemon/print/print.hpp"

@@ -9,7 +9,7 @@
 #include <memory>
 #include <sstream>
 
-#include "daemon/calibrate/board.hpp"
+#include "daemon/calibrate/lens/board.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/manual/command.hpp"
 #include "daemon/manual/pages.hpp"

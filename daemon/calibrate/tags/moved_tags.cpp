@@ -1,0 +1,215 @@
+#include "daemon/calibrate/tags/moved_tags.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <opencv2/core.hpp>
+
+#include "daemon/calibrate/lens/report.hpp"
+#include "daemon/tracking/least_squares.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+constexpr double moved_loss = 3;        // standard deviations, as of the map's adjustment
+constexpr double moved_gain = 60;       // of the cost; noise gains as a chi-square of 6 degrees
+constexpr double restless_share = 0.3;  // of sightings that disagree
+constexpr std::size_t most_cuts = 24;
+constexpr std::size_t least_of_a_place = 2;  // sightings
+
+// The sightings of one tag, whose cameras are known.
+struct OneTag {
+  const TagWalk& walk;
+  const PinholeIntrinsics& lens;
+  const TagPlaces& places;
+  std::size_t tag;
+  double model_error_px;
+  std::vector<std::size_t> sightings;  // in the walk's order
+};
+
+using Place = cv::Matx<double, 8, 1>;
+
+// Returns how far the corners of a sighting lie from their projection, px.
+Place off(const OneTag& one, std::size_t sighting, const glm::dmat4& place) {
+  const TagSighting& seen = one.walk.sightings[sighting];
+  const auto at =
+      projected_tag(one.lens, one.places.cameras[seen.picture], place, one.places.sizes_m[one.tag]);
+  Place result;
+  for (int i = 0; i < 4; ++i) {
+    const glm::dvec2 d = seen.corners[std::size_t(i)] - at[std::size_t(i)];
+    result(2 * i) = d.x;
+    result(2 * i + 1) = d.y;
+  }
+  return result;
+}
+
+double variance_of(const OneTag& one, std::size_t sighting) {
+  return one.walk.sightings[sighting].variance_px2 + one.model_error_px * one.model_error_px;
+}
+
+double cost_of(const OneTag& one, std::size_t sighting, const glm::dmat4& place) {
+  const Place r = off(one, sighting, place);
+  const double scale = 8 * moved_loss * moved_loss;
+  const double squares = r.dot(r) / variance_of(one, sighting);
+  return std::isfinite(squares) ? scale * std::log(1 + squares / scale) : HUGE_VAL;
+}
+
+using Range = std::pair<std::size_t, std::size_t>;  // of OneTag::sightings
+
+double cost_of(const OneTag& one, const Range& range, const glm::dmat4& place) {
+  double sum = 0;
+  for (std::size_t i = range.first; i < range.second; ++i)
+    sum += cost_of(one, one.sightings[i], place);
+  return sum;
+}
+
+// Some of the sightings, with weights of the robust loss and derivatives by central differences.
+struct PlaceProblem {
+  const OneTag& one;
+  const Range& range;
+
+  tracking::NormalEquations<6> evaluate(const glm::dmat4& place) const {
+    constexpr double small = 1e-6, scale = 8 * moved_loss * moved_loss;
+    tracking::NormalEquations<6> sum;
+    sum.cost = cost_of(one, range, place);
+    for (std::size_t i = range.first; i < range.second && std::isfinite(sum.cost); ++i) {
+      const std::size_t s = one.sightings[i];
+      cv::Matx<double, 8, 6> by;
+      for (int c = 0; c < 6; ++c) {
+        cv::Vec6d motion = cv::Vec6d::all(0);
+        motion[c] = small;
+        const Place slope =
+            (off(one, s, moved(place, -motion)) - off(one, s, moved(place, motion))) *
+            (1 / (2 * small));
+        for (int k = 0; k < 8; ++k) by(k, c) = slope(k);
+      }
+      const Place r = off(one, s, place);
+      const double variance = variance_of(one, s);
+      sum.add(by, r, 1 / (variance * (1 + r.dot(r) / variance / scale)));
+    }
+    return sum;
+  }
+
+  // Moves a place by a rotation and a shift along the tag's own axes.
+  static glm::dmat4 moved(const glm::dmat4& place, const cv::Matx61d& by) {
+    glm::dmat4 motion(tracking::rotation_by({by(0), by(1), by(2)}));
+    motion[3] = glm::dvec4(by(3), by(4), by(5), 1);
+    return place * motion;
+  }
+};
+
+glm::dmat4 fitted_place(const OneTag& one, const Range& range, const glm::dmat4& place) {
+  const tracking::LeastSquaresLimits limits{.most_trials = 12, .settled_gain = 1e-6};
+  return tracking::least_squares(PlaceProblem{one, range}, place, limits).at;
+}
+
+// A walk that is cut in two: a place before and one after.
+struct Cut {
+  std::size_t at = 0;  // index into OneTag::sightings of the first one after
+  glm::dmat4 before{1.0}, after{1.0};
+  double cost = HUGE_VAL;
+};
+
+Cut cut_at(const OneTag& one, std::size_t at, const glm::dmat4& place) {
+  Cut cut{at, {}, {}};
+  const Range first(0, at), second(at, one.sightings.size());
+  cut.before = fitted_place(one, first, place);
+  cut.after = fitted_place(one, second, place);
+  cut.cost = cost_of(one, first, cut.before) + cost_of(one, second, cut.after);
+  return cut;
+}
+
+// Returns the best cut, first among some that are spread over the walk, then around that.
+Cut best_cut(const OneTag& one, const glm::dmat4& place) {
+  const std::size_t first = least_of_a_place, last = one.sightings.size() - least_of_a_place;
+  const std::size_t stride = std::max<std::size_t>(1, (last - first + most_cuts) / most_cuts);
+  Cut best;
+  const auto look_at = [&](std::size_t at) {
+    if (const Cut cut = cut_at(one, at, place); cut.cost < best.cost) best = cut;
+  };
+  for (std::size_t at = first; at <= last; at += stride) look_at(at);
+  const std::size_t middle = best.at;
+  for (std::size_t at = middle > first + stride ? middle - stride + 1 : first;
+       at <= std::min(last, middle + stride - 1); ++at)
+    if (at != middle) look_at(at);
+  return best;
+}
+
+// Returns the mean distance, px, that the corners move between two places, over some pictures.
+double moved_px(const OneTag& one, const Cut& cut) {
+  double sum = 0;
+  for (std::size_t i = 0; i < one.sightings.size(); ++i) {
+    const Place d = off(one, one.sightings[i], cut.before) - off(one, one.sightings[i], cut.after);
+    sum += std::sqrt(d.dot(d) / 4);
+  }
+  return sum / double(one.sightings.size());
+}
+
+struct Suspect {
+  MovedTag moved;
+  double gain = 0;
+};
+
+Suspect looked_at(const OneTag& one) {
+  const glm::dmat4& place = one.places.world_from_tag[one.tag];
+  Suspect suspect;
+  suspect.moved.id = one.walk.ids[one.tag];
+  const std::size_t count = one.sightings.size();
+  std::size_t disagree = 0;
+  double most_gates = 0, gate_px = 0;  // the gate's mean
+  for (const std::size_t s : one.sightings) {
+    const Place r = off(one, s, place);
+    const double px = std::sqrt(r.dot(r) / 4);
+    suspect.moved.off_px = std::max(suspect.moved.off_px, px);
+    const double gate = sighting_gate_px(one.walk.sightings[s], one.model_error_px);
+    most_gates = std::max(most_gates, px / gate);
+    gate_px += gate / double(count);
+    if (px > gate) ++disagree;
+  }
+  // Two places a gate apart leave one of them at least half a gate off.
+  if (count < 2 * least_of_a_place || most_gates < 0.5) return suspect;
+  const double whole = cost_of(one, Range(0, count), place);
+  const Cut cut = best_cut(one, place);
+  const auto& name = [&](std::size_t i) {
+    return one.walk.pictures[one.walk.sightings[one.sightings[i]].picture];
+  };
+  if (whole - cut.cost > moved_gain && moved_px(one, cut) > gate_px && cut.cost < 0.5 * whole) {
+    suspect.gain = whole - cut.cost;
+    suspect.moved.until = name(cut.at - 1);
+    suspect.moved.since = name(cut.at);
+    suspect.moved.distance_m = glm::distance(glm::dvec3(cut.before[3]), glm::dvec3(cut.after[3]));
+    suspect.moved.angle_rad = tracking::rotation_between(tracking::camera_from_world(cut.before),
+                                                         tracking::camera_from_world(cut.after));
+  } else if (double(disagree) >= std::max(2.0, restless_share * double(count))) {
+    suspect.gain = whole;
+  }
+  return suspect;
+}
+
+}  // namespace
+
+std::optional<MovedTag> most_moved_tag(const TagWalk& walk, const PinholeIntrinsics& lens,
+                                       const TagPlaces& places, double model_error_px) {
+  std::vector<std::vector<std::size_t>> by_tag(walk.ids.size());
+  for (std::size_t i = 0; i < walk.sightings.size(); ++i)
+    by_tag[walk.sightings[i].tag].push_back(i);
+  Suspect worst;
+  for (std::size_t t = 0; t < walk.ids.size(); ++t) {
+    if (by_tag[t].empty()) continue;
+    const Suspect suspect = looked_at({walk, lens, places, t, model_error_px, by_tag[t]});
+    if (suspect.gain > worst.gain) worst = suspect;
+  }
+  return worst.gain > 0 ? std::optional(worst.moved) : std::nullopt;
+}
+
+std::string words_of(const MovedTag& moved) {
+  if (moved.until.empty())
+    return fmt::format("no position fits its pictures, some are off by {:.1f} px", moved.off_px);
+  return fmt::format("moved by {:.1f} mm and {:.1f} degrees between {} and {}",
+                     1000 * moved.distance_m, moved.angle_rad / degree, moved.until, moved.since);
+}
+
+}  // namespace previz::calibrate
