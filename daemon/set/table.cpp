@@ -215,7 +215,7 @@ Keys light_keys(LightDraft& d) {
       {"gain_real", &l.gain_real, gain, "Brightness on the real set: 1 for a real lamp, 0 for one that is added."},
       {"tint", &l.tint, gain, "Colour of its light in the composite relative to the real set: factors of red, green and blue.", optional("[1.0, 0.8, 0.6]")},
       {"captured", &d.captured, plain, "Whether the environment light also contains this lamp. It is then subtracted, so that it does not shine twice and can be dimmed or removed. Default: true for a lamp with gain_real above 0 and no carrier if the light comes from a light camera.", optional("false")},
-      {"cone_deg", &l.cone_rad, deg.within(0.01, 60), "With captured = true: half angle of the cone around the lamp that is subtracted. Default: its outline as the light camera sees it, plus 1 degree; for a lamp without a size, also the whole bright region there, if that is no larger than a cone of 10 degrees.", optional("5.0")},
+      {"cone_deg", &l.cone_rad, deg.within(0.01, 60), "With captured = true: half angle of the cone around the lamp that is subtracted. Default: its outline as the light camera sees it, plus 1 degree; for a lamp without a size, also the whole bright region there, up to a cone of 10 degrees.", optional("5.0")},
   };
 }
 

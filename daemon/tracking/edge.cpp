@@ -348,7 +348,11 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
   const double rms =
       std::max(kMinNoise * contrast, std::sqrt(squares / std::max(1.0, weight - kParameters)));
   if (rms > 0.2 * contrast) return *why = "unclear", std::nullopt;
-  const auto covariance = *inverse_of(equations.information, cv::DECOMP_SVD) * (rms * rms);
+  // A white that nothing determines, because all of it is clipped, leaves no more to say than
+  // below.
+  const auto covariance =
+      inverse_of(equations.information).value_or(decltype(equations.information)::zeros()) *
+      (rms * rms);
   // If many samples are clipped, the true white is only a guess, and with it the place where half
   // of it is reached: the variance grows.
   const auto whites = std::count_if(samples.begin(), samples.end(),

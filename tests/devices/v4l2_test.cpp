@@ -191,7 +191,7 @@ TEST(V4l2Configure, WhatCannotBeSaysWhatCan) {
   EXPECT_THAT(refusal(device, wanted), HasSubstr("remove white_balance_k"));
   device.add_control(V4L2_CID_WHITE_BALANCE_TEMPERATURE, 2800, 6500, 4000);
   wanted.white_balance_k = 9000;
-  EXPECT_THAT(refusal(device, wanted), HasSubstr("2800 to 6500 is"));
+  EXPECT_THAT(refusal(device, wanted), HasSubstr("2800 to 6500 are"));
   wanted = settings();
   wanted.gain = 2;
   EXPECT_THAT(refusal(device, wanted), HasSubstr("raw_gain"));
@@ -492,7 +492,7 @@ TEST(V4l2Configure, FormatsThatCannotBeAreRefused) {
       {[](v4l2_pix_format& format) { format.height = 0; }, "which is impossible"},
       {[](v4l2_pix_format& format) { format.width = 70'000; }, "which is impossible"},
       {[](v4l2_pix_format& format) { format.height = 0xffffffff; }, "which is impossible"},
-      {[](v4l2_pix_format& format) { format.bytesperline = 1; }, "rows are 1 bytes; 64 are needed"},
+      {[](v4l2_pix_format& format) { format.bytesperline = 1; }, "rows of 1 bytes; 64 are needed"},
       {[](v4l2_pix_format& format) { format.bytesperline = 0xffffffff; }, "bytes is the maximum"},
       {[](v4l2_pix_format& format) {
          format.width = format.height = 65'535;

@@ -100,7 +100,7 @@ TEST(PictureSize, Of8192x4320FitsOrIsRefused) {
   EXPECT_EQ(refusal(8192, 4320, {.bytes = 8 * gib, .texels = texels}), "");
   const std::string no_memory = refusal(8192, 4320, {.bytes = 4 * gib, .texels = texels});
   EXPECT_NE(no_memory.find("8192x4320 takes 7.2 GB"), std::string::npos) << no_memory;
-  EXPECT_NE(no_memory.find("there is 4.29 GB"), std::string::npos) << no_memory;
+  EXPECT_NE(no_memory.find("but there is only 4.29 GB"), std::string::npos) << no_memory;
   // Made into layers in the same memory: 140 bytes more.
   const std::string shared =
       refusal(8192, 4320, {.bytes = 8 * gib, .texels = texels, .read_back = true});

@@ -100,7 +100,7 @@ TEST_F(PictureRepair, ASunThatOverflowedIsTheLargestHalf) {
   ASSERT_EQ(halves.report.notes.size(), 1u);
   EXPECT_THAT(halves.report.notes[0],
               AllOf(HasSubstr("2 of 2048 pixels are brighter than the file could store"),
-                    HasSubstr("taken as 65504"), HasSubstr("x = 20, y = 9")));
+                    HasSubstr("set to 65504"), HasSubstr("x = 20, y = 9")));
   EXPECT_EQ(expect_like(sky, expected).size(), 1u);  // halves that were converted to floats
 }
 

@@ -347,7 +347,7 @@ TEST_F(RigLive, AFolderOfTakesThatCannotBeWrittenIsReportedBeforeATakeNeedsIt) {
     press("record");
     until_said("12A_take001 is finished");  // in the first folder
   });
-  EXPECT_EQ(count_said("takes cannot be written there"), 1) << log_.text();
+  EXPECT_EQ(count_said("is not writable for takes"), 1) << log_.text();
 }
 
 // The buttons of a replayed take are pressed again, at its own times.
