@@ -12,6 +12,7 @@
 #include "daemon/tracking/photometry.hpp"
 #include "daemon/tracking/tag_detector.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::calibrate {
 namespace {
