@@ -1,34 +1,15 @@
 #include "daemon/tracking/photometry.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <cstddef>
+
+#include "drivers/calibration/inverse_response.hpp"
 
 namespace previz::tracking {
 namespace {
 
 constexpr double kRed = 0.2126, kGreen = 0.7152, kBlue = 0.0722;  // Rec. 709
-
-// Converts a value in [0,1] to the linear signal in [0,1].
-double inverse_response(const ResponseCurve& curve, double value) {
-  value = std::clamp(value, 0.0, 1.0);
-  switch (curve.kind) {
-    case ResponseCurve::Kind::srgb:
-      return srgb_signal(value);
-    case ResponseCurve::Kind::linear:
-      return value;
-    case ResponseCurve::Kind::gamma:
-      return std::pow(value, curve.gamma);
-    case ResponseCurve::Kind::table:
-      break;
-  }
-  const std::vector<double>& table = curve.inverse_table;
-  assert(table.size() >= 2);
-  const double at = value * double(table.size() - 1);
-  const std::size_t i = std::min(std::size_t(at), table.size() - 2);
-  return table[i] + (at - double(i)) * (table[i + 1] - table[i]);
-}
 
 std::vector<std::uint8_t> encode(const std::vector<double>& signal) {
   std::vector<std::uint8_t> code(signal.size());
