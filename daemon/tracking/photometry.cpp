@@ -28,17 +28,10 @@ std::uint8_t luma8(std::uint8_t r, std::uint8_t g, std::uint8_t b) {
 
 }  // namespace
 
-double srgb_encode(double signal, double* slope) {
-  if (slope) *slope = 0;
+double srgb_encode(double signal) {
   if (!(signal > 0)) return 0;
   if (signal >= 1) return 1;
-  if (signal <= 0.0031308) {
-    if (slope) *slope = 12.92;
-    return 12.92 * signal;
-  }
-  const double root = std::pow(signal, 1 / 2.4);
-  if (slope) *slope = 1.055 / 2.4 * root / signal;
-  return 1.055 * root - 0.055;
+  return signal <= 0.0031308 ? 12.92 * signal : 1.055 * std::pow(signal, 1 / 2.4) - 0.055;
 }
 
 Photometry::Photometry(const ResponseCurve& response)
