@@ -50,6 +50,16 @@ class ExposureLedger {
     return current_;
   }
 
+  // Does the same for a frame that may itself say what it was taken with, which counts if radiance
+  // can be divided by it; where it says nothing of the gain, that of the ledger holds.
+  std::optional<Exposure> of_frame(std::int64_t timestamp_ns, std::optional<double> said_s,
+                                   std::optional<double> said_gain) {
+    const std::optional<Exposure> by_time = of_frame(timestamp_ns);
+    const double gain = said_gain.value_or(by_time ? by_time->gain : 0);
+    if (!said_s || !is_exposure(*said_s, gain)) return by_time;
+    return Exposure{*said_s, gain};
+  }
+
  private:
   struct Change {
     std::int64_t before_ns, after_ns;

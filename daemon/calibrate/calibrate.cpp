@@ -60,6 +60,21 @@ auto fitted(const Views& views, const LensOptions& options, const std::string& s
   }
 }
 
+// Gathers the views and fits a lens to them by `fit`, once more through the lens that was found
+// where the board needs it. Leaves the views that the fit is of in `views`.
+template <class Fit>
+auto fit_of_passes(const LensOptions& options, const std::string& stream, Views& views,
+                   std::ostream& out, Fit fit) {
+  views = gather(options, stream, {}, out);
+  auto found = fitted(views, options, stream, out, fit);
+  if (needs_lens(parse_board(options.board))) {
+    out << "second pass, with the lens found:\n";
+    views = gather(options, stream, found.intrinsics, out);
+    found = fit(views);
+  }
+  return found;
+}
+
 void plot(const LensOptions& options, const Views& views, const BundleFit& fit,
           const std::vector<UncertainPixel>& picture, std::ostream& out) {
   if (!options.residual_plot) return;
@@ -71,13 +86,8 @@ void plot(const LensOptions& options, const Views& views, const BundleFit& fit,
 // Returns the lens's table, under a comment about what it lacks.
 std::string calibrate_fisheye(const LightOptions& options, LightCameraCalibration& camera,
                               std::ostream& out) {
-  Views views = gather(options, "light", {}, out);
-  FisheyeFit fisheye = fitted(views, options, "light", out, fit_fisheye);
-  if (needs_lens(parse_board(options.board))) {
-    out << "second pass, with the lens found:\n";
-    views = gather(options, "light", fisheye.intrinsics, out);
-    fisheye = fit_fisheye(views);
-  }
+  Views views;
+  const FisheyeFit fisheye = fit_of_passes(options, "light", views, out, fit_fisheye);
   print_fit(views, fisheye.fit, fisheye_parameters, fisheye.picture, out);
   fmt::print(out, "widest corner {:.1f} degrees off axis; valid to {:.1f} degrees\n",
              fisheye.widest_corner_rad / degree, fisheye.intrinsics.max_angle_rad / degree);
@@ -128,13 +138,8 @@ constexpr auto pose_by_hand =
 }  // namespace
 
 void calibrate_observer(const LensOptions& options, std::ostream& out) {
-  Views views = gather(options, "observer", {}, out);
-  ObserverFit observer = fitted(views, options, "observer", out, fit_observer);
-  if (needs_lens(parse_board(options.board))) {
-    out << "second pass, with the lens found:\n";
-    views = gather(options, "observer", observer.intrinsics, out);
-    observer = fit_observer(views);
-  }
+  Views views;
+  ObserverFit observer = fit_of_passes(options, "observer", views, out, fit_observer);
   print_fit(views, observer.fit, observer.parameters, observer.picture, out);
   if (!observer.left_out.empty())
     fmt::print(out, "left at 0, because the corners do not hold {}: {}\n",

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "drivers/calibration/inverse_response.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::lighting {
@@ -21,13 +22,6 @@ double table_value(const std::vector<double>& table, double signal) {
   return (position + (signal - *below) / (*above - *below)) / static_cast<double>(table.size() - 1);
 }
 
-double table_signal(const std::vector<double>& table, double value) {
-  const double position = value * static_cast<double>(table.size() - 1);
-  const auto below = std::min(static_cast<std::size_t>(position), table.size() - 2);
-  const double t = position - static_cast<double>(below);
-  return (1 - t) * table[below] + t * table[below + 1];
-}
-
 double curve_value(const ResponseCurve& curve, double signal) {
   switch (curve.kind) {
     case ResponseCurve::Kind::srgb:
@@ -42,20 +36,6 @@ double curve_value(const ResponseCurve& curve, double signal) {
   return signal;
 }
 
-double curve_signal(const ResponseCurve& curve, double value) {
-  switch (curve.kind) {
-    case ResponseCurve::Kind::srgb:
-      return srgb_signal(value);
-    case ResponseCurve::Kind::linear:
-      return value;
-    case ResponseCurve::Kind::gamma:
-      return std::pow(value, curve.gamma);
-    case ResponseCurve::Kind::table:
-      return table_signal(curve.inverse_table, value);
-  }
-  return value;
-}
-
 }  // namespace
 
 Response::Response(const ResponseCurve& curve, int bits) : curve_(curve), bits_(bits) {
@@ -65,7 +45,8 @@ Response::Response(const ResponseCurve& curve, int bits) : curve_(curve), bits_(
   const int max = (1 << bits) - 1;
   inverse_.resize(static_cast<std::size_t>(max) + 1);
   for (int code = 0; code <= max; ++code)
-    inverse_[static_cast<std::size_t>(code)] = curve_signal(curve, static_cast<double>(code) / max);
+    inverse_[static_cast<std::size_t>(code)] =
+        inverse_response(curve, static_cast<double>(code) / max);
   inverse_.front() = 0;
   inverse_.back() = 1;
   for (int code = 0; code <= max; ++code) {
@@ -100,7 +81,7 @@ Clipping Response::clipping() const {
 double Response::least_signal(std::uint16_t code) const {
   if (code == 0) return 0;
   const double max = static_cast<double>((1 << bits_) - 1);
-  return curve_signal(curve_, (static_cast<double>(code) - 0.5) / max);
+  return inverse_response(curve_, (static_cast<double>(code) - 0.5) / max);
 }
 
 }  // namespace previz::lighting

@@ -38,10 +38,8 @@ std::string timecode(std::chrono::nanoseconds since_midnight, double fps) {
   const double part = std::chrono::duration<double>(since_midnight - seconds).count();
   const int frame = std::min(static_cast<int>(part * rate), rate - 1);
   const auto total = static_cast<int>(seconds.count() % 86'400);
-  std::array<char, 24> text{};
-  std::snprintf(text.data(), text.size(), "%02d:%02d:%02d:%02d", total / 3600, total / 60 % 60,
-                total % 60, frame);
-  return text.data();
+  return session::words_of(
+      session::TimecodeDigits{total / 3600, total / 60 % 60, total % 60, frame});
 }
 
 std::string timecode_of(std::chrono::system_clock::time_point time, double fps) {

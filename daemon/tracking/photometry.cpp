@@ -1,34 +1,15 @@
 #include "daemon/tracking/photometry.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <cstddef>
+
+#include "drivers/calibration/inverse_response.hpp"
 
 namespace previz::tracking {
 namespace {
 
 constexpr double kRed = 0.2126, kGreen = 0.7152, kBlue = 0.0722;  // Rec. 709
-
-// Converts a value in [0,1] to the linear signal in [0,1].
-double inverse_response(const ResponseCurve& curve, double value) {
-  value = std::clamp(value, 0.0, 1.0);
-  switch (curve.kind) {
-    case ResponseCurve::Kind::srgb:
-      return srgb_signal(value);
-    case ResponseCurve::Kind::linear:
-      return value;
-    case ResponseCurve::Kind::gamma:
-      return std::pow(value, curve.gamma);
-    case ResponseCurve::Kind::table:
-      break;
-  }
-  const std::vector<double>& table = curve.inverse_table;
-  assert(table.size() >= 2);
-  const double at = value * double(table.size() - 1);
-  const std::size_t i = std::min(std::size_t(at), table.size() - 2);
-  return table[i] + (at - double(i)) * (table[i + 1] - table[i]);
-}
 
 std::vector<std::uint8_t> encode(const std::vector<double>& signal) {
   std::vector<std::uint8_t> code(signal.size());
@@ -47,17 +28,10 @@ std::uint8_t luma8(std::uint8_t r, std::uint8_t g, std::uint8_t b) {
 
 }  // namespace
 
-double srgb_encode(double signal, double* slope) {
-  if (slope) *slope = 0;
+double srgb_encode(double signal) {
   if (!(signal > 0)) return 0;
   if (signal >= 1) return 1;
-  if (signal <= 0.0031308) {
-    if (slope) *slope = 12.92;
-    return 12.92 * signal;
-  }
-  const double root = std::pow(signal, 1 / 2.4);
-  if (slope) *slope = 1.055 / 2.4 * root / signal;
-  return 1.055 * root - 0.055;
+  return signal <= 0.0031308 ? 12.92 * signal : 1.055 * std::pow(signal, 1 / 2.4) - 0.055;
 }
 
 Photometry::Photometry(const ResponseCurve& response)

@@ -12,9 +12,8 @@
 
 namespace previz::tracking {
 
-// Applies the sRGB transfer curve; `signal` is clipped to [0,1]. `slope`, where given, receives the
-// derivative (0 where clipped).
-double srgb_encode(double signal, double* slope = nullptr);
+// Applies the sRGB transfer curve; `signal` is clipped to [0,1].
+double srgb_encode(double signal);
 
 // Inverts the camera's response. Holds no frame.
 class Photometry {

@@ -1,42 +1,15 @@
 #include "daemon/tracking/tag_detector.hpp"
 
 #include <apriltag/apriltag.h>
-#include <apriltag/tag16h5.h>
-#include <apriltag/tag25h9.h>
-#include <apriltag/tag36h10.h>
-#include <apriltag/tag36h11.h>
-#include <apriltag/tagCircle21h7.h>
-#include <apriltag/tagCircle49h12.h>
-#include <apriltag/tagCustom48h12.h>
-#include <apriltag/tagStandard41h12.h>
-#include <apriltag/tagStandard52h13.h>
 
 #include <algorithm>
 #include <cmath>
 #include <tuple>
 
-#include "drivers/error.hpp"
+#include "daemon/tracking/tag_family.hpp"
 
 namespace previz::tracking {
 namespace {
-
-struct Family {
-  const char* name;
-  apriltag_family_t* (*create)();
-  void (*destroy)(apriltag_family_t*);
-};
-
-constexpr Family kFamilies[] = {
-    {"tag36h11", tag36h11_create, tag36h11_destroy},
-    {"tag25h9", tag25h9_create, tag25h9_destroy},
-    {"tag16h5", tag16h5_create, tag16h5_destroy},
-    {"tag36h10", tag36h10_create, tag36h10_destroy},
-    {"tagStandard41h12", tagStandard41h12_create, tagStandard41h12_destroy},
-    {"tagStandard52h13", tagStandard52h13_create, tagStandard52h13_destroy},
-    {"tagCircle21h7", tagCircle21h7_create, tagCircle21h7_destroy},
-    {"tagCircle49h12", tagCircle49h12_create, tagCircle49h12_destroy},
-    {"tagCustom48h12", tagCustom48h12_create, tagCustom48h12_destroy},
-};
 
 // Makes the border a cell wider on every side, around the same codes.
 void widen(apriltag_family_t& family) {
@@ -46,15 +19,6 @@ void widen(apriltag_family_t& family) {
     ++family.bit_x[bit];
     ++family.bit_y[bit];
   }
-}
-
-const Family& family_by_name(const std::string& name) {
-  std::string known;
-  for (const Family& family : kFamilies) {
-    if (name == family.name) return family;
-    add_to_list(known, family.name);
-  }
-  throw Error("tracking.family: \"" + name + "\" is not a tag family; known: " + known);
 }
 
 constexpr int kMinPictureSide =
@@ -119,27 +83,24 @@ bool goes_before(const TagDetection& a, const TagDetection& b) {
 }  // namespace
 
 struct TagDetector::Library {
-  const Family& functions;
-  apriltag_family_t* family;
+  TagFamily family;
   apriltag_detector_t* detector;
   apriltag_detector_t* fast;  // with several threads
 
   // The table of codes grows with the power of `max_hamming`: gigabytes for the large families at
   // the library's limit of 2.
   explicit Library(const DetectorSettings& settings)
-      : functions(family_by_name(settings.family)),
-        family(functions.create()),
+      : family(make_tag_family(settings.family, "tracking.family: ")),
         detector(apriltag_detector_create()),
         fast(apriltag_detector_create()) {
     if (settings.wide_border) widen(*family);
     for (apriltag_detector_t* d : {detector, fast})
-      apriltag_detector_add_family_bits(d, family, std::clamp(settings.max_hamming, 0, 2));
+      apriltag_detector_add_family_bits(d, family.get(), std::clamp(settings.max_hamming, 0, 2));
     fast->nthreads = std::max(1, settings.threads);
   }
   ~Library() {
     apriltag_detector_destroy(detector);
     apriltag_detector_destroy(fast);
-    functions.destroy(family);
   }
   Library(const Library&) = delete;
   Library& operator=(const Library&) = delete;

@@ -309,7 +309,8 @@ class AravisCamera final : public Camera {
     const bool has_clock = note.device_ns >= 0 && note.device_ns < 4'000'000'000'000'000'000;
     frame->timestamp_ns =
         clock_.to_host(has_clock ? note.device_ns : frame->arrival_ns, frame->arrival_ns);
-    const std::optional<Exposure> exposure = exposure_of(note, frame->timestamp_ns);
+    const std::optional<Exposure> exposure =
+        ledger_.of_frame(frame->timestamp_ns, note.exposure_s, note.exposure_gain);
     if (!exposure) return left_out("frames during an exposure change");
     apply_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
@@ -338,14 +339,6 @@ class AravisCamera final : public Camera {
     const bool as_agreed = note.pfnc == agreed_.pfnc && note.width == agreed_.format.width &&
                            note.height == agreed_.format.height;
     return as_agreed ? nullptr : other_format;
-  }
-
-  std::optional<Exposure> exposure_of(const aravis::FrameNote& note, std::int64_t timestamp_ns) {
-    const std::optional<Exposure> by_time = ledger_.of_frame(timestamp_ns);
-    if (!note.exposure_s) return by_time;
-    const double gain = note.exposure_gain.value_or(by_time ? by_time->gain : 0);
-    if (!is_exposure(*note.exposure_s, gain)) return by_time;
-    return Exposure{*note.exposure_s, gain};
   }
 
   const CameraSettings settings_;

@@ -1,3 +1,5 @@
+// By libjpeg itself and not by its TurboJPEG, which keeps only the text of the first warning, so
+// that padding before a marker would hide samples that are missing, and takes 500 scans.
 #include <csetjmp>
 #include <cstdio>
 // jpeglib.h needs what <cstdio> declares.

@@ -104,7 +104,9 @@ class LibcameraCamera final : public Camera {
     if (completed.timestamp_ns > 0)
       stamp_ns = sensor_time_ns(boottime_, completed.timestamp_ns, arrival_ns);
     frame->timestamp_ns = order_.time_of(stamp_ns, arrival_ns);
-    const std::optional<Exposure> exposure = exposure_of(completed, frame->timestamp_ns);
+    // A pipeline may report an exposure that has no gain yet.
+    const std::optional<Exposure> exposure =
+        ledger_.of_frame(frame->timestamp_ns, completed.exposure_s, completed.gain);
     if (!exposure) return left_out("frames during an exposure change");
     apply_exposure(*frame, *exposure, settings_.responsivity);
     return frame;
@@ -113,14 +115,6 @@ class LibcameraCamera final : public Camera {
   FramePtr left_out(const char* why) {
     ++counters_[why];
     return nullptr;
-  }
-
-  std::optional<Exposure> exposure_of(const Completed& completed, std::int64_t timestamp_ns) {
-    const std::optional<Exposure> by_time = ledger_.of_frame(timestamp_ns);
-    // Radiance cannot be divided by what a pipeline reports that has no gain yet.
-    if (!completed.exposure_s || !is_exposure(*completed.exposure_s, completed.gain))
-      return by_time;
-    return Exposure{*completed.exposure_s, completed.gain};
   }
 
   // Returns the planes one after the other, as the conversions want them.

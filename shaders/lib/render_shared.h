@@ -58,7 +58,6 @@ PREVIZ_CONST uint UNLIMITED = 0xffffffffu;
 
 PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 PREVIZ_CONST uint NO_INDEX = 0xffffffffu;
-PREVIZ_CONST uint MAX_DEPTH = 64u;
 
 // Features that a scene may require. Specialisation constant 0 is their union; a feature that is
 // left out changes no pixel.

@@ -7,9 +7,8 @@
 
 #include "daemon/render/renderer.hpp"
 #include "drivers/error.hpp"
-#include "tests/bench/measure.hpp"
+#include "tests/bench/frames_after_change.hpp"
 #include "tests/bench/tracers/shapes.hpp"
-#include "tests/bench/view_from_above.hpp"
 #include "tests/support/figure.hpp"
 
 namespace previz::bench {
@@ -35,34 +34,16 @@ void run(const Options& options) {
   const auto device = render::open_device();
   const scene::Scene scene = make_scene(options);
   const ViewFromAbove view(device, scene, options.width, options.height);
-  render::Renderer& renderer = *view.renderer;
-  const render::FrameInput& frame = view.frame;
-
-  // [0]: nothing changed, [1]: the figure did. In CPU time: the machine may be busy.
-  std::vector<double> placed_ms[2], whole_ms[2];
-  std::uint64_t rebuilt_trees = 0;
-  for (int round = -2; round < 2 * options.rounds; ++round) {
-    const std::size_t deformed = round & 1;
+  const ChangeTimes times = time_changes(view, options.rounds, [&](int round) {
     const double angle = 0.03 * std::sin(0.4 * round);  // a stride is some 16 frames long
     const std::vector<scene::Shape> shapes = {test::bent_limb(scene.deformations[0], angle)};
-    const double start = cpu_seconds();
-    if (deformed != 0) renderer.deform(shapes);
-    renderer.begin(frame);
-    const double placed = cpu_seconds();
-    renderer.render(1);
-    rebuilt_trees += renderer.counters().rebuilt_trees;
-    if (round < 0) continue;  // compiles the pipelines
-    placed_ms[deformed].push_back(1e3 * (placed - start));
-    whole_ms[deformed].push_back(1e3 * (cpu_seconds() - start));
-  }
+    return [&view, shapes] { view.renderer->deform(shapes); };
+  });
   std::printf("%s, %zu triangles, %d joints, %dx%d, 1 sample, CPU ms, %llu trees built anew\n\n",
               render::device_name(*device).c_str(), scene.meshes.back().triangles.size(),
               options.joints, options.width, options.height,
-              static_cast<unsigned long long>(rebuilt_trees));
-  std::printf("| frame | until the first ray | whole |\n| --- | --- | --- |\n");
-  for (const std::size_t deformed : {0, 1})
-    std::printf("| %s | %.2f | %.1f |\n", deformed != 0 ? "deformed" : "still",
-                median(placed_ms[deformed]), median(whole_ms[deformed]));
+              static_cast<unsigned long long>(times.rebuilt_trees));
+  print_changes(times, "deformed");
 }
 
 }  // namespace

@@ -7,9 +7,8 @@
 
 #include "daemon/render/renderer.hpp"
 #include "drivers/error.hpp"
-#include "tests/bench/measure.hpp"
+#include "tests/bench/frames_after_change.hpp"
 #include "tests/bench/tracers/shapes.hpp"
-#include "tests/bench/view_from_above.hpp"
 
 namespace previz::bench {
 namespace {
@@ -39,34 +38,18 @@ void run(const Options& options) {
   const auto device = render::open_device();
   const scene::Scene scene = make_scene(options.levels);
   const ViewFromAbove view(device, scene, options.width, options.height);
-  render::Renderer& renderer = *view.renderer;
-  const render::FrameInput& frame = view.frame;
-
-  // [0]: nothing moved, [1]: everything did. In CPU time: the machine may be busy.
-  std::vector<double> placed_ms[2], whole_ms[2];
-  for (int round = -2; round < 2 * options.rounds; ++round) {
-    const std::size_t moved = round & 1;
-    std::vector<scene::Instance> instances = scene.instances;
-    std::vector<set::Light> lights = scene.lights;
+  const ChangeTimes times = time_changes(view, options.rounds, [&](int round) {
     const glm::dvec3 step(0.01 * round, 0, 0.5);
+    std::vector<scene::Instance> instances = scene.instances;
     instances[1].world_from_object = glm::translate(glm::dmat4(1), step);
+    std::vector<set::Light> lights = scene.lights;
     lights[0].position += step;
-    const double start = cpu_seconds();
-    if (moved != 0) renderer.move(instances, lights);
-    renderer.begin(frame);
-    const double placed = cpu_seconds();
-    renderer.render(1);
-    if (round < 0) continue;  // compiles the pipelines
-    placed_ms[moved].push_back(1e3 * (placed - start));
-    whole_ms[moved].push_back(1e3 * (cpu_seconds() - start));
-  }
+    return [&view, instances, lights] { view.renderer->move(instances, lights); };
+  });
   std::printf("%s, %zu triangles, %dx%d, 1 sample, CPU ms\n\n",
               render::device_name(*device).c_str(), scene.meshes[1].triangles.size(), options.width,
               options.height);
-  std::printf("| frame | until the first ray | whole |\n| --- | --- | --- |\n");
-  for (const std::size_t moved : {0, 1})
-    std::printf("| %s | %.2f | %.1f |\n", moved != 0 ? "moved" : "still", median(placed_ms[moved]),
-                median(whole_ms[moved]));
+  print_changes(times, "moved");
 }
 
 }  // namespace

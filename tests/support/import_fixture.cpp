@@ -172,4 +172,9 @@ std::string Shoot::error() const {
   }
 }
 
+std::unique_ptr<session::StreamReader> Shoot::open_observer() const {
+  session::Session opened = session::open_session(session());
+  return session::open_stream(opened, "observer");
+}
+
 }  // namespace previz::exchange

@@ -9,6 +9,7 @@ extern "C" {
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <string>
@@ -69,6 +70,8 @@ class Shoot {
   ImportReport import() const;
   // The message, or "" if the import succeeded; checks that a failure leaves nothing.
   std::string error() const;
+  // Returns the frames of the film camera that were imported.
+  std::unique_ptr<session::StreamReader> open_observer() const;
 
  private:
   test::TemporaryDirectory directory_;

@@ -1,15 +1,6 @@
 #include "tests/support/tracking_synthetic.hpp"
 
 #include <apriltag/apriltag.h>
-#include <apriltag/tag16h5.h>
-#include <apriltag/tag25h9.h>
-#include <apriltag/tag36h10.h>
-#include <apriltag/tag36h11.h>
-#include <apriltag/tagCircle21h7.h>
-#include <apriltag/tagCircle49h12.h>
-#include <apriltag/tagCustom48h12.h>
-#include <apriltag/tagStandard41h12.h>
-#include <apriltag/tagStandard52h13.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,10 +8,10 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/matrix.hpp>
-#include <map>
 #include <stdexcept>
 
 #include "daemon/tracking/photometry.hpp"
+#include "daemon/tracking/tag_family.hpp"
 #include "drivers/calibration/pinhole.hpp"
 
 namespace previz::test {
@@ -33,30 +24,13 @@ struct Layout {
 };
 
 Layout layout(const std::string& name, int id) {
-  struct Entry {
-    apriltag_family_t* (*create)();
-    void (*destroy)(apriltag_family_t*);
-  };
-  static const std::map<std::string, Entry> families{
-      {"tag36h11", {tag36h11_create, tag36h11_destroy}},
-      {"tag25h9", {tag25h9_create, tag25h9_destroy}},
-      {"tag16h5", {tag16h5_create, tag16h5_destroy}},
-      {"tag36h10", {tag36h10_create, tag36h10_destroy}},
-      {"tagStandard41h12", {tagStandard41h12_create, tagStandard41h12_destroy}},
-      {"tagStandard52h13", {tagStandard52h13_create, tagStandard52h13_destroy}},
-      {"tagCircle21h7", {tagCircle21h7_create, tagCircle21h7_destroy}},
-      {"tagCircle49h12", {tagCircle49h12_create, tagCircle49h12_destroy}},
-      {"tagCustom48h12", {tagCustom48h12_create, tagCustom48h12_destroy}},
-  };
-  const Entry& entry = families.at(name);
-  apriltag_family_t* family = entry.create();
-  image_u8_t* image = apriltag_to_image(family, id);
+  const tracking::TagFamily family = tracking::make_tag_family(name);
+  image_u8_t* image = apriltag_to_image(family.get(), id);
   Layout l{family->total_width, family->width_at_border, {}};
   for (int y = 0; y < l.total; ++y)
     for (int x = 0; x < l.total; ++x) l.cells.push_back(image->buf[y * image->stride + x]);
   std::free(image->buf);  // the packaged library does not export image_u8_destroy
   std::free(image);
-  entry.destroy(family);
   return l;
 }
 

@@ -17,11 +17,6 @@ namespace import_lost_frames_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
-std::unique_ptr<session::StreamReader> open(const Shoot& shoot) {
-  session::Session opened = session::open_session(shoot.session());
-  return session::open_stream(opened, "observer");
-}
-
 VideoForm small_form() {
   VideoForm form;
   form.encoder = "png";
@@ -53,7 +48,7 @@ struct Timed {
 Timed import_video(const Shoot& shoot) {
   Timed timed;
   timed.notes = shoot.import().notes;
-  const auto stream = open(shoot);
+  const auto stream = shoot.open_observer();
   for (std::size_t i = 0; i < stream->records().size(); ++i) {
     const FramePtr frame = stream->read(i);
     timed.frames[frame->timestamp_ns] = frame->bytes;
@@ -312,7 +307,7 @@ TEST(ImportVideo, PosesOfLostFramesAreLeftOut) {
   EXPECT_EQ(report.observer_frames, std::uint64_t{texture_frames - 1});
   EXPECT_EQ(report.poses, 2u);
   EXPECT_NE(report.notes.back().find("1 pose belongs to a lost frame"), std::string::npos);
-  const auto stream = open(shoot);
+  const auto stream = shoot.open_observer();
   EXPECT_EQ(stream->read(1)->sequence, 2u);
   EXPECT_EQ(stream->read(1)->timestamp_ns, 80'000'000);
 }

@@ -26,11 +26,6 @@ Rgb operator*(const Matrix& m, const Rgb& v) {
   return product;
 }
 
-std::unique_ptr<session::StreamReader> open(const Shoot& shoot) {
-  session::Session opened = session::open_session(shoot.session());
-  return session::open_stream(opened, "observer");
-}
-
 // From linear Rec. 709: BT.2087 table 2; SMPTE EG 432-1 by way of XYZ; and C. Poynton, Digital
 // Video and HD, chapter "Color science for video", for the two of Rec. 601.
 Matrix from_rec709(AVColorPrimaries primaries) {
@@ -258,7 +253,7 @@ TEST_P(ImportVideoColors, ComeInAsTheTagsSay) {
   const ImportReport report = shoot.import();
   EXPECT_EQ(report.notes.at(0).find("(assumed)") == std::string::npos, form.tagged)
       << report.notes.at(0);
-  const FramePtr frame = open(shoot)->read(0);
+  const FramePtr frame = shoot.open_observer()->read(0);
   for (std::size_t i = 0; i < 4; ++i) {
     const Rgb is = pixel(*frame, i % 2 ? 48 : 16, i / 2 ? 48 : 16);
     const Rgb signal = signals_of(form)[i];
@@ -339,7 +334,7 @@ TEST(ImportVideo, PrimariesOfSmallDifferenceAreConvertedToo) {
     write_video(shoot.folder() / "take.mkv", video, {frame_of(form)});
     shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
     ASSERT_EQ(shoot.error(), "");
-    const FramePtr frame = open(shoot)->read(0);
+    const FramePtr frame = shoot.open_observer()->read(0);
     for (std::size_t i = 0; i < 4; ++i)
       for (std::size_t c = 0; c < 3; ++c)
         // The published matrices have four digits.

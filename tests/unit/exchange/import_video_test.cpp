@@ -17,11 +17,6 @@ namespace import_video_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
-std::unique_ptr<session::StreamReader> open(const Shoot& shoot) {
-  session::Session opened = session::open_session(shoot.session());
-  return session::open_stream(opened, "observer");
-}
-
 // Its quadrants are red, green, blue and white.
 Bytes marked_picture(int width, int height) {
   constexpr std::array<std::array<std::uint8_t, 3>, 4> colors = {
@@ -66,7 +61,7 @@ TEST(ImportVideo, IsTurnedAsItIsToBeShown) {
     const ImportReport report = shoot.import();
     const bool upright = a == 1 && d == 1;
     EXPECT_EQ(report.notes.size(), upright ? 1u : 2u);
-    const FramePtr frame = open(shoot)->read(0);
+    const FramePtr frame = shoot.open_observer()->read(0);
     ASSERT_EQ(frame->width, a == 0 ? 16 : 48);
     ASSERT_EQ(frame->height, a == 0 ? 48 : 16);
     for (int stored = 0; stored < 4; ++stored) {
@@ -91,7 +86,7 @@ TEST(ImportVideo, AnAngleThatIsNoQuarterTurnIsRefused) {
   EXPECT_NE(shoot.error().find("must be 0, 90, 180 or 270"), std::string::npos);
   shoot.json["observer"]["read_as"] = {{"rotation_deg", 0}};
   EXPECT_EQ(shoot.error(), "");
-  EXPECT_EQ(open(shoot)->read(0)->width, 48);
+  EXPECT_EQ(shoot.open_observer()->read(0)->width, 48);
 }
 
 TEST(ImportVideo, PixelsBecomeSquare) {
@@ -107,7 +102,7 @@ TEST(ImportVideo, PixelsBecomeSquare) {
     write_video(shoot.folder() / "take.mov", form, {marked_picture(48, 16)});
     shoot.json["observer"] = {{"video", "take.mov"}, {"fps", 25}, {"exposure", 1}};
     ASSERT_EQ(shoot.error(), "");
-    const FramePtr frame = open(shoot)->read(0);
+    const FramePtr frame = shoot.open_observer()->read(0);
     ASSERT_EQ(frame->width, shape.width);
     ASSERT_EQ(frame->height, shape.height);
     for (int i = 0; i < 4; ++i)
@@ -145,7 +140,7 @@ TEST(ImportPictures, AreTurnedAsEXIFSays) {
     shoot.json["observer"] = {{"pictures", {"photo.jpg"}}, {"fps", 25}, {"exposure", 1}};
     const ImportReport report = shoot.import();
     EXPECT_EQ(report.notes.empty(), orientation == 1);
-    const FramePtr frame = open(shoot)->read(0);
+    const FramePtr frame = shoot.open_observer()->read(0);
     EXPECT_EQ(frame->width, orientation > 4 ? 32 : 64);
     EXPECT_EQ(quadrant_at(*frame, 8, 8), top[static_cast<std::size_t>(orientation - 1)][0]);
     EXPECT_EQ(quadrant_at(*frame, frame->width - 8, 8),
@@ -202,7 +197,7 @@ TEST(ImportVideo, ACamerasLogarithmicCurveIsRefused) {
       << shoot.error();
   shoot.json["observer"]["read_as"] = {{"transfer", "as recorded"}};
   const ImportReport report = shoot.import();
-  EXPECT_EQ(open(shoot)->read(0)->bytes, noise());
+  EXPECT_EQ(shoot.open_observer()->read(0)->bytes, noise());
   EXPECT_NE(report.notes.at(0).find("as recorded"), std::string::npos);
 
   form.metadata = {{"comment", "graded from S-Log3"}};  // people's words

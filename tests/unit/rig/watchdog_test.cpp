@@ -80,78 +80,72 @@ TEST_F(RigLive, TheWatchdogIsFedWhileTheCameraIsSilent) {
   });
 }
 
+class ServiceTest : public testing::Test {
+ protected:
+  void expect_silence() {
+    systemd_.skip();
+    EXPECT_EQ(systemd_.next(300), "");
+  }
+
+  const test::TemporaryDirectory directory_;
+  NotifySocket systemd_{directory_ / "notify"};
+  std::ostringstream log_;
+  report::Reports reports_{report::lines_to(log_)};
+  pipeline::Liveness liveness_;
+};
+
 // systemd waits 90 s for a start unless it is asked for more.
-TEST(ServiceTest, AsksForMoreTimeUntilItIsReadyAndWhileItStops) {
-  const test::TemporaryDirectory directory;
-  NotifySocket systemd(directory / "notify");
-  std::ostringstream log;
-  report::Reports reports(report::lines_to(log));
-  pipeline::Liveness liveness;
-  pipeline::Liveness::Pulse pulse(liveness, "main loop");
+TEST_F(ServiceTest, AsksForMoreTimeUntilItIsReadyAndWhileItStops) {
+  pipeline::Liveness::Pulse pulse(liveness_, "main loop");
   pulse.begin(std::chrono::hours(1));
-  Service service(liveness, reports, {});
-  for (int times = 0; times < 3; ++times) systemd.until("EXTEND_TIMEOUT_USEC=");
+  Service service(liveness_, reports_, {});
+  for (int times = 0; times < 3; ++times) systemd_.until("EXTEND_TIMEOUT_USEC=");
   service.ready("set \"desk\"");
-  systemd.until("READY=1");
-  systemd.until("WATCHDOG=1");
+  systemd_.until("READY=1");
+  systemd_.until("WATCHDOG=1");
   service.stopping();
-  systemd.until("STOPPING=1");
-  for (int times = 0; times < 3; ++times) systemd.until("EXTEND_TIMEOUT_USEC=");
+  systemd_.until("STOPPING=1");
+  for (int times = 0; times < 3; ++times) systemd_.until("EXTEND_TIMEOUT_USEC=");
   pulse.begin(std::chrono::milliseconds(-1));  // it hangs
   test::must_come("the hang is reported",
-                  [&] { return log.str() == "stopped responding: main loop\n"; });
-  systemd.skip();
-  EXPECT_EQ(systemd.next(300), "");
+                  [&] { return log_.str() == "stopped responding: main loop\n"; });
+  expect_silence();
 }
 
 // A camera that hangs takes no time from the disk that takes what is queued.
-TEST(ServiceTest, WhileATakeIsClosedTheMainThreadAloneDecides) {
-  const test::TemporaryDirectory directory;
-  NotifySocket systemd(directory / "notify");
-  std::ostringstream log;
-  report::Reports reports(report::lines_to(log));
-  pipeline::Liveness liveness;
-  pipeline::Liveness::Pulse main(liveness, Service::main_thread), camera(liveness, "observer");
+TEST_F(ServiceTest, WhileATakeIsClosedTheMainThreadAloneDecides) {
+  pipeline::Liveness::Pulse main(liveness_, Service::main_thread), camera(liveness_, "observer");
   main.begin(std::chrono::hours(1));
   camera.begin(std::chrono::milliseconds(-1));  // it hangs
-  Service service(liveness, reports, {});
+  Service service(liveness_, reports_, {});
   service.ready("set \"desk\"");
-  systemd.until("READY=1");
-  systemd.skip();
-  EXPECT_EQ(systemd.next(300), "");
+  systemd_.until("READY=1");
+  expect_silence();
   service.closing_take(true);  // another set was read
-  systemd.until("WATCHDOG=1");
+  systemd_.until("WATCHDOG=1");
   service.stopping();
-  for (int times = 0; times < 3; ++times) systemd.until("EXTEND_TIMEOUT_USEC=");
+  for (int times = 0; times < 3; ++times) systemd_.until("EXTEND_TIMEOUT_USEC=");
   service.closing_take(false);
-  systemd.next(100);
-  systemd.skip();
-  EXPECT_EQ(systemd.next(300), "");
+  systemd_.next(100);
+  expect_silence();
   service.closing_take(true);
-  systemd.until("EXTEND_TIMEOUT_USEC=");
+  systemd_.until("EXTEND_TIMEOUT_USEC=");
   main.begin(std::chrono::milliseconds(-1));  // it does not wait for the disk any more
-  systemd.next(100);
-  systemd.skip();
-  EXPECT_EQ(systemd.next(300), "");
+  systemd_.next(100);
+  expect_silence();
 }
 
 // A start may be granted ten minutes, but none of them once it is to stop.
-TEST(ServiceTest, AsksForNoTimeToStartWhatIsToStop) {
-  const test::TemporaryDirectory directory;
-  NotifySocket systemd(directory / "notify");
-  std::ostringstream log;
-  report::Reports reports(report::lines_to(log));
-  pipeline::Liveness liveness;
+TEST_F(ServiceTest, AsksForNoTimeToStartWhatIsToStop) {
   std::stop_source stop;
-  Service service(liveness, reports, stop.get_token());
-  systemd.until("EXTEND_TIMEOUT_USEC=");
+  Service service(liveness_, reports_, stop.get_token());
+  systemd_.until("EXTEND_TIMEOUT_USEC=");
   stop.request_stop();
-  systemd.next(100);
-  systemd.skip();
-  EXPECT_EQ(systemd.next(300), "");
+  systemd_.next(100);
+  expect_silence();
   service.stopping();
-  systemd.until("STOPPING=1");
-  systemd.until("EXTEND_TIMEOUT_USEC=");
+  systemd_.until("STOPPING=1");
+  systemd_.until("EXTEND_TIMEOUT_USEC=");
 }
 
 // A camera whose giving back comes at the same time as a stop.

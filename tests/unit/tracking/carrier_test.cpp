@@ -6,6 +6,7 @@
 
 #include "daemon/tracking/carrier_pose.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/pose_error.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking {
@@ -36,17 +37,6 @@ struct Held {
 glm::dmat4 placed(const glm::dvec3& position, double tilt_rad) {
   return glm::rotate(glm::translate(glm::dmat4(1), position), tilt_rad,
                      glm::normalize(glm::dvec3(1, 0.4, 0.2)));
-}
-
-// (rotation, translation) of the small motion from `estimate` to `truth`, in the estimate's frame.
-cv::Vec<double, 6> error_between(const glm::dmat4& estimate, const glm::dmat4& truth) {
-  const glm::dmat4 d = glm::inverse(estimate) * truth;
-  return {(d[1][2] - d[2][1]) / 2,
-          (d[2][0] - d[0][2]) / 2,
-          (d[0][1] - d[1][0]) / 2,
-          d[3][0],
-          d[3][1],
-          d[3][2]};
 }
 
 TEST(Carriers, AreFoundWhereTheyAre) {
@@ -89,10 +79,8 @@ TEST(Carriers, CovarianceHoldsOnPictures) {
     const Track track = tracker->track(picture(held.seen(), random, 200));
     if (!track.carriers[0].pose) continue;
     ++found;
-    const auto error =
-        error_between(track.carriers[0].pose->world_from_carrier, held.world_from_tray);
-    const Matrix6 covariance(track.carriers[0].pose->covariance.data());
-    sum += error.dot(covariance.solve(error, cv::DECOMP_SVD));
+    const CarrierPose& pose = *track.carriers[0].pose;
+    sum += square_in_sigmas(pose.covariance, pose.world_from_carrier, held.world_from_tray);
   }
   EXPECT_GE(found, trials * 3 / 4);
   EXPECT_LT(sum / found, 6 + 4 * std::sqrt(12.0 / found));

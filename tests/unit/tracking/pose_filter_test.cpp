@@ -10,31 +10,15 @@
 #include <opencv2/core.hpp>
 #include <random>
 
+#include "tests/support/pose_error.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking {
 namespace pose_filter_test {
 
-using Error6 = cv::Vec<double, 6>;
-
 constexpr double sigma_rad = 1e-4, sigma_m = 1e-4;
 
-// The small motion d, rotation then translation, with to = from * d.
-Error6 between(const glm::dmat4& from, const glm::dmat4& to) {
-  const glm::dmat4 d = glm::inverse(from) * to;
-  return {(d[1][2] - d[2][1]) / 2,
-          (d[2][0] - d[0][2]) / 2,
-          (d[0][1] - d[1][0]) / 2,
-          d[3][0],
-          d[3][1],
-          d[3][2]};
-}
-
-double in(const std::array<double, 36>& covariance, const Error6& error) {
-  return error.dot(cv::Matx<double, 6, 6>(covariance.data()).solve(error, cv::DECOMP_SVD));
-}
-
-glm::dmat4 moved(const glm::dmat4& pose, const Error6& by) {
+glm::dmat4 moved(const glm::dmat4& pose, const PoseError& by) {
   const glm::dvec3 w(by[0], by[1], by[2]);
   const double angle = glm::length(w);
   glm::dmat4 step(angle > 0 ? glm::mat3_cast(glm::angleAxis(angle, w / angle)) : glm::dmat3(1));
@@ -56,12 +40,12 @@ struct Shoot {
   explicit Shoot(set::Tracking wish = settings_for(table())) : settings(std::move(wish)) {}
 
   // The next frame's track, with the camera at `at`.
-  Track track(std::vector<int> tags = {0, 1, 2}, const Error6& bias = {}, double noise = 1) {
+  Track track(std::vector<int> tags = {0, 1, 2}, const PoseError& bias = {}, double noise = 1) {
     time_ns += kFrameNs;
     Track result;
     result.status = TrackStatus::tracked;
     result.pose.emplace();
-    Error6 error = bias;
+    PoseError error = bias;
     for (int i = 0; i < 6; ++i) {
       const double sigma = noise * (i < 3 ? sigma_rad : sigma_m);
       result.pose->covariance[static_cast<std::size_t>(7 * i)] = sigma * sigma;
@@ -92,7 +76,7 @@ glm::dmat4 hand_held(const glm::dmat4& start, double seconds) {
 }
 
 double step_size(const glm::dmat4& a, const glm::dmat4& b) {
-  return std::sqrt(cv::norm(between(a, b), cv::NORM_L2SQR));
+  return std::sqrt(cv::norm(error_between(a, b), cv::NORM_L2SQR));
 }
 
 // After two seconds of rest a pose is the mean of many: what is left of the jitter from frame to
@@ -112,7 +96,7 @@ TEST(PoseFilter, ACameraAtRestIsCalm) {
       raw += std::pow(step_size(last_raw, track.pose->world_from_camera), 2);
       shown += std::pow(step_size(last_shown, pose->world_from_camera), 2);
     }
-    off += in(track.pose->covariance, between(shoot.at, pose->world_from_camera)) / 6;
+    off += square_in_sigmas(track.pose->covariance, shoot.at, pose->world_from_camera) / 6;
     last_raw = track.pose->world_from_camera;
     last_shown = pose->world_from_camera;
   }
@@ -133,8 +117,8 @@ TEST(PoseFilter, AMovingCameraIsFollowedWithinTheNoiseOfAPose) {
     const Track track = shoot.track();
     const std::optional<ShownPose> pose = shoot.show(track);
     ASSERT_TRUE(pose);
-    const double off =
-        in(track.pose->covariance, between(pose->world_from_camera, track.pose->world_from_camera));
+    const double off = square_in_sigmas(track.pose->covariance, pose->world_from_camera,
+                                        track.pose->world_from_camera);
     EXPECT_LE(off, pose_surprise * (1 + 1e-3)) << i;  // small angles: sin(x) = x to 1e-6 here
     worst = std::max(worst, off);
   }
@@ -148,19 +132,19 @@ TEST(PoseFilter, OtherTagsMakeNoJump) {
   Shoot shoot;
   shoot.fit_px = 0.2;  // the map is wrong by half a pixel
   shoot.rest(50);
-  const Error6 bias(0, 8 * sigma_rad, 0, 8 * sigma_m, 0, 0);
+  const PoseError bias(0, 8 * sigma_rad, 0, 8 * sigma_m, 0, 0);
   glm::dmat4 last = shoot.show(shoot.track())->world_from_camera;
   for (int i = 0; i < 50; ++i) {
     const Track track = shoot.track({1}, bias);
     const ShownPose expected = *shoot.filter.expected(shoot.time_ns);
     const glm::dmat4 shown = shoot.show(track)->world_from_camera;
-    EXPECT_LE(in(expected.covariance, between(expected.world_from_camera, shown)),
+    EXPECT_LE(square_in_sigmas(expected.covariance, expected.world_from_camera, shown),
               pose_surprise * (1 + 1e-3))
         << i;
     EXPECT_LT(step_size(last, shown), 0.2 * std::sqrt(bias.dot(bias))) << i;
     last = shown;
   }
-  const Error6 left = between(moved(shoot.at, bias), last);
+  const PoseError left = error_between(moved(shoot.at, bias), last);
   std::printf("  after two seconds %.2f of the step is left\n",
               std::sqrt(left.dot(left) / bias.dot(bias)));
   EXPECT_LT(std::sqrt(left.dot(left) / bias.dot(bias)), 0.2);
@@ -175,7 +159,7 @@ TEST(PoseFilter, AMotionIsNotLaidToAMapThatFits) {
     shoot.at = moved(shoot.at, {0, 8 * sigma_rad, 0, 8 * sigma_m, 0, 0});
     const Track track = shoot.track(tags);
     const glm::dmat4 shown = shoot.show(track)->world_from_camera;
-    EXPECT_LE(in(track.pose->covariance, between(shown, track.pose->world_from_camera)),
+    EXPECT_LE(square_in_sigmas(track.pose->covariance, shown, track.pose->world_from_camera),
               pose_surprise * (1 + 1e-3));
   }
 }
@@ -188,8 +172,9 @@ TEST(PoseFilter, AWorsePoseCountsLess) {
     const Track track = shoot.track({2}, {}, 10);
     const ShownPose expected = *shoot.filter.expected(shoot.time_ns);
     const ShownPose shown = *shoot.show(track);
-    EXPECT_LE(in(expected.covariance, between(expected.world_from_camera, shown.world_from_camera)),
-              pose_surprise * (1 + 1e-3));
+    EXPECT_LE(
+        square_in_sigmas(expected.covariance, expected.world_from_camera, shown.world_from_camera),
+        pose_surprise * (1 + 1e-3));
     EXPECT_LT(step_size(shoot.at, shown.world_from_camera), 3 * sigma_m);
   }
 }
@@ -209,7 +194,7 @@ TEST(PoseFilter, HoldsWhileTheTagsAreCovered) {
     EXPECT_NEAR(pose->held_s, 1e-9 * i * kFrameNs, 1e-12);
     EXPECT_GT(pose->held_s, last_s);
     last_s = pose->held_s;
-    EXPECT_LT(in(pose->covariance, between(pose->world_from_camera, shoot.at)), 22.5) << i;
+    EXPECT_LT(square_in_sigmas(pose->covariance, pose->world_from_camera, shoot.at), 22.5) << i;
   }
   EXPECT_EQ(held, 12);
   // What comes back is shown as it is.
@@ -220,7 +205,7 @@ TEST(PoseFilter, HoldsWhileTheTagsAreCovered) {
 
 TEST(PoseFilter, GoesOnWithAMotionWhileItIsLikely) {
   Shoot shoot;
-  const Error6 step(0.004, 0.002, 0, 0.008, 0, 0.002);  // 0.2 m/s, 0.1 rad/s
+  const PoseError step(0.004, 0.002, 0, 0.008, 0, 0.002);  // 0.2 m/s, 0.1 rad/s
   for (int i = 0; i < 50; ++i) {
     shoot.at = moved(shoot.at, step);
     shoot.show(shoot.track());
@@ -258,8 +243,8 @@ TEST(PoseFilter, ACutBeginsAnew) {
   shoot.rest(20);
   shoot.at = camera_looking({-0.4, -0.5, 0.5}, {0.02, 0.03, 0});
   Track cut = shoot.track();
-  EXPECT_LE(in(cut.pose->covariance,
-               between(shoot.show(cut)->world_from_camera, cut.pose->world_from_camera)),
+  EXPECT_LE(square_in_sigmas(cut.pose->covariance, shoot.show(cut)->world_from_camera,
+                             cut.pose->world_from_camera),
             pose_surprise * 1.001);
   // So does a pause, after which the last pose says nothing.
   shoot.time_ns += 2'000'000'000;

@@ -1,0 +1,48 @@
+#include "daemon/tracking/tag_family.hpp"
+
+#include <apriltag/apriltag.h>
+#include <apriltag/tag16h5.h>
+#include <apriltag/tag25h9.h>
+#include <apriltag/tag36h10.h>
+#include <apriltag/tag36h11.h>
+#include <apriltag/tagCircle21h7.h>
+#include <apriltag/tagCircle49h12.h>
+#include <apriltag/tagCustom48h12.h>
+#include <apriltag/tagStandard41h12.h>
+#include <apriltag/tagStandard52h13.h>
+
+#include "drivers/error.hpp"
+
+namespace previz::tracking {
+namespace {
+
+struct KnownFamily {
+  const char* name;
+  apriltag_family_t* (*create)();
+  void (*destroy)(apriltag_family_t*);
+};
+
+constexpr KnownFamily known_families[] = {
+    {"tag36h11", tag36h11_create, tag36h11_destroy},
+    {"tag25h9", tag25h9_create, tag25h9_destroy},
+    {"tag16h5", tag16h5_create, tag16h5_destroy},
+    {"tag36h10", tag36h10_create, tag36h10_destroy},
+    {"tagStandard41h12", tagStandard41h12_create, tagStandard41h12_destroy},
+    {"tagStandard52h13", tagStandard52h13_create, tagStandard52h13_destroy},
+    {"tagCircle21h7", tagCircle21h7_create, tagCircle21h7_destroy},
+    {"tagCircle49h12", tagCircle49h12_create, tagCircle49h12_destroy},
+    {"tagCustom48h12", tagCustom48h12_create, tagCustom48h12_destroy},
+};
+
+}  // namespace
+
+TagFamily make_tag_family(const std::string& name, const std::string& where) {
+  std::string known;
+  for (const KnownFamily& family : known_families) {
+    if (name == family.name) return {family.create(), family.destroy};
+    add_to_list(known, family.name);
+  }
+  throw Error(where + "\"" + name + "\" is not a tag family; known: " + known);
+}
+
+}  // namespace previz::tracking
