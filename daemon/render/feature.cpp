@@ -1,12 +1,14 @@
 #include "daemon/render/feature.hpp"
 
 #include <algorithm>
-#include <array>
+#include <cassert>
+#include <functional>
 #include <glm/gtc/packing.hpp>
 #include <span>
 #include <vector>
 
 #include "daemon/render/gpu_lights.hpp"
+#include "daemon/scene/material_extensions.hpp"
 #include "shaders/lib/render_shared.h"
 
 namespace previz::render {
@@ -20,20 +22,11 @@ bool is_textured(std::uint32_t texture) {
 }
 
 bool reflects(const Material& m, const Scene&, double) {
-  return m.metallic > 0 || (scene::has_opaque_part(m) && m.specular > 0 && m.ior > 1);
-}
-
-bool has_coat_color(const Material& m, const Scene&, double) {
-  return scene::has_opaque_part(m) && m.specular > 0 && m.ior > 1 && scene::has_specular_color(m);
+  return m.metallic > 0 || scene::has_coat(m);
 }
 
 bool glows(const Material& m, const Scene&, double) {
   return scene::emits(m);
-}
-
-bool has_layer_texture(const Material& m, const Scene&, double) {
-  const auto layers = std::span(scene::material_textures).subspan(scene::first_layer_texture);
-  return std::ranges::any_of(layers, [&](auto texture) { return is_textured(m.*texture); });
 }
 
 // A texture may leave lacquer and sheen off some of the material.
@@ -101,7 +94,8 @@ bool lamps_shine(const Scene& scene) {
   return std::ranges::any_of(scene.lights, shines) || scene::may_glow(scene);
 }
 
-constexpr std::array<Feature, 31> feature_table = {{
+// The features that no single extension of materials brings.
+constexpr Feature own_features[] = {
     {.name = "two worlds",
      .bit = gpu::FEATURE_FORKS,
      .can_be_carried = true,
@@ -142,33 +136,6 @@ constexpr std::array<Feature, 31> feature_table = {{
      .in_material = reflects,
      .used = "a surface reflects: metal, or the sheen of paint or plastic",
      .left_out = "every surface is matt"},
-    {.name = "coloured gloss",
-     .bit = gpu::FEATURE_COAT_COLOR,
-     .can_be_carried = true,
-     .in_material = has_coat_color,
-     .used = "paint or plastic reflects in its own colour",
-     .left_out = "paint and plastic reflect all colours alike"},
-    {.name = "brushed metal",
-     .bit = gpu::FEATURE_ANISOTROPY,
-     .can_be_carried = true,
-     .in_material =
-         [](const Material& m, const Scene& scene, double alpha) {
-           return scene::is_anisotropic(m) && reflects(m, scene, alpha);
-         },
-     .used = "a surface stretches highlights in one direction, as brushed metal does",
-     .left_out = "no surface stretches highlights in one direction"},
-    {.name = "cloth",
-     .bit = gpu::FEATURE_SHEEN,
-     .can_be_carried = true,
-     .in_material = [](const Material& m, const Scene&, double) { return scene::has_sheen(m); },
-     .used = "a surface has the soft shine of cloth where it is seen from the side",
-     .left_out = "no surface shines as cloth does"},
-    {.name = "lacquer",
-     .bit = gpu::FEATURE_CLEARCOAT,
-     .can_be_carried = true,
-     .in_material = [](const Material& m, const Scene&, double) { return m.clearcoat > 0; },
-     .used = "a surface has a clear coat above its own",
-     .left_out = "no surface has a clear coat above its own"},
     {.name = "metal",
      .in_material = [](const Material& m, const Scene&, double) { return m.metallic > 0; },
      .used = "an object is metal",
@@ -223,12 +190,6 @@ constexpr std::array<Feature, 31> feature_table = {{
          },
      .used = "a surface has its colour or detail from an image",
      .left_out = "no surface has its colour or detail from an image"},
-    {.name = "textures of layers",
-     .bit = gpu::FEATURE_LAYER_TEXTURES,
-     .can_be_carried = true,
-     .in_material = has_layer_texture,
-     .used = "an image says where a surface is glass, glossy, lacquered, brushed or cloth",
-     .left_out = "no image says where a surface is glass, glossy, lacquered, brushed or cloth"},
     {.name = "texture mappings",
      .bit = gpu::FEATURE_MAPPINGS,
      .can_be_carried = true,
@@ -331,13 +292,46 @@ constexpr std::array<Feature, 31> feature_table = {{
      .in_frame = [](bool, const Demand& d) { return d.denoises; },
      .used = "noise is removed from the picture that is shown",
      .left_out = "noise is left in the picture that is shown"},
-}};
-static_assert(feature_table.size() <= max_features);
+};
+
+Feature feature_of(const scene::MaterialFeature& feature) {
+  return {.name = feature.name,
+          .bit = feature.bit,
+          .can_be_carried = true,
+          .of_extension = feature.is_asked_for,
+          .used = feature.used,
+          .left_out = feature.left_out};
+}
+
+// Returns all features in the order in which `check` names them: those of extensions of materials
+// follow gloss, the newest first, which has the highest bit.
+std::vector<Feature> all_features() {
+  std::vector<Feature> of_extensions;
+  for (const scene::MaterialExtension& extension : scene::material_extensions())
+    if (extension.feature) of_extensions.push_back(feature_of(*extension.feature));
+  std::ranges::sort(of_extensions, std::ranges::greater(), &Feature::bit);
+  std::vector<Feature> all;
+  for (const Feature& own : own_features) {
+    all.push_back(own);
+    if (own.bit == gpu::FEATURE_GLOSSY)
+      all.insert(all.end(), of_extensions.begin(), of_extensions.end());
+    if (own.bit == gpu::FEATURE_TEXTURES) all.push_back(feature_of(scene::layer_texture_feature()));
+  }
+  assert(all.size() <= max_features);
+  return all;
+}
+
+bool asks_for(const Material& material, const Feature& feature, const Scene& scene,
+              double specular_alpha) {
+  if (feature.of_extension) return feature.of_extension(material);
+  return feature.in_material && feature.in_material(material, scene, specular_alpha);
+}
 
 }  // namespace
 
 std::span<const Feature> features() {
-  return feature_table;
+  static const std::vector<Feature> all = all_features();
+  return all;
 }
 
 MaterialFeatures material_features(const Scene& scene, double specular_alpha) {
@@ -347,22 +341,20 @@ MaterialFeatures material_features(const Scene& scene, double specular_alpha) {
     if (seen[index] || !can_be_hit(scene.meshes[mesh])) return;
     seen[index] = true;
     const Material& material = scene.materials[index];
-    for (std::size_t row = 0; row < feature_table.size(); ++row)
-      if (!result[row] && feature_table[row].in_material)
-        result[row] = feature_table[row].in_material(material, scene, specular_alpha);
+    for (std::size_t row = 0; row < features().size(); ++row)
+      result[row] = result[row] || asks_for(material, features()[row], scene, specular_alpha);
   });
   return result;
 }
 
 bool is_needed(const Feature& feature, const Demand& demand) {
-  const bool in_material =
-      demand.materials[static_cast<std::size_t>(&feature - feature_table.data())];
+  const bool in_material = demand.materials[static_cast<std::size_t>(&feature - features().data())];
   return feature.in_frame ? feature.in_frame(in_material, demand) : in_material;
 }
 
 std::uint32_t needed_bits(const Demand& demand) {
   std::uint32_t bits = 0;
-  for (const Feature& feature : feature_table)
+  for (const Feature& feature : features())
     if (feature.bit != 0 && is_needed(feature, demand)) bits |= feature.bit;
   return bits;
 }

@@ -1,8 +1,7 @@
 // This table lists the renderer's features: the name of each, when a frame needs it, which bit the
 // shaders are specialised on, and what `previzd check` says about it. The pipelines, `check` and
-// `trade` all use this table (shaders/README.md, "Only what the scene requires"). A new feature of
-// materials needs a bit in shaders/lib/render_shared.h, a row here, and code that reads and draws
-// it.
+// `trade` all use this table (shaders/README.md, "Only what the scene requires"). What draws an
+// extension of materials is in the table of extensions (daemon/scene/material_extensions.hpp).
 #pragma once
 
 #include <bitset>
@@ -14,7 +13,7 @@
 
 namespace previz::render {
 
-inline constexpr std::size_t max_features = 32;
+inline constexpr std::size_t max_features = 64;
 // One bit per row of the table, in its order.
 using MaterialFeatures = std::bitset<max_features>;
 
@@ -40,6 +39,7 @@ struct Feature {
                                 // picture is then the same, bit for bit
   // Returns whether a material asks for the feature. Null: no material does.
   bool (*in_material)(const scene::Material&, const scene::Scene&, double specular_alpha) = nullptr;
+  bool (*of_extension)(const scene::Material&) = nullptr;  // instead, of scene::MaterialFeature
   // Returns whether a frame needs the feature, given whether a material in use asks for it. Null: a
   // frame needs it exactly where a material asks for it.
   bool (*in_frame)(bool in_material, const Demand&) = nullptr;

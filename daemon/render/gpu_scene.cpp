@@ -11,10 +11,12 @@
 #include <numbers>
 #include <tuple>
 #include <utility>
+#include <variant>
 
 #include "daemon/render/albedo_table.hpp"
 #include "daemon/render/gpu_lights.hpp"
 #include "daemon/render/mip_levels.hpp"
+#include "daemon/scene/material_extensions.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
@@ -109,10 +111,19 @@ std::array<std::uint32_t, 2> packed_mappings(const scene::Material& m) {
   return packed;
 }
 
-// Adds the textures of glass, gloss, lacquer and sheen.
+// Sets the factors that the table of extensions packs.
+void set_factors(const scene::Material& m, gpu::GpuMaterial& to) {
+  for (const scene::MaterialExtension& extension : scene::material_extensions())
+    for (const scene::Factor& factor : extension.factors)
+      std::visit(
+          [&](const auto& value) {
+            if (value.packed) to.*value.packed = glm::max(m.*value.member, factor.supported);
+          },
+          factor.value);
+}
+
+// Adds the textures of extensions.
 void set_layers(const scene::Material& m, gpu::GpuMaterial& to) {
-  static_assert(scene::first_layer_texture == gpu::TEXTURE_OF_LAYERS &&
-                scene::material_textures.size() == gpu::TEXTURE_OF_LAYERS + gpu::LAYERS);
   for (std::uint32_t i = 0; i < gpu::LAYERS; ++i) {
     to.layer_textures[i] = m.*scene::material_textures[scene::first_layer_texture + i];
     if (to.layer_textures[i] != scene::no_texture) to.layers |= 1u << i;
@@ -305,36 +316,27 @@ void GpuScene::upload_materials(double specular_alpha) {
   for (const scene::Material& material : scene_.materials) {
     const scene::Material m = as_read(material);
     check_medium(m, materials.size());
-    materials.push_back({.base_color = m.base_color,
-                         .metallic = m.metallic,
-                         .emission = m.emission,
-                         .roughness = m.roughness,
-                         .specular = m.specular,
-                         .ior = m.ior,
-                         .transmission = m.transmission,
-                         .thin_walled = m.thin_walled ? 1u : 0u,
-                         .base_color_texture = m.base_color_texture,
-                         .metallic_roughness_texture = m.metallic_roughness_texture,
-                         .emission_texture = m.emission_texture,
-                         .normal_texture = m.normal_texture,
-                         .normal_scale = m.normal_scale,
-                         .alpha_mode = static_cast<std::uint32_t>(m.alpha_mode),
-                         .alpha = m.alpha,
-                         .alpha_cutoff = m.alpha_cutoff,
-                         .albedo_table = albedo.first_of(m, specular_alpha),
-                         .attenuation = scene::attenuation_per_m(m),
-                         .clearcoat = m.clearcoat,
-                         .clearcoat_roughness = m.clearcoat_roughness,
-                         .sheen_color = m.sheen_color,
-                         .sheen_roughness = std::max(m.sheen_roughness, gpu::LEAST_SHEEN_ROUGHNESS),
-                         .anisotropy = anisotropy_of(m),
-                         .specular_color = m.specular_color,
-                         .layers = 0,
-                         .layer_textures = {},
-                         .mappings = {},
-                         .clearcoat_normal_scale = m.clearcoat_normal_scale,
-                         .anisotropy_steps = anisotropy_steps(m)});
-    set_layers(m, materials.back());
+    gpu::GpuMaterial& to = materials.emplace_back();
+    to.base_color = m.base_color;
+    to.metallic = m.metallic;
+    to.emission = m.emission;
+    to.roughness = m.roughness;
+    to.thin_walled = m.thin_walled ? 1u : 0u;
+    to.base_color_texture = m.base_color_texture;
+    to.metallic_roughness_texture = m.metallic_roughness_texture;
+    to.emission_texture = m.emission_texture;
+    to.normal_texture = m.normal_texture;
+    to.normal_scale = m.normal_scale;
+    to.alpha_mode = static_cast<std::uint32_t>(m.alpha_mode);
+    to.alpha = m.alpha;
+    to.alpha_cutoff = m.alpha_cutoff;
+    to.albedo_table = albedo.first_of(m, specular_alpha);
+    to.attenuation = scene::attenuation_per_m(m);
+    to.anisotropy = anisotropy_of(m);
+    to.clearcoat_normal_scale = m.clearcoat_normal_scale;
+    to.anisotropy_steps = anisotropy_steps(m);
+    set_factors(m, to);
+    set_layers(m, to);
   }
   upload_storage(device_, materials_, materials);
   upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <string_view>
 
+#include "daemon/scene/material_extensions.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 
@@ -24,33 +26,19 @@ constexpr std::string_view plain_textures = "export the file with textures in PN
 constexpr std::string_view plain_meshes =
     "export the object as a mesh of triangles with its materials";
 
+// Those of materials are in material_extensions.hpp, but for the variants, which change no
+// material.
 constexpr Extension extensions[] = {
     {"EXT_mesh_gpu_instancing", Support::read, ""},
     {"EXT_meshopt_compression", Support::read, ""},
     {"KHR_draco_mesh_compression", Support::read, ""},
     {"KHR_lights_punctual", Support::read, ""},
-    {"KHR_materials_anisotropy", Support::read, ""},
-    {"KHR_materials_clearcoat", Support::read, ""},
-    {"KHR_materials_emissive_strength", Support::read, ""},
-    {"KHR_materials_ior", Support::read, ""},
-    {"KHR_materials_sheen", Support::read, ""},
-    {"KHR_materials_specular", Support::read, ""},
-    {"KHR_materials_transmission", Support::read, ""},
     {"KHR_materials_variants", Support::read, ""},
-    {"KHR_materials_volume", Support::read, ""},
     {"KHR_mesh_quantization", Support::read, ""},
     {"KHR_meshopt_compression", Support::read, ""},
     {"KHR_texture_transform", Support::read, ""},
     {"KHR_animation_pointer", Support::ignored,
      "what it animates besides nodes and weights stands still"},
-    {"KHR_materials_diffuse_transmission", Support::ignored,
-     "leaves, paper and lampshades are dark where light comes from behind them"},
-    {"KHR_materials_dispersion", Support::ignored, "glass does not split light into its colours"},
-    {"KHR_materials_iridescence", Support::ignored,
-     "soap bubbles and films of oil do not change colour with the angle of view"},
-    {"KHR_materials_pbrSpecularGlossiness", Support::ignored,
-     "colours and gloss are used as without it"},
-    {"KHR_materials_unlit", Support::ignored, "unlit materials are lit like all others"},
     {"KHR_xmp", Support::ignored, "it says who made the file, and changes nothing to see"},
     {"KHR_xmp_json_ld", Support::ignored, "it says who made the file, and changes nothing to see"},
     {"CESIUM_RTC", Support::refused, "export the file with its place in the nodes' translations"},
@@ -64,9 +52,14 @@ constexpr Extension extensions[] = {
     {"KHR_texture_basisu", Support::refused, plain_textures},
     {"MSFT_texture_dds", Support::refused, plain_textures}};
 
-const Extension* find(std::string_view name) {
+std::optional<Extension> find(std::string_view name) {
+  for (const MaterialExtension& of_material : material_extensions())
+    if (name == of_material.name)
+      return of_material.ignored ? Extension{name, Support::ignored, of_material.ignored}
+                                 : Extension{name, Support::read, ""};
   const auto* const at = std::ranges::find(extensions, name, &Extension::name);
-  return at == std::end(extensions) ? nullptr : at;
+  if (at == std::end(extensions)) return {};
+  return *at;
 }
 
 // Returns the materials that have an extension, in brackets; "" if none has.
@@ -90,7 +83,7 @@ void check_required_extensions(const nlohmann::json& root, const std::string& fi
   for (const nlohmann::json& element : *required) {
     if (!element.is_string()) continue;
     const std::string name = element.get<std::string>();
-    const Extension* const known = find(name);
+    const std::optional<Extension> known = find(name);
     if (known && known->support != Support::refused) continue;
     std::string message =
         file + ": requires the extension \"" + set::printable(name) + "\", which is not supported";
@@ -106,7 +99,7 @@ void note_extensions(const tinygltf::Model& model, Notes& notes) {
   for (const std::string& name : required)
     if (std::ranges::find(used, name) == used.end()) used.push_back(name);
   for (const std::string& name : used) {
-    const Extension* const known = find(name);
+    const std::optional<Extension> known = find(name);
     if (known && known->support == Support::read) continue;
     std::string note = "the extension \"" + set::printable(name) + '"';
     note += required.contains(name) ? ", which the file requires, is not supported; ignored"

@@ -5,19 +5,16 @@
 #include <cstdint>
 #include <limits>
 #include <utility>
+#include <variant>
 
 #include "daemon/scene/gltf_value.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
-#include "shaders/lib/render_shared.h"
 
 namespace previz::scene {
 namespace {
 
 constexpr double max_radiance = 1e30;
-constexpr double max_distance_m = 1e15;  // attenuation is negligible beyond this
-// Alpha is the same in either encoding; colours come in this one, often in the same image.
-constexpr Encoding alpha_only = Encoding::srgb;
 
 // A reference to a texture, from the core of glTF or from an extension.
 struct TextureInfo {
@@ -61,6 +58,34 @@ UvMapping read_mapping(const TextureInfo& texture, const std::string& what, Note
   for (const double value : mapping.affine)
     if (!std::isfinite(value)) throw Error(what + ": its texture transform is not finite");
   return mapping;
+}
+
+// Reads one factor into a material that has its default. Returns whether it is raised to what is
+// supported.
+bool read_factor(const Factor& factor, const tinygltf::Value& from, const std::string& what,
+                 Material& material, Notes& notes) {
+  const std::string named = what + ": " + factor.key;
+  if (const auto* const color = std::get_if<Packed<glm::vec3>>(&factor.value)) {
+    glm::vec3& value = material.*color->member;
+    const std::vector<double> rgb = numbers(from, factor.key, {value.r, value.g, value.b});
+    value = color_within(rgb, factor.most, named, notes);
+    return false;
+  }
+  float& value = material.*std::get<Packed<float>>(factor.value).member;
+  value = within(number(from, factor.key, value), factor.least, factor.most, named, notes);
+  const bool is_raised = value < factor.supported;
+  value = std::max(value, factor.supported);
+  return is_raised;
+}
+
+// Makes a material one that does not have the extension. Of a layer that is not there by its
+// factors, the textures that were read say nothing.
+void forget(const MaterialExtension& row, Material& material) {
+  static const Material standard;
+  const auto reset = [&](auto packed) { material.*packed.member = standard.*packed.member; };
+  for (const Factor& factor : row.factors) std::visit(reset, factor.value);
+  if (row.is_there) return;
+  for (const LayerTexture& texture : row.textures) material.*texture.texture = no_texture;
 }
 
 AlphaMode alpha_mode(const std::string& mode, const std::string& what, Notes& notes) {
@@ -111,10 +136,20 @@ class GltfMaterials::Textures {
     return true;
   }
 
-  // Takes a texture of an extension.
-  bool take(const tinygltf::Value& extension, const std::string& key, Encoding encoding,
-            std::uint32_t Material::*texture) {
-    return take(info_of(extension, key), encoding, texture, key);
+  // Takes the textures of an extension. Returns false if one without which it says nothing about
+  // any place of the surface cannot be had.
+  bool take(const tinygltf::Value& extension, const MaterialExtension& row) {
+    for (const LayerTexture& texture : row.textures) {
+      const std::string key = texture.key;
+      const bool is_taken = take(info_of(extension, key), texture.encoding, texture.texture, key);
+      if (!texture.scale) {
+        if (!is_taken) return false;
+      } else if (extension.Has(key) && extension.Get(key).IsObject()) {
+        material_.*texture.scale = within(number(extension.Get(key), "scale", 1), -1e3, 1e3,
+                                          what_ + ": " + key + "'s scale", notes_);
+      }
+    }
+    return true;
   }
 
   std::vector<UvMapping> mappings;
@@ -159,132 +194,35 @@ UsedMaterial GltfMaterials::read(const tinygltf::Material& given, const std::str
   material.normal_scale =
       within(given.normalTexture.scale, -1e3, 1e3, what + ": its normal texture's scale", notes_);
   // Occlusion textures are not left out: path tracing finds occlusion itself.
-  read_extensions(given, what, textures, material);
+  for (const MaterialExtension& extension : material_extensions())
+    read_extension(extension, given, what, textures, material);
 
   const auto index = static_cast<std::uint32_t>(scene_.materials.size());
   scene_.materials.push_back(std::move(material));
   return {index, std::move(textures.mappings)};
 }
 
-void GltfMaterials::read_extensions(const tinygltf::Material& given, const std::string& what,
-                                    Textures& textures, Material& material) {
-  const tinygltf::Value ior = extension(given.extensions, "KHR_materials_ior");
-  // An ior of 0 stands for a Fresnel term of 1 and is there for old specular-glossiness assets.
-  material.ior = within(number(ior, "ior", 1.5), 1, 100, what + ": ior", notes_);
-  read_glass(given, what, textures, material);
-  read_clearcoat(given, what, textures, material);
-  read_sheen(given, what, textures, material);
-  read_specular(given, what, textures, material);
-  read_anisotropy(given, what, textures, material);
-}
-
-// A factor whose texture cannot be had says nothing about any place of the surface.
-void GltfMaterials::leave_out(const std::string& what, const std::string& extension) {
-  notes_.add(what + ": " + extension + " is ignored, because its texture cannot be read");
-}
-
-void GltfMaterials::read_glass(const tinygltf::Material& given, const std::string& what,
-                               Textures& textures, Material& material) {
-  const tinygltf::Value transmission = extension(given.extensions, "KHR_materials_transmission");
-  material.transmission = within(number(transmission, "transmissionFactor", 0), 0, 1,
-                                 what + ": transmissionFactor", notes_);
-  if (material.transmission > 0 &&
-      !textures.take(transmission, "transmissionTexture", Encoding::linear,
-                     &Material::transmission_texture)) {
-    leave_out(what, "KHR_materials_transmission");
-    material.transmission = 0;
+void GltfMaterials::read_extension(const MaterialExtension& row, const tinygltf::Material& given,
+                                   const std::string& what, Textures& textures,
+                                   Material& material) {
+  const tinygltf::Value from = extension(given.extensions, row.name);
+  std::vector<std::string> raised;
+  for (const Factor& factor : row.factors)
+    if (read_factor(factor, from, what, material, notes_))
+      raised.push_back(what + ": its " + factor.key + " is raised to " +
+                       std::to_string(factor.supported).substr(0, 4) + ", the supported minimum");
+  if (!row.is_there || row.is_there(material)) {
+    for (const std::string& note : raised) notes_.add(note);
+    if (!textures.take(from, row)) {
+      notes_.add(what + ": " + row.name + " is ignored, because its texture cannot be read");
+      forget(row, material);
+    }
   }
-
-  const tinygltf::Value volume = extension(given.extensions, "KHR_materials_volume");
-  // How thick it is where is for renderers that do not follow light through the mesh.
-  material.thin_walled = !(number(volume, "thicknessFactor", 0) > 0);
-  material.attenuation_color = color_within(numbers(volume, "attenuationColor", {1, 1, 1}), 1,
-                                            what + ": attenuationColor", notes_);
-  const double distance_m = number(volume, "attenuationDistance", max_distance_m);
-  if (distance_m > 0 && distance_m < max_distance_m)
-    material.attenuation_distance_m = static_cast<float>(distance_m);
-  else if (distance_m <= 0)
-    notes_.add(what + ": attenuationDistance must be greater than 0; infinite used");
-}
-
-void GltfMaterials::read_clearcoat(const tinygltf::Material& given, const std::string& what,
-                                   Textures& textures, Material& material) {
-  const tinygltf::Value lacquer = extension(given.extensions, "KHR_materials_clearcoat");
-  material.clearcoat =
-      within(number(lacquer, "clearcoatFactor", 0), 0, 1, what + ": clearcoatFactor", notes_);
-  material.clearcoat_roughness = within(number(lacquer, "clearcoatRoughnessFactor", 0), 0, 1,
-                                        what + ": clearcoatRoughnessFactor", notes_);
-  if (material.clearcoat <= 0) return;
-  if (!textures.take(lacquer, "clearcoatTexture", Encoding::linear, &Material::clearcoat_texture) ||
-      !textures.take(lacquer, "clearcoatRoughnessTexture", Encoding::linear,
-                     &Material::clearcoat_roughness_texture)) {
-    leave_out(what, "KHR_materials_clearcoat");
-    material.clearcoat = 0;
-    return;
-  }
-  const std::string normals = "clearcoatNormalTexture";
-  textures.take(lacquer, normals, Encoding::linear, &Material::clearcoat_normal_texture);
-  if (lacquer.Has(normals) && lacquer.Get(normals).IsObject())
-    material.clearcoat_normal_scale = within(number(lacquer.Get(normals), "scale", 1), -1e3, 1e3,
-                                             what + ": " + normals + "'s scale", notes_);
-}
-
-void GltfMaterials::read_sheen(const tinygltf::Material& given, const std::string& what,
-                               Textures& textures, Material& material) {
-  const tinygltf::Value sheen = extension(given.extensions, "KHR_materials_sheen");
-  material.sheen_color = color_within(numbers(sheen, "sheenColorFactor", {0, 0, 0}), 1,
-                                      what + ": sheenColorFactor", notes_);
-  const float roughness = within(number(sheen, "sheenRoughnessFactor", 0), 0, 1,
-                                 what + ": sheenRoughnessFactor", notes_);
-  material.sheen_roughness = std::max(roughness, gpu::LEAST_SHEEN_ROUGHNESS);
-  if (!has_sheen(material)) return;
-  if (roughness < material.sheen_roughness)
-    notes_.add(what + ": its sheenRoughnessFactor is raised to " +
-               std::to_string(gpu::LEAST_SHEEN_ROUGHNESS).substr(0, 4) + ", the supported minimum");
-  if (textures.take(sheen, "sheenColorTexture", Encoding::srgb, &Material::sheen_color_texture) &&
-      textures.take(sheen, "sheenRoughnessTexture", alpha_only, &Material::sheen_roughness_texture))
-    return;
-  leave_out(what, "KHR_materials_sheen");
-  material.sheen_color = glm::vec3(0);
-}
-
-void GltfMaterials::read_specular(const tinygltf::Material& given, const std::string& what,
-                                  Textures& textures, Material& material) {
-  const tinygltf::Value specular = extension(given.extensions, "KHR_materials_specular");
-  material.specular =
-      within(number(specular, "specularFactor", 1), 0, 1, what + ": specularFactor", notes_);
-  material.specular_color =
-      color_within(numbers(specular, "specularColorFactor", {1, 1, 1}),
-                   std::numeric_limits<float>::max(), what + ": specularColorFactor", notes_);
-  if (!textures.take(specular, "specularTexture", alpha_only, &Material::specular_texture) ||
-      !textures.take(specular, "specularColorTexture", Encoding::srgb,
-                     &Material::specular_color_texture)) {
-    leave_out(what, "KHR_materials_specular");
-    material.specular = 1;
-    material.specular_color = glm::vec3(1);
-    material.specular_texture = material.specular_color_texture = no_texture;
-  }
-  if (material.transmission > 0 && has_specular_color(material))
-    notes_.add(what + ": KHR_materials_specular does not colour the reflection of its glass");
-}
-
-void GltfMaterials::read_anisotropy(const tinygltf::Material& given, const std::string& what,
-                                    Textures& textures, Material& material) {
-  const tinygltf::Value anisotropy = extension(given.extensions, "KHR_materials_anisotropy");
-  material.anisotropy = within(number(anisotropy, "anisotropyStrength", 0), 0, 1,
-                               what + ": anisotropyStrength", notes_);
-  material.anisotropy_rotation_rad = within(number(anisotropy, "anisotropyRotation", 0), -1e3, 1e3,
-                                            what + ": anisotropyRotation", notes_);
-  if (material.anisotropy <= 0) return;
-  if (!is_anisotropic(material)) {
-    notes_.add(what + ": it transmits light, so its anisotropy is ignored");
-    return;
-  }
-  if (textures.take(anisotropy, "anisotropyTexture", Encoding::linear,
-                    &Material::anisotropy_texture))
-    return;
-  leave_out(what, "KHR_materials_anisotropy");
-  material.anisotropy = 0;
+  if (!row.finish) return;
+  const auto given_number = [&](const char* key, double otherwise) {
+    return number(from, key, otherwise);
+  };
+  if (const char* const note = row.finish(given_number, material)) notes_.add(what + ": " + note);
 }
 
 }  // namespace previz::scene

@@ -1,5 +1,5 @@
-// Reads glTF materials: metallic-roughness and the KHR_materials_* extensions that scene.hpp's
-// Material has.
+// Reads glTF materials: metallic-roughness and the extensions that material_extensions.hpp says are
+// read.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -11,6 +11,7 @@
 #include "daemon/scene/gltf_mesh.hpp"
 #include "daemon/scene/gltf_texture.hpp"
 #include "daemon/scene/load_log.hpp"
+#include "daemon/scene/material_extensions.hpp"
 #include "daemon/scene/scene.hpp"
 
 namespace previz::scene {
@@ -42,19 +43,8 @@ class GltfMaterials {
   class Textures;
 
   UsedMaterial read(const tinygltf::Material& given, const std::string& what);
-  void read_extensions(const tinygltf::Material& given, const std::string& what, Textures& textures,
-                       Material& material);
-  void read_glass(const tinygltf::Material& given, const std::string& what, Textures& textures,
-                  Material& material);
-  void read_clearcoat(const tinygltf::Material& given, const std::string& what, Textures& textures,
-                      Material& material);
-  void read_sheen(const tinygltf::Material& given, const std::string& what, Textures& textures,
-                  Material& material);
-  void read_specular(const tinygltf::Material& given, const std::string& what, Textures& textures,
-                     Material& material);
-  void read_anisotropy(const tinygltf::Material& given, const std::string& what, Textures& textures,
-                       Material& material);
-  void leave_out(const std::string& what, const std::string& extension);
+  void read_extension(const MaterialExtension& extension, const tinygltf::Material& given,
+                      const std::string& what, Textures& textures, Material& material);
 
   const tinygltf::Model& model_;
   std::string file_;

@@ -14,8 +14,6 @@
 
 namespace previz::scene {
 
-enum class Encoding { srgb, linear };  // of red, green and blue; alpha is always linear
-
 // Holds the textures of one file, each decoded when first used.
 class GltfTextures {
  public:

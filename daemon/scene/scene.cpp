@@ -116,6 +116,10 @@ bool has_opaque_part(const Material& m) {
          (m.transmission < 1 || m.transmission_texture != no_texture);
 }
 
+bool has_coat(const Material& m) {
+  return has_opaque_part(m) && m.specular > 0 && m.ior > 1;
+}
+
 double widest_alpha(const Material& m, double roughness, double strength_factor) {
   const double alpha = roughness * roughness;
   if (!is_anisotropic(m)) return alpha;

@@ -59,6 +59,8 @@ struct Instance {
 inline constexpr std::uint32_t no_texture = 0xffffffffu;
 inline constexpr std::uint32_t no_object = 0xffffffffu;
 
+inline constexpr std::size_t texture_roles = 13;  // textures that a material can have
+
 // With `mask` a hit counts where alpha >= alpha_cutoff, with `blend` with probability alpha.
 enum class AlphaMode : std::uint32_t { opaque, mask, blend };
 
@@ -110,12 +112,12 @@ struct Material {
   float clearcoat_normal_scale = 1;                     // as smooth as the mesh
   // By which of the mesh's texture coordinates each texture is read, in the order of
   // material_textures: 0 for Mesh::uvs, which the base colour has, k for Mesh::more_uvs[k - 1].
-  std::array<std::uint8_t, 13> mappings{};
+  std::array<std::uint8_t, texture_roles> mappings{};
 };
 
 // The textures that a material can have. The shaders know those from the fifth on by their place
-// (LAYER_* of shaders/lib/render_shared.h).
-inline constexpr std::array<std::uint32_t Material::*, 13> material_textures = {
+// (LAYER_* of shaders/lib/material_shared.h).
+inline constexpr std::array<std::uint32_t Material::*, texture_roles> material_textures = {
     &Material::base_color_texture,
     &Material::metallic_roughness_texture,
     &Material::emission_texture,
@@ -132,6 +134,9 @@ inline constexpr std::array<std::uint32_t Material::*, 13> material_textures = {
 inline constexpr std::size_t first_layer_texture = 4;
 // A material reads its textures by at most so many different mappings.
 inline constexpr std::size_t max_mappings = material_textures.size();
+
+// How an image encodes red, green and blue; alpha is always linear.
+enum class Encoding { srgb, linear };
 
 enum class Wrap : std::uint32_t { repeat, clamp, mirror };
 
@@ -249,6 +254,9 @@ bool has_specular_color(const Material& material);
 // Returns whether reflections are wider along one direction. What lets light through is left as it
 // is, rough glass in all directions alike.
 bool is_anisotropic(const Material& material);
+
+// Returns whether paint or plastic reflects on any part of this material.
+bool has_coat(const Material& material);
 
 // Returns the GGX alpha of reflections at this roughness, in the direction in which they are
 // widest, where a texture gives this share of the anisotropy's strength.

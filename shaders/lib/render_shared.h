@@ -1,8 +1,9 @@
 // Structures and constants of the renderer that cross between C++ and the shaders, in scalar
-// layout. Those that tracing needs are in shared.h.
+// layout. Those that tracing needs are in shared.h, features and materials in material_shared.h.
 #ifndef PREVIZ_RENDER_SHARED_H
 #define PREVIZ_RENDER_SHARED_H
 
+#include "shaders/lib/material_shared.h"
 #include "shaders/lib/shared.h"
 
 #ifdef __cplusplus
@@ -19,8 +20,6 @@ PREVIZ_CONST uint ANISOTROPIC_TABLES = 9u;
 // Where a texture changes its strength it has them for so many equal steps of the strength, from the
 // first step to the whole.
 PREVIZ_CONST uint ANISOTROPIC_STEPS = 8u;
-// The lobe of smoother sheen is narrower than its table resolves.
-PREVIZ_CONST float LEAST_SHEEN_ROUGHNESS = 0.07f;
 // The GGX alpha of an anisotropic reflection is at least this in any direction.
 PREVIZ_CONST float LEAST_ANISOTROPIC_ALPHA = 1e-3f;
 // Glass below this index of refraction is treated as smooth, since it bends light too little for
@@ -58,34 +57,6 @@ PREVIZ_CONST uint UNLIMITED = 0xffffffffu;
 
 PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 PREVIZ_CONST uint NO_INDEX = 0xffffffffu;
-
-// Features that a scene may require. Specialisation constant 0 is their union; a feature that is
-// left out changes no pixel.
-PREVIZ_CONST uint FEATURE_GLOSSY = 1u;        // any specular reflection of opaque surfaces
-PREVIZ_CONST uint FEATURE_TRANSMISSION = 2u;
-PREVIZ_CONST uint FEATURE_TEXTURES = 4u;
-PREVIZ_CONST uint FEATURE_LIGHTS = 8u;        // set lights or emissive triangles
-PREVIZ_CONST uint FEATURE_VISIBLE_LIGHTS = 16u;  // lights with an extent that rays can see
-PREVIZ_CONST uint FEATURE_LENS = 32u;
-PREVIZ_CONST uint FEATURE_FORKS = 64u;        // any object that is in one world only
-PREVIZ_CONST uint FEATURE_ENVIRONMENT_SAMPLING = 128u;  // next-event estimation of the environment
-PREVIZ_CONST uint FEATURE_CAUSTICS = 256u;  // paths bring caustics
-PREVIZ_CONST uint FEATURE_PHOTONS = 512u;   // photons bring caustics
-PREVIZ_CONST uint FEATURE_NORMAL_MAPS = 2048u;
-PREVIZ_CONST uint FEATURE_ALPHA = 4096u;  // any surface that may be transparent by its alpha
-PREVIZ_CONST uint FEATURE_DIFFERENCE = 1024u;  // where possible, only the difference is traced
-PREVIZ_CONST uint FEATURE_PANES = 16384u;  // any smooth thin wall through which light goes straight
-PREVIZ_CONST uint FEATURE_CAMERA = 8192u;  // the plate gives the radiance of points that it shows
-PREVIZ_CONST uint FEATURE_ATTENUATION = 32768u;  // clear solids that take light away inside
-PREVIZ_CONST uint FEATURE_CLEARCOAT = 65536u;  // a coat of lacquer above the base material
-PREVIZ_CONST uint FEATURE_MANY_LIGHTS = 131072u;  // more than FEW_LIGHTS: they are chosen by a tree
-PREVIZ_CONST uint FEATURE_SHEEN = 262144u;        // fibres of cloth above the base material
-PREVIZ_CONST uint FEATURE_ANISOTROPY = 524288u;   // reflections that are wider along one direction
-PREVIZ_CONST uint FEATURE_COAT_COLOR = 1048576u;  // paint or plastic whose reflection has a colour
-PREVIZ_CONST uint FEATURE_FILTERED_TEXTURES = 2097152u;  // looked up over a sample's footprint
-PREVIZ_CONST uint FEATURE_VERTEX_COLORS = 4194304u;   // base colours that meshes state
-PREVIZ_CONST uint FEATURE_MAPPINGS = 8388608u;        // textures of a surface that lie differently on it
-PREVIZ_CONST uint FEATURE_LAYER_TEXTURES = 16777216u;  // textures of glass, gloss, lacquer and sheen
 
 // These bits are a path's state.
 PREVIZ_CONST uint PATH_WORLDS_MASK = 3u;      // WORLD_*
@@ -192,64 +163,6 @@ struct GpuInstance {
   uint first_extra;
   uint extras_per_vertex;
 };
-
-// The textures of a material, by their place in scene::material_textures: the first four have names
-// of their own in GpuMaterial, the others are its layer_textures, here from 0 on.
-PREVIZ_CONST uint TEXTURE_OF_BASE_COLOR = 0u;
-PREVIZ_CONST uint TEXTURE_OF_METALLIC_ROUGHNESS = 1u;
-PREVIZ_CONST uint TEXTURE_OF_EMISSION = 2u;
-PREVIZ_CONST uint TEXTURE_OF_NORMAL = 3u;
-PREVIZ_CONST uint TEXTURE_OF_LAYERS = 4u;
-PREVIZ_CONST uint LAYER_TRANSMISSION = 0u;
-PREVIZ_CONST uint LAYER_CLEARCOAT = 1u;
-PREVIZ_CONST uint LAYER_CLEARCOAT_ROUGHNESS = 2u;
-PREVIZ_CONST uint LAYER_SHEEN_COLOR = 3u;
-PREVIZ_CONST uint LAYER_SHEEN_ROUGHNESS = 4u;
-PREVIZ_CONST uint LAYER_SPECULAR = 5u;
-PREVIZ_CONST uint LAYER_SPECULAR_COLOR = 6u;
-PREVIZ_CONST uint LAYER_ANISOTROPY = 7u;
-PREVIZ_CONST uint LAYER_CLEARCOAT_NORMAL = 8u;
-PREVIZ_CONST uint LAYERS = 9u;
-
-struct GpuMaterial {
-  vec3 base_color;
-  float metallic;
-  vec3 emission;
-  float roughness;
-  float specular;
-  float ior;
-  float transmission;
-  uint thin_walled;
-  uint base_color_texture;  // NO_INDEX: none
-  uint metallic_roughness_texture;
-  uint emission_texture;
-  uint normal_texture;
-  float normal_scale;
-  uint alpha_mode;    // ALPHA_*
-  float alpha;
-  float alpha_cutoff;
-  uint albedo_table;  // rough glass: its table seen from outside; the next is from inside.
-                      // Anisotropic metal: the first of its ANISOTROPIC_TABLES
-  vec3 attenuation;   // inside, per metre; 0: clear, or nothing gets in
-  float clearcoat;
-  float clearcoat_roughness;
-  vec3 sheen_color;
-  float sheen_roughness;
-  vec2 anisotropy;      // in which direction of the texture the reflection is wider, times the
-                        // strength; 0: in none
-  vec3 specular_color;  // factor of the coat's reflectance at normal incidence
-  uint layers;          // bit i: it has layer_textures[i]
-  uint layer_textures[LAYERS];
-  uint mappings[2];     // of every texture, of 4 bits each: by mapping_of()
-  float clearcoat_normal_scale;
-  uint anisotropy_steps;  // of ANISOTROPIC_TABLES from albedo_table on; 0: they are of one strength
-};
-
-// glTF's alpha modes: the surface is all there, or there where its alpha reaches the cutoff, or its
-// alpha is the share that is there.
-PREVIZ_CONST uint ALPHA_OPAQUE = 0u;
-PREVIZ_CONST uint ALPHA_MASK = 1u;
-PREVIZ_CONST uint ALPHA_BLEND = 2u;
 
 PREVIZ_CONST uint TEXTURE_REPEAT = 0u;
 PREVIZ_CONST uint TEXTURE_CLAMP = 1u;
@@ -517,8 +430,6 @@ static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 160);
 static_assert(sizeof(GpuControl) == 96);
 static_assert(sizeof(GpuInstance) == 120);
-static_assert(sizeof(GpuMaterial) == 196);
-static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(sizeof(GpuTexture) == 32);
 static_assert(sizeof(GpuLight) == 160);
 static_assert(offsetof(GpuLight, uv0) == 112);

@@ -39,14 +39,11 @@ struct Surface {
   bool thin_walled;
   uint albedo_table;      // rough glass: its first table of ALBEDO
   vec3 emission;
-  float clearcoat;        // weight of a coat of lacquer above all else
+  PREVIZ_LAYER_FACTORS(PREVIZ_FACTOR_MEMBER)
   float clearcoat_alpha;
-  vec3 sheen_color;       // of fibres above the base material; black: there are none
-  float sheen_roughness;
   vec3 tangent;           // where is_anisotropic(): unit, across the normal
   float tangent_alpha;    // GGX width along the tangent; alpha is that across it
   float anisotropy_step;  // of the anisotropy's tables, counted from no strength at all; below 0: the only one
-  vec3 specular_color;    // factor of the coat's reflectance at normal incidence
   uint medium;            // behind the surface, where that is a coloured solid (lib/medium.glsl)
 };
 
@@ -341,22 +338,17 @@ bool has_layer(uint material, uint layer) {
   return has_feature(FEATURE_LAYER_TEXTURES) && (materials[material].layers & (1u << layer)) != 0u;
 }
 
-// Applies the textures of glass, gloss, lacquer and sheen. There is one look-up for all of them, because
-// it is long.
-void apply_layers(inout Surface s, uint material, TexturePoint at, inout float clearcoat_roughness) {
-  uint left = materials[material].layers;
-  left &= ~((1u << LAYER_ANISOTROPY) | (1u << LAYER_CLEARCOAT_NORMAL));  // these give directions
+// Applies the textures that multiply a factor; the others give directions. There is one look-up for all
+// of them, because it is long.
+#define PREVIZ_LAYER_BIT(layer, factor, channels) | (1u << layer)
+#define PREVIZ_APPLY_LAYER(layer, factor, channels) case layer: s.factor *= texel.channels; break;
+void apply_layers(inout Surface s, uint material, TexturePoint at) {
+  uint left = materials[material].layers & (0u PREVIZ_LAYER_TEXTURES(PREVIZ_LAYER_BIT));
   for (; left != 0u; left &= left - 1u) {
     const uint layer = uint(findLSB(left));
     const vec4 texel = look_up_layer(at, layer);
     switch (layer) {
-      case LAYER_TRANSMISSION: s.transmission *= texel.r; break;
-      case LAYER_CLEARCOAT: s.clearcoat *= texel.r; break;
-      case LAYER_CLEARCOAT_ROUGHNESS: clearcoat_roughness *= texel.g; break;
-      case LAYER_SHEEN_COLOR: s.sheen_color *= texel.rgb; break;
-      case LAYER_SHEEN_ROUGHNESS: s.sheen_roughness *= texel.a; break;
-      case LAYER_SPECULAR: s.specular *= texel.a; break;
-      case LAYER_SPECULAR_COLOR: s.specular_color *= texel.rgb; break;
+      PREVIZ_LAYER_TEXTURES(PREVIZ_APPLY_LAYER)
       default: break;
     }
   }
@@ -389,6 +381,8 @@ vec3 anisotropic_direction(TexturePoint at, vec2 anisotropy, vec3 normal) {
   return tangent * anisotropy.x + bitangent * anisotropy.y;
 }
 
+#define PREVIZ_READ_FACTOR(type, name, feature, otherwise) \
+  s.name = has_feature(feature) ? m.name : otherwise;
 void apply_material(inout Surface s, TexturePoint at, vec2 anisotropy) {
   const uint material = at.instance.material;
   const GpuMaterial m = materials[material];
@@ -415,13 +409,9 @@ void apply_material(inout Surface s, TexturePoint at, vec2 anisotropy) {
       s.emission *= look_up(at, m.emission_texture, TEXTURE_OF_EMISSION).rgb;
   }
   s.alpha = roughness * roughness;
-  s.clearcoat = has_feature(FEATURE_CLEARCOAT) ? m.clearcoat : 0.0;
-  float clearcoat_roughness = m.clearcoat_roughness;
-  s.sheen_color = has_feature(FEATURE_SHEEN) ? m.sheen_color : vec3(0.0);
-  s.sheen_roughness = m.sheen_roughness;
-  s.specular_color = has_feature(FEATURE_COAT_COLOR) ? m.specular_color : vec3(1.0);
-  if (has_feature(FEATURE_LAYER_TEXTURES)) apply_layers(s, material, at, clearcoat_roughness);
-  s.clearcoat_alpha = clearcoat_roughness * clearcoat_roughness;
+  PREVIZ_LAYER_FACTORS(PREVIZ_READ_FACTOR)
+  if (has_feature(FEATURE_LAYER_TEXTURES)) apply_layers(s, material, at);
+  s.clearcoat_alpha = s.clearcoat_roughness * s.clearcoat_roughness;
   s.tangent_alpha = s.alpha;
   if (has_feature(FEATURE_ANISOTROPY) && any(notEqual(anisotropy, vec2(0.0)))) {
     s.tangent_alpha = mix(s.alpha, 1.0, dot(anisotropy, anisotropy));
