@@ -132,9 +132,149 @@ class RecordingWatch {
   bool recorded_ = false;
 };
 
-}  // namespace
+// The rig from its start to its end: what stays while sets come and go, and each set's run.
+class LiveRun {
+ public:
+  // `pulse` is the main thread's; liveness, pulse and reports outlive the run.
+  LiveRun(const LiveOptions& options, report::Reports& reports, pipeline::Liveness& liveness,
+          pipeline::Liveness::Pulse& pulse)
+      : options_(options),
+        reports_(reports),
+        liveness_(liveness),
+        pulse_(pulse),
+        end_from_outside_(options.stop, [this] { end_.request_stop(); }),
+        service_(liveness, reports, end_.get_token()),
+        sets_(
+            options.set_file, [this](set::Set& set) { override_set(set, options_); }, reports,
+            options.with),
+        device_(open_graphics(options.device, sets_.running().set.quality.cpu_instead, reports)),
+        screen_(kept_, options.on_screen) {}
 
-pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& reports) {
+  pipeline::MetricsSnapshot run() {
+    for (;;) {
+      reports_.begin_set();
+      if (!run_set()) continue;
+      if (!sets_.has_next() || end_.stop_requested()) {  // a stop may come with a set that was read
+        service_.stopping();
+        screen_.close();
+        return snapshot();
+      }
+      sets_.begin_next();
+    }
+  }
+
+ private:
+  pipeline::MetricsSnapshot snapshot() {
+    const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start_;
+    return metrics_.snapshot(since.count());
+  }
+
+  // Returns false, with the set before in place, if the set cannot run. Throws if there is none.
+  bool run_set() {
+    const set::Set& set = sets_.running().set;
+    EventLoop loop([this](const std::exception& error) { loop_failed(error); });
+    std::optional<LiveFiles> files;
+    const auto show = [&](pipeline::Shot shot, const Look& look) {
+      if (options_.on_shown) options_.on_shown(shot, look);
+      screen_->show(shot, shot.picture);
+      files->take(std::move(shot.picture));
+    };
+    std::unique_ptr<Rig> rig;
+    try {
+      files.emplace(
+          options_.directory ? *options_.directory : live_directory(set.output.directory),
+          [this] { return to_json(snapshot()); }, reports_);
+      screen_.use(set);
+      rig = std::make_unique<Rig>(
+          Rig::Parts{loop, sets_, kept_, service_, pulse_, device_, renderer_, show,
+                     [this](RigFacts facts) { screen_->show(std::move(facts)); }, options_.buttons,
+                     options_.around_cameras, options_.loop, end_.get_token()});
+    } catch (const std::exception& error) {
+      if (!sets_.go_back(error.what())) throw;
+      return false;
+    }
+    say_live(set);
+    run_rig(loop, *rig, set);
+    return true;
+  }
+
+  void run_rig(EventLoop& loop, Rig& rig, const set::Set& set) {
+    std::optional<RecordingWatch> watch;
+    std::optional<BusLink> bus;
+    if (options_.bus) {
+      watch.emplace(loop.handle(), reports_, [this] { end_if_replaced(); });
+      bus.emplace(loop,
+                  verbs_of(rig, set, *device_, reports_, [this] { return to_json(snapshot()); }),
+                  kept_);
+      rig.on_change([&] {
+        bus->changed();
+        watch->look(rig);
+      });
+    }
+    const auto reload =
+        loop.on_signal(SIGHUP, [&] { rig.perform(*set::find_action("reload_set"), "SIGHUP"); });
+    const auto drivers = loop.every(std::chrono::seconds(1), [&] { end_if_barred(rig); });
+    rig.run();
+    sets_.leave(rig.controls().look().edits);
+    if (sets_.has_next() && rig.controls().look().take_edits != pipeline::Edits{})
+      reports_({report::Severity::warning, "review",
+                "changes to the take in review are dropped, because a set is loading"});
+    rig.on_change({});
+  }
+
+  void loop_failed(const std::exception& error) {
+    metrics_.count("main loop: failed");
+    reports_(report::once({report::Severity::error, "main loop", error.what()}));
+    // What fails again at once leaves time for the rest.
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+
+  void say_live(const set::Set& set) {
+    const bool holds_rate = set.quality.fps > 0;
+    reports_({report::Severity::info, "",
+              "live on " + device_words(*device_) + ", set \"" + set.name + "\", " +
+                  (holds_rate ? "at most " : "") + std::to_string(set.quality.samples) +
+                  " samples per frame" +
+                  (holds_rate ? ", fewer where the rate would suffer (quality.fps)" : "")});
+  }
+
+  void end_if_replaced() {
+    if (!options_.replaced || !options_.replaced()) return;
+    reports_({report::Severity::info, "", "another version was installed; restarting"});
+    end_.request_stop();
+  }
+
+  void end_if_barred(const Rig& rig) {
+    if (!options_.has_new_devices || !render::drawing_device(*device_).empty() ||
+        is_recording(rig) || !options_.has_new_devices())
+      return;
+    reports_({report::Severity::info, "",
+              "a new kind of device appeared; previzd is restarting to open it"});
+    end_.request_stop();
+  }
+
+  const LiveOptions& options_;
+  report::Reports& reports_;
+  pipeline::Liveness& liveness_;
+  pipeline::Liveness::Pulse& pulse_;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  pipeline::Metrics metrics_;
+  std::stop_source end_;
+  const std::stop_callback<std::function<void()>> end_from_outside_;
+  Service service_;
+  const pipeline::StageKeeper::Parts kept_{.reports = reports_,
+                                           .metrics = metrics_,
+                                           .liveness = liveness_,
+                                           .patience = options_.patience,
+                                           .rehearse = options_.rehearse};
+  SetKeeper sets_;
+  const std::shared_ptr<render::Device> device_;
+  std::shared_ptr<render::Renderer> renderer_;  // goes from set to set
+  CrewScreen screen_;
+};
+
+// What the whole process needs before any thread starts.
+void prepare_process() {
   // A file that may not grow (RLIMIT_FSIZE) fails the recorder's write and does not end the
   // process.
   std::signal(SIGXFSZ, SIG_IGN);
@@ -147,105 +287,16 @@ pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& 
   sigemptyset(&hangup);
   sigaddset(&hangup, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &hangup, nullptr);
-  pipeline::Metrics metrics;
+}
+
+}  // namespace
+
+pipeline::MetricsSnapshot run_live(const LiveOptions& options, report::Reports& reports) {
+  prepare_process();
   pipeline::Liveness liveness;
   pipeline::Liveness::Pulse pulse(liveness, Service::main_thread);
-  pulse.begin(options.patience.set);
-  std::stop_source end;
-  const std::stop_callback end_from_outside(options.stop, [&end] { end.request_stop(); });
-  Service service(liveness, reports, end.get_token());
-  const pipeline::StageKeeper::Parts kept{.reports = reports,
-                                          .metrics = metrics,
-                                          .liveness = liveness,
-                                          .patience = options.patience,
-                                          .rehearse = options.rehearse};
-  const auto start = std::chrono::steady_clock::now();
-  const auto snapshot = [&] {
-    const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start;
-    return metrics.snapshot(since.count());
-  };
-  const auto metrics_json = [&] { return to_json(snapshot()); };
-  const auto end_if_replaced = [&] {
-    if (!options.replaced || !options.replaced()) return;
-    reports({report::Severity::info, "", "another version was installed; restarting"});
-    end.request_stop();
-  };
-  SetKeeper sets(
-      options.set_file, [&](set::Set& set) { override_set(set, options); }, reports, options.with);
-  const std::shared_ptr<render::Device> device =
-      open_graphics(options.device, sets.running().set.quality.cpu_instead, reports);
-  std::shared_ptr<render::Renderer> renderer;  // goes from set to set
-  CrewScreen screen(kept, options.on_screen);
-  for (;;) {
-    reports.begin_set();
-    const set::Set& set = sets.running().set;
-    EventLoop loop([&](const std::exception& error) {
-      metrics.count("main loop: failed");
-      reports(report::once({report::Severity::error, "main loop", error.what()}));
-      // What fails again at once leaves time for the rest.
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    });
-    std::optional<LiveFiles> files;
-    const auto show = [&](pipeline::Shot shot, const Look& look) {
-      if (options.on_shown) options.on_shown(shot, look);
-      screen->show(shot, shot.picture);
-      files->take(std::move(shot.picture));
-    };
-    const auto show_facts = [&](RigFacts facts) { screen->show(std::move(facts)); };
-    std::unique_ptr<Rig> rig;
-    try {
-      files.emplace(options.directory ? *options.directory : live_directory(set.output.directory),
-                    metrics_json, reports);
-      screen.use(set);
-      rig = std::make_unique<Rig>(
-          Rig::Parts{loop, sets, kept, service, pulse, device, renderer, show, show_facts,
-                     options.buttons, options.around_cameras, options.loop, end.get_token()});
-    } catch (const std::exception& error) {
-      if (!sets.go_back(error.what())) throw;
-      continue;
-    }
-    reports({report::Severity::info, "",
-             "live on " + device_words(*device) + ", set \"" + set.name + "\", " +
-                 (set.quality.fps > 0 ? "at most " : "") + std::to_string(set.quality.samples) +
-                 " samples per frame" +
-                 (set.quality.fps > 0 ? ", fewer where the rate would suffer (quality.fps)" : "")});
-    std::optional<BusLink> bus;
-    std::optional<RecordingWatch> watch;
-    if (options.bus) {
-      watch.emplace(loop.handle(), reports, end_if_replaced);
-      bus.emplace(loop, verbs_of(*rig, set, *device, reports, metrics_json), kept);
-      rig->on_change([&] {
-        bus->changed();
-        watch->look(*rig);
-      });
-    }
-    const auto reload =
-        loop.on_signal(SIGHUP, [&] { rig->perform(*set::find_action("reload_set"), "SIGHUP"); });
-    const auto end_if_barred = [&] {
-      if (!options.has_new_devices || !render::drawing_device(*device).empty() ||
-          is_recording(*rig) || !options.has_new_devices())
-        return;
-      reports({report::Severity::info, "",
-               "a new kind of device appeared; previzd is restarting to open it"});
-      end.request_stop();
-    };
-    const auto drivers = loop.every(std::chrono::seconds(1), end_if_barred);
-    rig->run();
-    sets.leave(rig->controls().look().edits);
-    if (sets.has_next() && rig->controls().look().take_edits != pipeline::Edits{})
-      reports({report::Severity::warning, "review",
-               "changes to the take in review are dropped, because a set is loading"});
-    rig->on_change({});
-    bus.reset();
-    watch.reset();
-    rig.reset();
-    if (!sets.has_next() || end.stop_requested()) {  // a stop may come with a set that was read
-      service.stopping();
-      screen.close();
-      return snapshot();
-    }
-    sets.begin_next();
-  }
+  pulse.begin(options.patience.set);  // until the set is read
+  return LiveRun(options, reports, liveness, pulse).run();
 }
 
 }  // namespace previz::rig

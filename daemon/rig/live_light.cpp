@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "daemon/pipeline/relight.hpp"
+#include "drivers/error.hpp"
 
 namespace previz::rig {
 
@@ -20,7 +21,11 @@ LiveLight::LiveLight(Parts parts, const std::optional<LightCameraCalibration>& c
       needs_observer_(stage_->needs_observer()),
       observer_width_(observer.intrinsics.width),
       observer_height_(observer.intrinsics.height),
-      keeper_("lighting", parts_.kept, &pipeline::Patience::stage, make_stage_) {}
+      keeper_("lighting", parts_.kept, &pipeline::Patience::stage, make_stage_) {
+  if (needs_frames_ && !parts_.has_camera)
+    throw Error(parts_.set.file.string() +
+                ": lighting: the set has neither a light camera nor lighting.environment");
+}
 
 void LiveLight::start(pipeline::StageThreads& stages, std::function<FramePtr()> next_frame) {
   feed_.start(

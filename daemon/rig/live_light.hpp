@@ -23,9 +23,10 @@ class LiveLight {
     const scene::Scene& scene;
     const pipeline::Newest<Look>& look;
     pipeline::StageKeeper::Parts kept;
+    bool has_camera = true;  // the set has a light camera
   };
 
-  // Throws previz::Error as pipeline::LightStage does.
+  // Throws previz::Error as pipeline::LightStage does, and without the light camera that it needs.
   LiveLight(Parts parts, const std::optional<LightCameraCalibration>& calibration,
             const ObserverCalibration& observer);
 

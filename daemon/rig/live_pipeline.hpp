@@ -32,10 +32,6 @@
 
 namespace previz::rig {
 
-// Counts and reports anything odd about a picture that is to be shown.
-void count_picture(const pipeline::Shot& shot, pipeline::Metrics& metrics,
-                   report::Reports& reports);
-
 class LivePipeline {
  public:
   struct Parts {  // all of them outlive the pipeline

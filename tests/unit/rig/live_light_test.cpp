@@ -9,7 +9,7 @@
 #include <sstream>
 #include <thread>
 
-#include "daemon/rig/live_pipeline.hpp"
+#include "daemon/rig/live_output.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/wait_until.hpp"

@@ -1,0 +1,52 @@
+// The work of the rig's tracking thread: where the film camera is and what was moved by hand, the
+// light that belongs to the frame, and the frame's line in the take.
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "daemon/output/recorder.hpp"
+#include "daemon/pipeline/animation_clock.hpp"
+#include "daemon/pipeline/channel.hpp"
+#include "daemon/pipeline/edits.hpp"
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/pipeline/stage_keeper.hpp"
+#include "daemon/pipeline/track_stage.hpp"
+#include "daemon/rig/cameras.hpp"
+#include "daemon/rig/controls.hpp"
+#include "daemon/rig/live_light.hpp"
+#include "daemon/tracking/pose_filter.hpp"
+
+namespace previz::rig {
+
+class LiveTracking {
+ public:
+  struct Parts {  // outlive the tracking
+    const set::Set& set;
+    const Cameras& cameras;
+    output::Recorder& recorder;
+    const pipeline::Newest<Look>& look;
+    LiveLight& light;
+    pipeline::StageKeeper::Parts kept;
+  };
+  // Throws previz::Error on a set that cannot be tracked.
+  LiveTracking(Parts parts, const ObserverCalibration& calibration);
+
+  // Returns the shot tracked and lit, and offers its line to the recorder. What fails is reported
+  // and begins anew by itself; the shot is then without a pose, or has the light as it was.
+  pipeline::Shot track(pipeline::Shot shot);
+
+ private:
+  void make_stage();
+  void report_carriers(const pipeline::Shot& shot);
+  void offer_line(pipeline::Shot& shot, const pipeline::Edits& edits);
+
+  const Parts parts_;
+  const ObserverCalibration calibration_;
+  std::optional<pipeline::TrackStage> stage_;
+  std::optional<tracking::PoseFilter> filter_;  // absent: the set shows poses as they are found
+  pipeline::AnimationClock animation_clock_;
+  pipeline::StageKeeper tracking_, lighting_;
+};
+
+}  // namespace previz::rig
