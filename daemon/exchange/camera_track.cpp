@@ -207,7 +207,7 @@ CameraTrack camera_track(const session::Session& session,
         session.directory.string() +
         ": no frame has a pose, so there is no camera to export; `previzd track` says why; "
         "the set file needs [[tag]] tables (`previzd calibrate tags` measures them; --set names "
-        "another set file than the take's own), or the import a track");
+        "another set file than the take's own), or FRAMES.json a track");
   return track;
 }
 

@@ -46,8 +46,8 @@ std::string to_usda(const CameraTrack& track);
 
 // Returns Nuke's camera: a line for each tracked frame, "frame tx ty tz rx ry rz vfov", metres and
 // degrees. Nuke's world is Y up (X stays, its -Z is our Y); the rotation order is Nuke's default,
-// ZXY: the matrix is Ry Rx Rz. vfov is the full vertical angle of the picture about the principal
-// point's column.
+// ZXY: the matrix is Ry Rx Rz. vfov is the vertical angle of view of the whole picture, measured
+// in the column of the principal point.
 std::string to_chan(const CameraTrack& track);
 
 // Returns the angles (x, y, z) in degrees of a rotation matrix in the order ZXY; |x| <= 90.

@@ -10,9 +10,10 @@
 
 namespace previz::exchange {
 
-// How a picture must be turned to be upright: to its place right and down of the middle,
-//   x' = xx x + xy y,  y' = yx x + yy y,
-// each 0, 1 or -1, two of them 0. There are eight.
+// How a picture must be turned to be upright. A pixel x to the right of the middle and y below it
+// goes to
+//   x' = xx x + xy y,  y' = yx x + yy y;
+// each factor is 0, 1 or -1, and two of them are 0. There are eight orientations.
 struct Orientation {
   int xx = 1, xy = 0, yx = 0, yy = 1;
 
@@ -32,8 +33,8 @@ std::optional<Orientation> display_orientation(const std::array<std::int32_t, 9>
 // Turns a picture of grey or RGB.
 void turn(Picture& picture, const Orientation& orientation);
 
-// Widens or heightens a picture of grey or RGB, by cubic interpolation, so that pixels `wide` to
-// `high` become square. No sample is lost but those between.
+// Stretches a picture of grey or RGB in width or height, by cubic interpolation, so that pixels of
+// the shape `wide` to `high` become square. It is never made smaller.
 void make_square(Picture& picture, int wide, int high);
 
 }  // namespace previz::exchange

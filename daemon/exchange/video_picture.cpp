@@ -66,8 +66,8 @@ VideoPictures::VideoPictures(const AVFrame& first, AVStream& stream, AVFormatCon
   if (colors_.changes_anything()) done += ", sRGB's curve, Rec. 709";
   notes_.push_back(fmt::format("{}: {}: {}", file_.string(), tags_.words, done));
   if (!tags_.orientation.is_upright())
-    notes_.push_back(
-        fmt::format("{}: is {}, as it is to be shown", file_.string(), tags_.orientation.words()));
+    notes_.push_back(fmt::format("{}: its pictures are {}, so that they are upright",
+                                 file_.string(), tags_.orientation.words()));
   if (tags_.pixel_aspect.num != tags_.pixel_aspect.den)
     notes_.push_back(fmt::format("{}: its pixels, {}:{} wide to high, are resampled to square",
                                  file_.string(), tags_.pixel_aspect.num, tags_.pixel_aspect.den));

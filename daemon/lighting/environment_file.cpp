@@ -169,7 +169,7 @@ const CubeCross* known_cross(const std::filesystem::path& path, const LinearPict
         ". This looks like a strip of six cube faces, whose order differs from program to program; "
         "convert it to latitude-longitude or to a cube cross, by cmft for example";
   else
-    message += ", and a cube cross has 3:4 or 4:3; export it as one of these, and whole";
+    message += ", and a cube cross has 3:4 or 4:3; export the whole picture in one of these shapes";
   throw Error(message);
 }
 

@@ -36,7 +36,7 @@ std::string actions_text() {
 const Chapter service_chapter{"THE SERVICE", R"(
 previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. When the set file is saved, it is reloaded, or at the latest on `systemctl reload previzd`. If it has a mistake, the old one keeps running, and the journal and `previzctl status` report what is wrong. Changes made by buttons stay in effect.
 `previzctl action keep` writes what buttons have changed into the set file. As installed, the service may not write anywhere in /etc: keep the set file in /var/lib/previzd, or let the service write (`systemctl edit previzd`, ReadWritePaths=/etc/previzd) to a folder owned by previz.
-`journalctl -u previzd` shows what it reports, each line with its priority: `-p err` shows only the errors. Each loss of a device is a line, from the second on with its number ("the 3rd time in this run"); what repeats with every frame is a line the first, the 10th, 100th and 1000th time.
+`journalctl -u previzd` shows what it reports, each line with its priority: `-p err` shows only the errors. Each loss of a device is logged, from the second on with its number ("the 3rd time in this run"). What repeats with every frame is logged only the 1st, 10th, 100th and 1000th time.
 Members of the group previz may operate the rig with previzctl.
 )"};
 
@@ -53,7 +53,7 @@ previzd print board aprilgrid:6x6:40mm:12mm:kalibr --paper A3 --out board.pdf: D
 previzd calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds its pose from the set's tags.
 previzd calibrate response bracket --camera observer --out response.toml: Measures the film camera's response curve, and from which code on it clips, from a folder of pictures of one view at several shutter times. The longest exposure should be two stops longer than a bright even area needs to become white.
 previzd calibrate from camchain.yaml --camera cam0 --out lens.toml: Takes a lens that Kalibr, OpenCV, ROS or COLMAP calibrated.
-previzd calibrate from cameras.txt --as observer: Makes a fisheye of COLMAP the film camera's lens, and says by how many pixels it is off at worst.
+previzd calibrate from cameras.txt --as observer: Turns a fisheye lens that COLMAP calibrated into the film camera's lens, and says by how many pixels the two differ at worst.
 previzd calibrate tags walk --set desk.toml --size 80mm --write: Finds the tags' positions, from a walk past all of them with the film camera, and writes them to the set file.
 previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.
 previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the rest.
@@ -61,7 +61,7 @@ previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with 
 previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
 previzd trade desk.toml --axes estimator,depth: Measures the cost and benefit of the estimator and the number of bounces on this set.
 previzd trade takes/12A_take003 --set desk.toml --fps 25 --error 2% --out trade: Finds the settings that hold 25 frames per second with the least error, and those that reach an error of 2 % in the least time.
-previzd trade takes/12A_take003 --set desk.toml --out trade --minutes 20: Goes on from what the last one measured there, with more time.
+previzd trade takes/12A_take003 --set desk.toml --out trade --minutes 20: Continues the previous run of `previzd trade` in that folder, with more time.
 previzd run desk.toml --with trade/live.toml: Composites live with the settings that trade found.
 previzd render takes/12A_take003 --with trade/post.toml: Renders with the settings that trade found.
 previzd import frames.json sessions/desk: Makes a take of your own pictures or video.
@@ -117,8 +117,8 @@ The size is that of the black border, from outer edge to outer edge, as measured
 )"};
 
 const Chapter lenses_chapter{"LENSES OF OTHER PROGRAMS", R"(
-`previzd calibrate from FILE` recognises by their content: OpenCV's YAML, XML and JSON (4, 5 or 8 coefficients, or a fisheye's 4), ROS's camera_info (plumb_bob, rational_polynomial, equidistant), Kalibr's camchain (pinhole with radtan, equidistant or none), and COLMAP's cameras.txt (all models up to FULL_OPENCV and OPENCV_FISHEYE). What is assumed or converted is said, such as COLMAP's pixels, which are counted from the corner of the first one and not from its centre.
-A fisheye becomes the light camera's lens and a pinhole the film camera's, unless `--as` says otherwise: then the one is fitted by the other's model, and the worst difference over the picture is reported. More than 0.1 px needs `--force`.
+`previzd calibrate from FILE` recognises by their content: OpenCV's YAML, XML and JSON (4, 5 or 8 coefficients, or a fisheye's 4), ROS's camera_info (plumb_bob, rational_polynomial, equidistant), Kalibr's camchain (pinhole with radtan, equidistant or none), and COLMAP's cameras.txt (all models up to FULL_OPENCV and OPENCV_FISHEYE). The output says what is assumed or converted, such as COLMAP's pixel coordinates, which are counted from the corner of the first one and not from its centre.
+A fisheye becomes the light camera's lens and a pinhole the film camera's, unless `--as` says otherwise: then the lens is fitted with the other model, and the largest difference over the picture is reported. More than 0.1 px needs `--force`.
 Not supported are thin prisms and tilted sensors, Kalibr's omni, eucm, ds and fov, COLMAP's FOV and THIN_PRISM_FISHEYE, Nuke's LensDistortion and the lenses of 3DEqualizer: calibrate with another model, or from pictures of a board.
 )"};
 

@@ -46,7 +46,7 @@ void LiveGraphics::drop_stage() {
   parts_.renderer.reset();
 }
 
-// A renderer that fails again is made on a device that was opened anew.
+// A renderer that fails again is made on a reopened device.
 void LiveGraphics::begin_anew() {
   drop_stage();
   if (++begun_anew_ > 1) gpu().open();
@@ -81,7 +81,7 @@ void LiveGraphics::show_plates(std::chrono::milliseconds time) {
   rendering_.goes_on();
 }
 
-// While the renderer is made anew, the crew sees the plate.
+// While the renderer is rebuilt, the crew sees the plate.
 std::optional<Shot> LiveGraphics::next_picture() {
   const auto renew = [this](const render::DeviceLost& lost) { return keeper_.renew(lost); };
   for (;;) {

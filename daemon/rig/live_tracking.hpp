@@ -33,7 +33,7 @@ class LiveTracking {
   LiveTracking(Parts parts, const ObserverCalibration& calibration);
 
   // Returns the shot tracked and lit, and offers its line to the recorder. What fails is reported
-  // and begins anew by itself; the shot is then without a pose, or has the light as it was.
+  // and restarts by itself; the shot is then without a pose, or has the light as it was.
   pipeline::Shot track(pipeline::Shot shot);
 
  private:

@@ -130,7 +130,7 @@ AnimationChannel channel_of(const tinygltf::Model& model, const tinygltf::Animat
   const std::size_t wanted = channel.times_s.size() * (is_cubic ? 3 : 1);
   if (channel.values.size() != wanted)
     throw Error(output + ": has " + std::to_string(channel.values.size()) +
-                " values where its times ask for " + std::to_string(wanted));
+                " values, but its key times need " + std::to_string(wanted));
   for (std::size_t i = 0; i < wanted; ++i) {
     const glm::dvec4& value = channel.values[i];
     const bool is_key = !is_cubic || i % 3 == 1;  // tangents may be anything

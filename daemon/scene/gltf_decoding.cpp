@@ -8,7 +8,9 @@ namespace previz::scene {
 
 void DecodingLimit::add(std::uint64_t compressed, std::uint64_t decoded, const std::string& where) {
   if (compressed > compressed_left_)
-    throw Error(where + ": more is compressed than its buffers hold: parts of it overlap");
+    throw Error(where +
+                ": more is compressed than its buffers hold: compressed parts overlap; export the "
+                "file again");
   if (decoded > decoded_left_)
     throw Error(where + ": the file would have more than 4 GiB when decompressed");
   compressed_left_ -= compressed;

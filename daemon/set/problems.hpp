@@ -17,7 +17,7 @@ class Problems {
  public:
   explicit Problems(std::string file) : file_(std::move(file)) {}
 
-  // From now on a line after `lines` is one of this file, counted from there.
+  // Lines after number `lines` belong to `file`, and are numbered from its first line.
   void go_on_with(std::string file, std::uint32_t lines);
 
   // `key` is the full path of the key or table at fault, "observer.lens.f_number"; `what` says what

@@ -149,7 +149,7 @@ Keys tracking_keys(Tracking& t) {
       {"enabled", &t.enabled, plain, "Find the film camera's pose from the tags in its picture; false: use the poses recorded in the session."},
       {"family", &t.family, Rule{.words = tag_families}, "AprilTag family of the printed tags."},
       {"decimate", &t.decimate, plain.within(1, 8), "Search for tags in a picture reduced by this factor: faster, but misses small tags."},
-      {"min_margin", &t.min_margin, plain.within(0, 255), "Detections whose decision margin is lower are dropped."},
+      {"min_margin", &t.min_margin, plain.within(0, 255), "Detections that are less certain than this (AprilTag's decision margin) are dropped."},
       {"max_hamming", &t.max_hamming, plain.within(0, 3), "Bits of a tag's code that may be corrected."},
       {"ambiguity_ratio", &t.ambiguity_ratio, plain.within(0, 1), "A single tag can look the same from two poses. It counts as ambiguous if the best pose's error, divided by the second best's, is above this."},
       {"search_parts", &t.search_parts, plain, "Live, search for tags where they are expected, and the rest of the picture in strips, all of it within 16 frames, to keep up with large pictures. false: search the whole picture of every frame, as `previzd render` does."},
@@ -263,7 +263,7 @@ Keys light_sources_keys(LightSources& l) {
   return {
       {"contrast", &l.contrast, plain.within(2, 1e6), "A lamp must be at least this many times as bright as the mean of everything that is not a lamp."},
       {"least_share", &l.least_share, plain.within(0, 1), "A lamp must give at least this fraction of all light; fainter ones, such as reflections of lamps, stay in the picture."},
-      {"residual", &l.residual, plain, "With mode = \"sources\": light that is not from lamps is kept, heavily blurred, or dropped (its fraction is then reported)."},
+      {"residual", &l.residual, plain, "With mode = \"sources\": light that is not from lamps is heavily blurred, or dropped (its fraction is then reported)."},
       {"distance_m", &l.distance_m, length, "Distance of the lamps from the light camera. Default: they are on the walls of [lighting.room], or infinitely far away if there is none.", optional("2.5")},
   };
 }
@@ -276,9 +276,9 @@ Keys estimator_keys(Estimation& e) {
       {"composite_floor", &e.composite_floor, plain.within(0.0001, 1), "With composite = \"hybrid\": a real surface counts as dark below this fraction of the sensor's white."},
       {"max_depth", &e.max_depth, plain.within(1, 64), "Largest number of bounces."},
       {"roulette_depth", &e.roulette_depth, plain.within(1, 64), "From this bounce on, faint paths are ended at random (Russian roulette)."},
-      {"seed", &e.seed, plain, "The same seed gives the same noise: in every frame, or, with quality.neighbours, in the frame of the same number."},
+      {"seed", &e.seed, plain, "The same seed gives the same noise. All frames share one pattern of noise; in `previzd render` with quality.neighbours, each frame has a pattern of its own, which depends on its number."},
       {"specular_roughness", &e.specular_roughness, plain.within(0, 0.1), "A surface counts as a perfect mirror if its roughness (GGX alpha) is at or below this."},
-      {"difference_sampling", &e.difference_sampling, plain.within(0, 0.8), "Largest fraction of directions aimed at virtual and removed objects, because only there can the two worlds differ. Fewer are aimed where small lamps give most of the light, since these find the objects anyway. 0: none, as in the paper."},
+      {"difference_sampling", &e.difference_sampling, plain.within(0, 0.8), "Largest fraction of directions aimed at virtual and removed objects, because only there can the two worlds differ. Fewer are aimed where small lamps give most of the light, because the rays towards those lamps find the difference anyway. 0: none, as in the paper that previzd follows."},
       {"caustics", &e.caustics, plain, "Light that reaches rough surfaces via mirrors and glass. \"photons\": soft at first, then sharper. \"traced\": by paths that happen to find it, noisy. \"none\": off."},
       {"photons", &e.photons, plain.within(0.001, 10), "With caustics = \"photons\": photons per sample and pixel; at least 1024 per sample in all."},
       {"photon_radius_px", &e.photon_radius_px, plain.within(0.1, 100), "Blur of caustics in the first sample: radius over which photons are averaged, in pixels. It shrinks with every sample."},
@@ -288,7 +288,7 @@ Keys estimator_keys(Estimation& e) {
 
 Keys quality_keys(Quality& q) {
   return {
-      {"samples", &q.samples, plain.within(1, 1'000'000), "Samples per pixel and frame; with error or seconds, those of the first round."},
+      {"samples", &q.samples, plain.within(1, 1'000'000), "Samples per pixel and frame. If error or seconds is set: those of the first round, to which more are added."},
       {"adaptive", &q.adaptive, plain, "Spends more samples where the picture is noisy: the number of samples is then the average, and a pixel gets between an eighth and eight times as many. Offline only, from 32 samples on, and only if neither error nor seconds is set."},
       {"denoise", &q.denoise, plain, "Removes noise from the composite, in the preview as well, guided by the noise that was measured in each pixel. The fewer the samples, the more it helps and the more it blurs. The other layers of an EXR file stay as rendered."},
       {"accumulate", &q.accumulate, plain, "Live and in review, averages what is added to the plate over previous frames, where they show the same surfaces in the same light: less noise at the same rate. The plate is never averaged. What moves fast or has changed starts over. A snapshot's frame stands alone, so that it can be compared with what is rendered from a take. The action \"accumulate\" toggles it. Not used by refinement; for offline rendering see neighbours."},
@@ -296,7 +296,7 @@ Keys quality_keys(Quality& q) {
       {"error", &q.error, plain.within(0, 1), "Adds samples wherever the estimated error is above this fraction of the picture's brightness; 0: a fixed number of samples."},
       {"seconds", &q.seconds, plain.within(0, 86'400), "Adds samples for this long, where the picture needs them most; 0: a fixed number of samples."},
       {"scale", &q.scale, plain.within(0.01, 1), "Size of the preview, relative to the camera's picture; offline rendering is always full size."},
-      {"fps", &q.fps, plain.within(0, 240), "Frame rate that the preview holds, with 1 to 50 samples, then with a smaller picture (scale is the largest size), or by the [[quality.preview]] tables; 0: the keys above decide."},
+      {"fps", &q.fps, plain.within(0, 240), "Frame rate that the preview holds by changing its samples (1 to 50) and, if one sample is too many, its size (up to scale), or by the [[quality.preview]] tables. 0: samples and scale stay as set."},
       {"cpu_instead", &q.cpu_instead, plain, "Live, if the graphics card is gone: render on the CPU, slowly, as long as the set runs. Otherwise the plate is shown until the card is back. A rig that never had a card always renders on the CPU."},
   };
 }

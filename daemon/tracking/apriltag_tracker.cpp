@@ -132,10 +132,10 @@ class AprilTagTracker final : public Tracker {
     const bool is_turned = frame.width == lens_.height && frame.height == lens_.width;
     return "the frame is " + size(frame.width, frame.height) + ", the lens is calibrated for " +
            size(lens_.width, lens_.height) +
-           (is_turned
-                ? ": one of the two is turned by a quarter; turn the pictures as the lens was "
-                  "calibrated, or calibrate it with pictures like these"
-                : ": calibrate it with pictures of this size");
+           (is_turned ? ": one of the two is turned by 90 degrees; turn the pictures as they were "
+                        "when the lens "
+                        "was calibrated, or calibrate it with pictures like these"
+                      : ": calibrate it with pictures of this size");
   }
 
   bool lacks_what_was_followed(const Track& track) const {

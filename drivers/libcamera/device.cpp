@@ -300,7 +300,7 @@ struct Device::Impl {
     const std::size_t delivered =
         frame_bytes(agreed.format.format, agreed.format.width, agreed.format.height);
     if (std::max(least, delivered) > convert::most_picture_bytes)
-      refuse("reports pictures of " + config.size.toString() + " pixels, which is more than " +
+      refuse("reports pictures of " + config.size.toString() + " pixels, which need more than " +
              std::to_string(convert::most_picture_bytes) + " bytes");
     if (config.frameSize < least)
       refuse("reports a frame size of " + std::to_string(config.frameSize) +

@@ -68,7 +68,8 @@ std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& s
 // disk has is not known. Call it from a thread that may wait. Not thread-safe.
 class SessionWriter {
  public:
-  // The directory must not exist or be empty. All is on the disk at least this often. `codec` is
+  // The directory must be empty or not exist yet. All is synced to the disk at least every
+  // `sync_interval`. `codec` is
   // that of the cameras' pictures; the composite's is always FFV1.
   SessionWriter(const std::filesystem::path& directory, const SessionInfo& info,
                 std::chrono::nanoseconds sync_interval = std::chrono::seconds(1),
@@ -111,10 +112,10 @@ class SessionWriter {
 // far as the file system knows locks.
 bool is_being_written(const std::filesystem::path& directory);
 
-// Brings a session that was cut off, and that nobody is writing, into order: writes into its
-// session.toml that, unless it is there already, and returns how many frames of the observer it
-// has; nothing if there was nothing to do. Does not read the videos. Throws previz::Error as
-// open_session() does.
+// Brings a session that was cut off, and that nobody is writing, into order: notes in its
+// session.toml that it was cut off, and returns how many frames of the observer it has; nothing if
+// the session was closed, or had the note or another fault already. Does not read the videos.
+// Throws previz::Error as open_session() does.
 std::optional<std::uint64_t> salvage(const std::filesystem::path& directory);
 
 // Changes the take that a finished session describes. Throws previz::Error naming the file.

@@ -160,7 +160,7 @@ void search_lost(OpenedVideo& video, const std::filesystem::path& file, const St
   missing.push_back(file.filename().string() +
                     ": its head, or what lies between its pictures, is damaged; " +
                     count_of("picture", found.size() - before) + " of " +
-                    std::to_string(lines.size()) + " found one by one, whole by their checksums");
+                    std::to_string(lines.size()) + " found one by one, with correct checksums");
 }
 
 }  // namespace

@@ -18,9 +18,9 @@ namespace previz::calibrate {
 //   tilt      the boards' normals spread over at least 30 degrees about either axis of the picture.
 //             Without tilt the distance of the board cannot be separated from the focal length
 //             (Zhang 2000, section 4, and figure 4: the error falls until 45 degrees).
-//   distance  at least 2 views show the board across a third of the picture's diagonal: tilt
-//   differs
-//             from size by the change of scale across the board, which a small board lacks.
+//   distance  at least 2 views show the board across a third of the picture's diagonal. Tilt is
+//             told from size by how the scale changes across the board; across a small board it
+//             hardly changes.
 //   certainty over half of the picture the projection is certain to 1 px (one standard deviation),
 //             whatever else was wrong with the views.
 //   worst     and nowhere worse than to useless_px.

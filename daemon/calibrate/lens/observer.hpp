@@ -28,12 +28,13 @@ struct ObserverFit {
   double reach = 0;  // of the farthest corner from the picture's middle, in halves of the diagonal
 };
 
-// Fits both focal lengths, the principal point, k1, and of k2, p1 with p2, and k3 those that the
-// corners hold. Of a lens with a coefficient more, the Bayesian information criterion (Schwarz
-// 1978) must be lower; the picture must not fold within its edges, as no real lens's does; and none
-// is taken that leaves the picture uncertain by more than `useless_px`, unless all do: it would
-// explain corners in the middle and spoil the rest. Throws previz::Error if the views cannot
-// determine a lens at all; missing_views (coverage.hpp) decides whether they determine it well.
+// Fits both focal lengths, the principal point and k1, and those of k2, p1 with p2, and k3 that the
+// corners determine: a lens with more coefficients is taken only if its Bayesian information
+// criterion (Schwarz 1978) is lower. The picture must not fold within its edges, as no real lens's
+// does; and none is taken that leaves the picture uncertain by more than `useless_px`, unless all
+// do: it would explain corners in the middle and spoil the rest. Throws previz::Error if the views
+// cannot determine a lens at all; missing_views (coverage.hpp) decides whether they determine it
+// well.
 ObserverFit fit_observer(const Views& views);
 
 // Uncertainties of the projection, at worst over the picture: above the first there is a warning,

@@ -92,7 +92,8 @@ DarkSums sums_of(PictureSource& source, const ResponseCurve& response) {
                               picture.height, sums.width, sums.height));
     sums.add(picture);
   }
-  if (sums.pictures == 0) throw Error("no pictures of a covered lens");
+  if (sums.pictures == 0)
+    throw Error("there are no pictures; give some that were taken with the lens covered");
   return sums;
 }
 

@@ -79,8 +79,8 @@ void miss_certainty(const TagSurvey& survey, const std::vector<const SurveyedTag
     missing.push_back(fmt::format(
         "three tags or more in a picture: {} of {} pictures show two only, and a chain of pairs "
         "bends ({} are not certain; tag {}, the worst, to {:.0f} mm and {:.1f} degrees): film from "
-        "farther away or stick more tags; if the lengths alone are to be certain, measure two far "
-        "ones and give --distance",
+        "farther away or put up more tags; if only the scale must be certain, measure the distance "
+        "between two tags that are far apart and give it with --distance",
         survey.pictures_of_pairs, survey.pictures, tracking::tags_in_words(ids), worst.id,
         1000 * worst.position_sigma_m, worst.rotation_sigma_rad / degree));
     return;

@@ -252,7 +252,10 @@ void choose_coefficients(Surveying& state) {
     best = std::move(tried);
     least = criterion;
   }
-  if (!best) throw Error("no lens that boards and tags agree on shows the whole picture");
+  if (!best)
+    throw Error(
+        "every lens that fits boards and tags folds within the picture; calibrate the lens again "
+        "with boards near the picture's edges");
   state = std::move(*best);
 }
 
