@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "daemon/pipeline/relight.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::rig {
 

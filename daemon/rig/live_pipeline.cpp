@@ -19,6 +19,7 @@
 #include "daemon/rig/live_render.hpp"
 #include "daemon/rig/snapshots.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::rig {
 
