@@ -4,6 +4,7 @@
 
 #include "daemon/pipeline/relight.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::rig {
 

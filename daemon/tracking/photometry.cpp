@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "drivers/calibration/inverse_response.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::tracking {
 namespace {

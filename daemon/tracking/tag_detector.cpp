@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "daemon/tracking/tag_family.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::tracking {
 namespace {

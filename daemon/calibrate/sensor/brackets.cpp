@@ -10,6 +10,7 @@
 #include "daemon/calibrate/lens/exif.hpp"
 #include "daemon/calibrate/lens/source.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::calibrate {
 namespace {

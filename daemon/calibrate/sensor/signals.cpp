@@ -1,6 +1,7 @@
 #include "daemon/calibrate/sensor/signals.hpp"
 
 #include "daemon/lighting/response.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::calibrate {
 
