@@ -10,6 +10,7 @@
 
 #include "daemon/render/renderer.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "tests/bench/measure.hpp"
 #include "tests/bench/plot.hpp"
 #include "tests/bench/tracers/shapes.hpp"

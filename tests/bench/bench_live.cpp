@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/render/renderer.hpp"
+#include "drivers/plate.hpp"
 #include "tests/bench/equal_error/view.hpp"
 #include "tests/bench/measure.hpp"
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/render/renderer.hpp"
+#include "drivers/plate.hpp"
 #include "tests/bench/measure.hpp"
 #include "tests/bench/tracers/shapes.hpp"
 

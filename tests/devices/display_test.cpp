@@ -18,6 +18,7 @@
 #include "drivers/error.hpp"
 #ifdef PREVIZ_WITH_KMS
 #include "drivers/kms/modes.hpp"
+#include "drivers/plate.hpp"
 #include "tests/devices/gbm_cycle.hpp"
 #include "tests/devices/leftovers.hpp"
 

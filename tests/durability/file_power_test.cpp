@@ -9,6 +9,7 @@
 #include "daemon/output/video.hpp"
 #include "daemon/render/composite.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/draft.hpp"
 #include "tests/durability/faulty_disk.hpp"
 #include "tests/support/session_fixture.hpp"

@@ -12,6 +12,7 @@
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/response.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/pixels_by_hand.hpp"

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "daemon/lighting/response.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {

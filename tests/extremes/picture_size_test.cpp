@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {

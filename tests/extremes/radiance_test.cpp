@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/plate.hpp"
 #include "shaders/lib/octahedral.h"
 #include "tests/extremes/every_way.hpp"
 

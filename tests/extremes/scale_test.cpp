@@ -4,6 +4,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "drivers/plate.hpp"
 #include "tests/extremes/every_way.hpp"
 
 namespace previz::test {

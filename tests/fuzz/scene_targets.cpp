@@ -17,6 +17,7 @@
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "drivers/faults.hpp"
+#include "drivers/plate.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 

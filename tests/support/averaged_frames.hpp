@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {

@@ -13,6 +13,7 @@
 #include "daemon/lighting/luminance.hpp"
 #include "daemon/lighting/response.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::lighting {
 

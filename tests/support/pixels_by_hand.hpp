@@ -6,6 +6,7 @@
 #include <span>
 
 #include "daemon/render/presenter.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "daemon/pipeline/shot.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::test {
 

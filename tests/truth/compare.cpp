@@ -8,6 +8,7 @@
 
 #include "daemon/lighting/response.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::truth {
 namespace {

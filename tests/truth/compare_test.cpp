@@ -7,6 +7,7 @@
 
 #include "daemon/lighting/response.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "tests/truth/cpu_random.hpp"
 
 namespace previz::truth {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "drivers/plate.hpp"
+
 namespace previz::truth {
 namespace {
 

@@ -8,6 +8,7 @@
 #include "daemon/output/png.hpp"
 #include "daemon/render/renderer.hpp"
 #include "daemon/set/names.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/scenes.hpp"
 #include "tests/truth/compare.hpp"
 #include "tests/truth/comparison_sheet.hpp"

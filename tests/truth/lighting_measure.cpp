@@ -16,6 +16,7 @@
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "tests/truth/cpu_geometry.hpp"
 
 namespace previz::truth {

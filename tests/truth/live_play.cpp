@@ -14,6 +14,7 @@
 #include "daemon/pipeline/take_shots.hpp"
 #include "daemon/scene/load.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "tests/truth/cpu_camera.hpp"
 
 namespace previz::truth {

@@ -6,6 +6,7 @@
 
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/scene/load.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"
 #include "tests/support/shared_data.hpp"

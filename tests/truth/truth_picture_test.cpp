@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "daemon/output/png.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/truth/truth_render.hpp"
 #include "tests/truth/truth_take.hpp"

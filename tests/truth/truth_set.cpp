@@ -13,6 +13,7 @@
 #include "daemon/lighting/response.hpp"
 #include "daemon/output/png.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::truth {
 namespace {

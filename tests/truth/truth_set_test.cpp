@@ -11,6 +11,7 @@
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/truth/truth_take.hpp"
 

@@ -6,6 +6,7 @@
 
 #include "daemon/output/png.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/session.hpp"
 
 namespace previz::truth {

@@ -9,6 +9,7 @@
 #include <random>
 
 #include "daemon/lighting/response.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::convert {
 namespace convert_test {

@@ -10,6 +10,7 @@
 #include "drivers/error.hpp"
 #include "drivers/gles/placement.hpp"
 #include "drivers/headless/headless_display.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz {
 namespace display_test {

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/crc32.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/session_fixture.hpp"

@@ -11,6 +11,7 @@
 #include "daemon/lighting/response.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/lighting_pictures.hpp"
 
 namespace previz::lighting {

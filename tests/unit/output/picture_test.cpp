@@ -8,6 +8,7 @@
 #include "daemon/output/video.hpp"
 #include "drivers/av.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace previz::output {

@@ -10,6 +10,7 @@
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/load.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 

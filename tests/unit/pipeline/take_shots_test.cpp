@@ -7,6 +7,7 @@
 
 #include "daemon/pipeline/take_shots.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -18,6 +18,7 @@
 #include "daemon/output/png.hpp"
 #include "daemon/post/render.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/session_fixture.hpp"

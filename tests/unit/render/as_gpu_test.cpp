@@ -3,6 +3,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "daemon/render/device.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test {

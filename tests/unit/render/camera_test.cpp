@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "drivers/calibration/pinhole.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {

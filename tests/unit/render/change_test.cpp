@@ -7,6 +7,7 @@
 
 #include "daemon/render/light_change.hpp"
 #include "daemon/render/moved_instances.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 

@@ -1,5 +1,6 @@
 // The composite: untouched plates bit for bit, samples independent of how they are asked for, and
 // the equation itself.
+#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test {

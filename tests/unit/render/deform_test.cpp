@@ -6,6 +6,7 @@
 
 #include "daemon/render/deformer.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/bvh_decode.hpp"
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"

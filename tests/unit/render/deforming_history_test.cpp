@@ -3,6 +3,7 @@
 
 #include "daemon/render/moved_instances.hpp"
 #include "daemon/scene/bvh_refit.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/figure.hpp"
 

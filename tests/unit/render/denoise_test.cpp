@@ -3,6 +3,7 @@
 #include <numbers>
 #include <random>
 
+#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test {

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "daemon/render/blue_noise.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test {

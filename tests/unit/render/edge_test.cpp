@@ -2,6 +2,7 @@
 // converged real world, the composite must be its mixed world, on every pixel.
 #include <algorithm>
 
+#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {

@@ -4,6 +4,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 

@@ -2,6 +2,7 @@
 // seen in them does, and not as their own surface.
 #include <cmath>
 
+#include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 
 namespace previz::test {

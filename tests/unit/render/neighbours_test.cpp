@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 
+#include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 

@@ -1,6 +1,7 @@
 // The picture made on the device is that of the layers, whatever they are composited by.
 #include <random>
 
+#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test {

@@ -14,6 +14,7 @@
 #include "daemon/report/reports.hpp"
 #include "daemon/rig/live.hpp"
 #include "daemon/set/actions.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"

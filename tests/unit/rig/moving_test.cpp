@@ -14,6 +14,7 @@
 
 #include "daemon/post/render.hpp"
 #include "daemon/rig/live.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/gltf_writer.hpp"

@@ -19,6 +19,7 @@
 #include "daemon/control/bus.hpp"
 #include "daemon/rig/live.hpp"
 #include "daemon/set/actions.hpp"
+#include "drivers/plate.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/crewed_rig.hpp"

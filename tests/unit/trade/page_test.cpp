@@ -8,6 +8,7 @@
 
 #include "daemon/trade/chart.hpp"
 #include "drivers/error.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::trade {
 namespace page_test {
