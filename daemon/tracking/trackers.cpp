@@ -18,18 +18,18 @@ struct Wanted {
 
 struct Kind {
   bool (*suits)(const Wanted& wanted);
-  std::unique_ptr<Tracker> (*make)(Wanted wanted);
+  std::unique_ptr<Tracker> (*make)(Wanted& wanted);
 };
 
 // The first that suits is made.
 constexpr Kind kinds[] = {
     {[](const Wanted& w) { return w.set.tracking.enabled; },
-     [](Wanted w) {
+     [](Wanted& w) {
        return make_apriltag_tracker(w.set.tracking, w.calibration.intrinsics,
                                     w.calibration.response, w.search);
      }},
     {[](const Wanted& w) { return w.recorded && !w.recorded->empty(); },
-     [](Wanted w) { return make_recorded_tracker(std::move(w.recorded)); }},
+     [](Wanted& w) { return make_recorded_tracker(std::move(w.recorded)); }},
 };
 
 }  // namespace
@@ -42,7 +42,7 @@ std::unique_ptr<Tracker> make_tracker(const set::Set& set, const ObserverCalibra
   if (kind == std::end(kinds))
     throw Error(set.file.string() +
                 ": tracking.enabled: is false, but the session recorded no poses (track.jsonl)");
-  return kind->make(std::move(wanted));
+  return kind->make(wanted);
 }
 
 }  // namespace previz::tracking
