@@ -57,31 +57,194 @@ class Channel {
   virtual Waiting waiting() const = 0;
 };
 
-// What the channels share: the values wait in order, behind one lock. A class of its own says when
-// there is room, and how much may wait.
+// The channel for live use: a push replaces a value that was not taken yet and counts it as
+// dropped. The writer never waits.
 template <class T>
-class Queue : public Channel<T> {
+class Mailbox final : public Channel<T> {
  public:
   bool push(T value) override {
     {
-      std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return has_room() || closed_; });
+      const std::lock_guard lock(mutex_);
       if (closed_) return false;
-      put(std::move(value));
+      if (value_) ++dropped_;
+      value_.emplace(Pushed<T>{std::move(value)});
     }
-    changed_.notify_all();
+    filled_.notify_one();
     return true;
   }
 
   std::optional<T> pop() override {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [this] { return !values_.empty() || closed_; });
+    filled_.wait(lock, [this] { return value_ || closed_; });
+    return take();
+  }
+
+  std::optional<T> try_pop() override {
+    const std::lock_guard lock(mutex_);
+    return take();
+  }
+
+  // Works like pop(), but also returns nothing once the time is over, for readers with other work.
+  std::optional<T> pop_for(std::chrono::milliseconds timeout) {
+    std::unique_lock lock(mutex_);
+    filled_.wait_for(lock, timeout, [this] { return value_ || closed_; });
+    return take();
+  }
+  // Returns true once the channel is closed and drained: nothing will ever come.
+  bool finished() const {
+    const std::lock_guard lock(mutex_);
+    return closed_ && !value_;
+  }
+
+  void close() override { close(false); }
+  void abandon() override { close(true); }
+
+  std::uint64_t dropped() const override {
+    const std::lock_guard lock(mutex_);
+    return dropped_;
+  }
+  // The age is that of the value that waits: of what it took the place of, nothing is known.
+  Waiting waiting() const override {
+    const std::lock_guard lock(mutex_);
+    return value_ ? Waiting{.values = 1, .oldest_s = value_->age_s()} : Waiting{};
+  }
+
+ private:
+  std::optional<T> take() {
+    if (!value_) return std::nullopt;
+    std::optional<T> value = std::move(value_->value);
+    value_.reset();
+    return value;
+  }
+
+  void close(bool empty) {
+    {
+      const std::lock_guard lock(mutex_);
+      closed_ = true;
+      if (empty) value_.reset();
+    }
+    filled_.notify_all();
+  }
+
+  mutable std::mutex mutex_;
+  std::condition_variable filled_;
+  std::optional<Pushed<T>> value_;
+  std::uint64_t dropped_ = 0;
+  bool closed_ = false;
+};
+
+// The channel for recording and offline use: at most `capacity` (>= 1) values wait, in order; a
+// push waits for room.
+template <class T>
+class BoundedQueue final : public Channel<T> {
+ public:
+  explicit BoundedQueue(std::size_t capacity) : capacity_(capacity) {}
+
+  bool push(T value) override {
+    {
+      std::unique_lock lock(mutex_);
+      room_.wait(lock, [this] { return values_.size() < capacity_ || closed_; });
+      if (closed_) return false;
+      values_.push_back({std::move(value)});
+    }
+    filled_.notify_one();
+    return true;
+  }
+
+  // Pushes without waiting. Returns false, and the value is gone, if there is no room or the
+  // channel is closed.
+  bool offer(T value) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (closed_ || values_.size() >= capacity_) return false;
+      values_.push_back({std::move(value)});
+    }
+    filled_.notify_one();
+    return true;
+  }
+
+  std::optional<T> pop() override {
+    std::unique_lock lock(mutex_);
+    filled_.wait(lock, [this] { return !values_.empty() || closed_; });
     return take(lock);
   }
 
   std::optional<T> try_pop() override {
     std::unique_lock lock(mutex_);
     return take(lock);
+  }
+
+  void close() override { close(false); }
+  void abandon() override { close(true); }
+
+  std::uint64_t dropped() const override { return 0; }
+  Waiting waiting() const override {
+    const std::lock_guard lock(mutex_);
+    if (values_.empty()) return {};
+    return {.values = values_.size(), .oldest_s = values_.front().age_s()};
+  }
+
+ private:
+  std::optional<T> take(std::unique_lock<std::mutex>& lock) {
+    if (values_.empty()) return std::nullopt;
+    std::optional<T> value = std::move(values_.front().value);
+    values_.pop_front();
+    lock.unlock();
+    room_.notify_one();
+    return value;
+  }
+
+  void close(bool empty) {
+    {
+      const std::lock_guard lock(mutex_);
+      closed_ = true;
+      if (empty) values_.clear();
+    }
+    filled_.notify_all();
+    room_.notify_all();
+  }
+
+  const std::size_t capacity_;
+  mutable std::mutex mutex_;
+  std::condition_variable filled_, room_;
+  std::deque<Pushed<T>> values_;
+  bool closed_ = false;
+};
+
+// The channel for values that are all wanted, of a writer that must not wait: once more than
+// `fewest` values wait that have more than `most_bytes` together, the oldest are dropped and
+// counted.
+template <class T>
+class RecentQueue final : public Channel<T> {
+ public:
+  using BytesOf = std::function<std::uint64_t(const T&)>;
+  RecentQueue(std::size_t fewest, std::uint64_t most_bytes, BytesOf bytes_of)
+      : fewest_(fewest), most_bytes_(most_bytes), bytes_of_(std::move(bytes_of)) {}
+
+  bool push(T value) override {
+    {
+      const std::lock_guard lock(mutex_);
+      if (closed_) return false;
+      bytes_ += bytes_of_(value);
+      values_.push_back({std::move(value)});
+      while (values_.size() > fewest_ && bytes_ > most_bytes_) {
+        take_first();
+        ++dropped_;
+      }
+    }
+    filled_.notify_one();
+    return true;
+  }
+
+  std::optional<T> pop() override {
+    std::unique_lock lock(mutex_);
+    filled_.wait(lock, [this] { return !values_.empty() || closed_; });
+    return take_first();
+  }
+
+  std::optional<T> try_pop() override {
+    const std::lock_guard lock(mutex_);
+    return take_first();
   }
 
   void close() override { close(false); }
@@ -97,42 +260,12 @@ class Queue : public Channel<T> {
     return {.values = values_.size(), .oldest_s = values_.front().age_s(), .bytes = bytes_};
   }
 
- protected:
-  // All of these are called under the lock.
-  virtual bool has_room() const { return true; }       // else a push waits
-  virtual bool has_too_much() const { return false; }  // then the oldest value is dropped
-  virtual std::uint64_t bytes_of(const T&) const { return 0; }
-
-  void put(T value) {
-    bytes_ += bytes_of(value);
-    values_.push_back({std::move(value)});
-    while (has_too_much()) {
-      take_first();
-      ++dropped_;
-    }
-  }
-
-  // Returns the oldest value, if any, and lets the lock go.
-  std::optional<T> take(std::unique_lock<std::mutex>& lock) {
-    if (values_.empty()) return std::nullopt;
-    std::optional<T> value = take_first();
-    lock.unlock();
-    changed_.notify_all();
-    return value;
-  }
-
-  mutable std::mutex mutex_;
-  // With one writer and one reader, at most one of them waits: for room or for a value.
-  std::condition_variable changed_;
-  std::deque<Pushed<T>> values_;
-  std::uint64_t bytes_ = 0;
-  bool closed_ = false;
-
  private:
-  T take_first() {
-    T value = std::move(values_.front().value);
+  std::optional<T> take_first() {
+    if (values_.empty()) return std::nullopt;
+    std::optional<T> value = std::move(values_.front().value);
     values_.pop_front();
-    bytes_ -= bytes_of(value);
+    bytes_ -= bytes_of_(*value);
     return value;
   }
 
@@ -145,82 +278,17 @@ class Queue : public Channel<T> {
         bytes_ = 0;
       }
     }
-    changed_.notify_all();
+    filled_.notify_all();
   }
-
-  std::uint64_t dropped_ = 0;
-};
-
-// The channel for live use: a push replaces a value that was not taken yet and counts it as
-// dropped. The writer never waits. The age of what waits is that of this value: of what it took the
-// place of, nothing is known.
-template <class T>
-class Mailbox final : public Queue<T> {
- public:
-  // Works like pop(), but also returns nothing once the time is over, for readers with other work.
-  std::optional<T> pop_for(std::chrono::milliseconds timeout) {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, timeout, [this] { return !values_.empty() || closed_; });
-    return this->take(lock);
-  }
-  // Returns true once the channel is closed and drained: nothing will ever come.
-  bool finished() const {
-    const std::lock_guard lock(mutex_);
-    return closed_ && values_.empty();
-  }
-
- private:
-  using Queue<T>::mutex_, Queue<T>::changed_, Queue<T>::values_, Queue<T>::closed_;
-
-  bool has_too_much() const override { return values_.size() > 1; }
-};
-
-// The channel for recording and offline use: at most `capacity` (>= 1) values wait, in order; a
-// push waits for room.
-template <class T>
-class BoundedQueue final : public Queue<T> {
- public:
-  explicit BoundedQueue(std::size_t capacity) : capacity_(capacity) {}
-
-  // Pushes without waiting. Returns false, and the value is gone, if there is no room or the
-  // channel is closed.
-  bool offer(T value) {
-    {
-      const std::lock_guard lock(mutex_);
-      if (closed_ || values_.size() >= capacity_) return false;
-      this->put(std::move(value));
-    }
-    changed_.notify_all();
-    return true;
-  }
-
- private:
-  using Queue<T>::mutex_, Queue<T>::changed_, Queue<T>::values_, Queue<T>::closed_;
-
-  bool has_room() const override { return values_.size() < capacity_; }
-
-  const std::size_t capacity_;
-};
-
-// The channel for values that are all wanted, of a writer that must not wait: once more than
-// `fewest` values wait that have more than `most_bytes` together, the oldest are dropped and
-// counted.
-template <class T>
-class RecentQueue final : public Queue<T> {
- public:
-  using BytesOf = std::function<std::uint64_t(const T&)>;
-  RecentQueue(std::size_t fewest, std::uint64_t most_bytes, BytesOf bytes_of)
-      : fewest_(fewest), most_bytes_(most_bytes), bytes_of_(std::move(bytes_of)) {}
-
- private:
-  bool has_too_much() const override {
-    return this->values_.size() > fewest_ && this->bytes_ > most_bytes_;
-  }
-  std::uint64_t bytes_of(const T& value) const override { return bytes_of_(value); }
 
   const std::size_t fewest_;
   const std::uint64_t most_bytes_;
   const BytesOf bytes_of_;
+  mutable std::mutex mutex_;
+  std::condition_variable filled_;
+  std::deque<Pushed<T>> values_;
+  std::uint64_t bytes_ = 0, dropped_ = 0;
+  bool closed_ = false;
 };
 
 // Holds one immutable value that a thread publishes and any other thread reads.

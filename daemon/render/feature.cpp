@@ -1,10 +1,10 @@
 #include "daemon/render/feature.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <functional>
 #include <glm/gtc/packing.hpp>
 #include <span>
+#include <stdexcept>
 #include <vector>
 
 #include "daemon/render/gpu_lights.hpp"
@@ -317,7 +317,7 @@ std::vector<Feature> all_features() {
       all.insert(all.end(), of_extensions.begin(), of_extensions.end());
     if (own.bit == gpu::FEATURE_TEXTURES) all.push_back(feature_of(scene::layer_texture_feature()));
   }
-  assert(all.size() <= max_features);
+  if (all.size() > max_features) throw std::logic_error("more features than max_features");
   return all;
 }
 

@@ -154,11 +154,7 @@ class LiveRun {
     for (;;) {
       reports_.begin_set();
       if (!run_set()) continue;
-      if (!sets_.has_next() || end_.stop_requested()) {  // a stop may come with a set that was read
-        service_.stopping();
-        screen_.close();
-        return snapshot();
-      }
+      if (is_last_) return snapshot();
       sets_.begin_next();
     }
   }
@@ -195,6 +191,13 @@ class LiveRun {
     }
     say_live(set);
     run_rig(loop, *rig, set);
+    rig.reset();
+    is_last_ =
+        !sets_.has_next() || end_.stop_requested();  // a stop may come with a set that was read
+    if (is_last_) {  // before the files, which have the last word on what was shown
+      service_.stopping();
+      screen_.close();
+    }
     return true;
   }
 
@@ -271,6 +274,7 @@ class LiveRun {
   const std::shared_ptr<render::Device> device_;
   std::shared_ptr<render::Renderer> renderer_;  // goes from set to set
   CrewScreen screen_;
+  bool is_last_ = false;  // no set follows the one that has run
 };
 
 // What the whole process needs before any thread starts.

@@ -348,8 +348,8 @@ std::optional<EdgeFit> fit_edge(const Luminance& luminance, const PinholeIntrins
   const double rms =
       std::max(kMinNoise * contrast, std::sqrt(squares / std::max(1.0, weight - kParameters)));
   if (rms > 0.2 * contrast) return *why = "unclear", std::nullopt;
-  // A white that nothing determines, because all of it is clipped, leaves no more to say than
-  // below.
+  // A white that nothing determines, because all of it is clipped, is held. Where the rest is
+  // singular as well, only the clipping counts, below.
   const auto covariance =
       inverse_of(equations.information).value_or(decltype(equations.information)::zeros()) *
       (rms * rms);

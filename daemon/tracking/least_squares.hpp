@@ -53,7 +53,7 @@ Matrix in_units(const Matrix& information, const std::vector<double>& units) {
 
 // Solves (information + damping * its diagonal) * step = gradient by Cholesky's factors, N x N and
 // N x 1 of double, cv::Mat1d or cv::Matx. An unknown that nothing determines stays where it is.
-// Returns nothing if the matrix is singular or not finite.
+// Returns nothing if the matrix is singular.
 template <typename Matrix, typename Vector>
 std::optional<Vector> damped_step(const Matrix& information, const Vector& gradient,
                                   double damping) {

@@ -8,15 +8,15 @@ command=$(awk -v file="$unity" -F'"' '/"command"/ { c = $0 } /"file"/ && index($
   build/lint/compile_commands.json | sed 's/^ *"command": "//; s/",$//; s/\\"/"/g; s/ -o [^ ]*//; s/ -c / -M /')
 # All that the outcome depends on but the headers of libraries: the sources' and our headers' own text,
 # for the checks of comments and macros, how they are compiled, the checks, and clang-tidy itself.
-reads=$(cd build/lint && eval "$command" 2>/dev/null | tr -s ' \\\n' '\n' | grep "^$root/" | grep -v "^$root/build/" | sort -u)
-[[ -n $reads ]] || { echo "lint: no command builds $unity"; exit 1; }
+reads=$(cd build/lint && eval "$command" 2>"$root/$unity.log" | tr -s ' \\\n' '\n' | grep "^$root/" | grep -v "^$root/build/" | sort -u)
+[[ -n $reads ]] || { printf 'lint: %s cannot be read:\n' "$unity" && cat "$unity.log" && exit 1; }
 key=$({
   clang-tidy --version | grep -o 'version .*'
   cat .clang-tidy
   echo "${command#*c++ }"
   # shellcheck disable=SC2086  # a list of files
   sha256sum $reads
-} | sed "s#$root/##g" | sha256sum | cut -c1-40)
+} | sed "s#$root/\?##g" | sha256sum | cut -c1-40)
 pass() { printf '%s %s\n' "$key" "$name" >"$unity.passed"; }
 [[ $LINT_ALL == 1 ]] || ! grep -qsx "$key $name" "$record" || { pass && exit; }
 [[ ! -e $here/$key ]] || { pass && exit; }

@@ -232,6 +232,7 @@ BundleFit fit_bundle(const std::vector<View>& views, Bundle start, const Project
     problem.used = within(fit.residuals, std::max(limit, least_rejection_px));
     if (problem.used == fit.used) break;
   }
+  problem.used = fit.used;  // also where the last round would still change it
 
   std::size_t views_used = 0;
   for (std::size_t v = 0; v < fit.used.size(); ++v) {
