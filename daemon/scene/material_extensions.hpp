@@ -51,7 +51,7 @@ struct LayerTexture {
   const char* key = nullptr;
   std::uint32_t Material::*texture = nullptr;  // one of material_textures
   Encoding encoding = Encoding::linear;
-  // Of a normal texture: its scale. Without such a texture the layer is smooth, so that it stays
+  // The scale of a normal texture. Without such a texture the layer is smooth, so that it stays
   // where the image cannot be read. Null: without the image there is no such layer.
   float Material::*scale = nullptr;
 };
