@@ -5,8 +5,6 @@
 #include <arpa/inet.h>
 #include <arv.h>
 #include <fcntl.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <linux/netlink.h>
 #include <linux/seccomp.h>
 #include <linux/sockios.h>
@@ -17,18 +15,7 @@
 #include <sys/syscall.h>
 #include <sys/wait.h>
 
-#include <algorithm>
-#include <chrono>
 #include <csignal>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
-#include <memory>
-#include <random>
-#include <sstream>
-#include <string>
-#include <thread>
-#include <vector>
 
 #include "drivers/aravis/child_process.hpp"
 #include "drivers/aravis/protocol.hpp"
@@ -40,9 +27,9 @@
 #include "drivers/error.hpp"
 #include "drivers/lifeline.hpp"
 #include "tests/devices/hostile_network.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace aravis_hostile_test {
+namespace previz::test::aravis_hostile_test {
 
 TEST_F(HostileNetwork, FramesGoOnAmongPacketsOfAnotherHost) {
   expect_frames_among(another);
@@ -411,5 +398,4 @@ TEST(Receiver, TextOfForeignOriginIsPrintable) {
   EXPECT_EQ(aravis::printable("a\x1b[2J\xff\n~"), "a?[2J??~");
 }
 
-}  // namespace aravis_hostile_test
-}  // namespace previz::test
+}  // namespace previz::test::aravis_hostile_test

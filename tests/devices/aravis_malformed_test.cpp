@@ -2,25 +2,14 @@
 // its name, or counted and left out. Aravis' fake camera with its own description and registers
 // changed, over real GVCP and GVSP.
 #include <arv.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cstring>
-#include <fstream>
-#include <memory>
-#include <string>
 
 #include "drivers/camera_drivers.hpp"
 #include "drivers/error.hpp"
 #include "tests/devices/private_network.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace aravis_malformed_test {
-
-using testing::HasSubstr;
-using testing::StartsWith;
+namespace previz::test::aravis_malformed_test {
 
 constexpr const char* address = "127.0.0.1";
 
@@ -198,5 +187,4 @@ TEST_F(AbsurdCamera, StreamCountersHavePlainNames) {
     EXPECT_THAT(name, testing::Not(HasSubstr("_")));
 }
 
-}  // namespace aravis_malformed_test
-}  // namespace previz::test
+}  // namespace previz::test::aravis_malformed_test

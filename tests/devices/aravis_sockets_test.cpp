@@ -1,27 +1,19 @@
 // The sockets of a receiving process have their packet filters before they can receive: seen on the
 // sockets themselves, while nothing answers, and in a flood that never pauses.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <linux/filter.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include <atomic>
-#include <chrono>
-#include <string>
-#include <thread>
-#include <vector>
-
 #include "drivers/aravis/protocol.hpp"
 #include "drivers/aravis/receiver_process.hpp"
 #include "drivers/aravis/shared_buffers.hpp"
 #include "drivers/descriptor.hpp"
 #include "tests/devices/hostile_network.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace aravis_sockets_test {
+namespace previz::test::aravis_sockets_test {
 
 using namespace aravis_hostile_test;
 using std::chrono::milliseconds;
@@ -186,5 +178,4 @@ INSTANTIATE_TEST_SUITE_P(From, HostileReopening, testing::Values(another, addres
                                                                   : "TheCamerasName");
                          });
 
-}  // namespace aravis_sockets_test
-}  // namespace previz::test
+}  // namespace previz::test::aravis_sockets_test

@@ -1,22 +1,7 @@
 // Buttons: what contacts and reports become; and on real kernel devices (gpio-sim, uhid) where the
 // machine has them.
 #include <fcntl.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <poll.h>
-
-#include <atomic>
-#include <chrono>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <map>
-#include <memory>
-#include <span>
-#include <stdexcept>
-#include <string_view>
-#include <thread>
 
 #include "drivers/button_drivers.hpp"
 #include "drivers/button_queue.hpp"
@@ -28,13 +13,11 @@
 #include "drivers/hid/hid_buttons.hpp"
 #include "tests/devices/leftovers.hpp"
 #include "tests/devices/uhid_pad.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace buttons_test {
+namespace previz::buttons_test {
 
 using test::UhidPad;
-using testing::ElementsAre;
-using testing::HasSubstr;
 using Report = std::vector<std::uint8_t>;
 
 // ---- contacts
@@ -482,5 +465,4 @@ TEST(ButtonDevices, APadOfUhidPressedUnpluggedAndBack) {
   }
 }
 
-}  // namespace buttons_test
-}  // namespace previz
+}  // namespace previz::buttons_test

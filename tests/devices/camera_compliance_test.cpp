@@ -1,18 +1,10 @@
 // Every camera driver must pass these tests, whatever device stands behind it; see
 // drivers/camera.hpp.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <chrono>
-#include <optional>
-#include <thread>
-#include <vector>
-
 #include "drivers/error.hpp"
 #include "tests/devices/device_under_test.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace camera_compliance_test {
+namespace previz::test::camera_compliance_test {
 
 using std::chrono::milliseconds;
 using Clock = std::chrono::steady_clock;
@@ -295,7 +287,7 @@ TEST_P(CameraCompliance, NamesTheDeviceThatIsMissing) {
     device_->open_missing();
     ADD_FAILURE() << "a device was opened that is not there";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("missing"), std::string::npos) << error.what();
+    EXPECT_THAT(error.what(), HasSubstr("missing"));
   }
 }
 
@@ -313,5 +305,4 @@ std::string name_of(const testing::TestParamInfo<RegisteredDevice>& instance) {
 INSTANTIATE_TEST_SUITE_P(Drivers, CameraCompliance, testing::ValuesIn(devices(false)), name_of);
 INSTANTIATE_TEST_SUITE_P(Drivers, CameraUnplugged, testing::ValuesIn(devices(true)), name_of);
 
-}  // namespace camera_compliance_test
-}  // namespace previz::test
+}  // namespace previz::test::camera_compliance_test

@@ -1,17 +1,8 @@
 // Displays: the modes of screens as numbers, and a real screen where this machine has one to spare.
 #include <dlfcn.h>
-#include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
-#include <cerrno>
-#include <chrono>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <thread>
 
 #include "drivers/display_drivers.hpp"
 #include "drivers/display_lifeline.hpp"
@@ -21,6 +12,7 @@
 #include "drivers/plate.hpp"
 #include "tests/devices/gbm_cycle.hpp"
 #include "tests/devices/leftovers.hpp"
+#include "tests/support/test.hpp"
 
 namespace {
 bool has_atomic_commits = true;  // what the card is taken to say
@@ -41,8 +33,7 @@ extern "C" int drmSetClientCap(int card, std::uint64_t capability, std::uint64_t
 }
 #endif
 
-namespace previz {
-namespace display_test {
+namespace previz::display_test {
 
 #ifdef PREVIZ_WITH_KMS
 drmModeModeInfo timing(int width, int height, int clock_khz, int total_width, int total_height,
@@ -91,7 +82,7 @@ TEST(KmsModes, TheNearestRateOfTheSizeProgressiveFirst) {
       chosen(wanted);
       FAIL() << to_string(wanted);
     } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find("1280x720@50"), std::string::npos);
+      EXPECT_THAT(error.what(), HasSubstr("1280x720@50"));
     }
   }
 }
@@ -265,7 +256,7 @@ TEST_P(KmsCable, AHundredTimesUnpluggedLeavesNothingBehind) {
       openings = life.openings();
     }
     cable.pull();
-    ASSERT_NE(life.until("unplugged").find("unplugged"), std::string::npos) << "cycle " << cycle;
+    ASSERT_THAT(life.until("unplugged"), HasSubstr("unplugged")) << "cycle " << cycle;
     cable.plug();
   }
   ASSERT_EQ(life.until("shown"), "shown");
@@ -289,8 +280,7 @@ TEST_P(KmsScreen, AnUnknownConnectorOrModeIsToldWithWhatThereIs) {
       display_driver("kms").open(settings);
       FAIL();
     } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find(settings_.connector), std::string::npos)
-          << error.what();
+      EXPECT_THAT(error.what(), HasSubstr(settings_.connector));
     }
   }
 }
@@ -303,5 +293,4 @@ INSTANTIATE_TEST_SUITE_P(Cards, KmsCable, testing::Values(true),
                          [](const auto&) { return std::string("Atomic"); });
 #endif
 
-}  // namespace display_test
-}  // namespace previz
+}  // namespace previz::display_test

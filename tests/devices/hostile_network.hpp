@@ -2,31 +2,20 @@
 #pragma once
 
 #include <arv.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <filesystem>
-#include <memory>
-#include <random>
-#include <string>
-#include <vector>
 
 #include "drivers/camera_drivers.hpp"
 #include "drivers/error.hpp"
 #include "tests/devices/hostile_packets.hpp"
 #include "tests/devices/private_network.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace aravis_hostile_test {
+namespace previz::test::aravis_hostile_test {
 
 namespace fs = std::filesystem;
 using namespace hostile;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-using testing::HasSubstr;
-using testing::StartsWith;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::uint32_t url_register = 0x200;  // where a camera says where its description is
@@ -107,5 +96,4 @@ class HostileNetwork : public testing::Test {
   TemporaryDirectory directory_;
 };
 
-}  // namespace aravis_hostile_test
-}  // namespace previz::test
+}  // namespace previz::test::aravis_hostile_test

@@ -1,17 +1,11 @@
 // What libcamera's thread reports while a camera is opened and closed, on a camera of the test's
 // own that has libcamera's signals.
-#include <gtest/gtest.h>
 #include <libcamera/base/signal.h>
 
-#include <atomic>
-#include <chrono>
-#include <memory>
-#include <thread>
-
 #include "drivers/libcamera/mailbox.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::libcam {
-namespace libcamera_mailbox_test {
+namespace previz::libcam::libcamera_mailbox_test {
 
 using std::chrono::milliseconds;
 
@@ -73,5 +67,4 @@ TEST(LibcameraMailbox, MayBeLeftWhileTheCameraReports) {
   }
 }
 
-}  // namespace libcamera_mailbox_test
-}  // namespace previz::libcam
+}  // namespace previz::libcam::libcamera_mailbox_test

@@ -1,16 +1,10 @@
 // A camera is unplugged and plugged in again a hundred times, and nothing may be left behind.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <chrono>
-#include <vector>
-
 #include "drivers/lifeline.hpp"
 #include "tests/devices/device_under_test.hpp"
 #include "tests/devices/leftovers.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace replug_test {
+namespace previz::test::replug_test {
 
 using std::chrono::milliseconds;
 
@@ -91,5 +85,4 @@ std::vector<RegisteredDevice> devices_with_a_cable() {
 INSTANTIATE_TEST_SUITE_P(Drivers, Replugging, testing::ValuesIn(devices_with_a_cable()),
                          [](const auto& instance) { return std::string(instance.param.name); });
 
-}  // namespace replug_test
-}  // namespace previz::test
+}  // namespace previz::test::replug_test

@@ -1,22 +1,12 @@
 // What the USB itself can do for a device, on one that is really there: PREVIZ_TEST_USB_CABLE names
 // the file that stands for a USB camera's cable (tests/rig_vm).
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <chrono>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <vector>
-
+#include "drivers/usb/usb.hpp"
 #include "drivers/camera_drivers.hpp"
 #include "drivers/lifeline.hpp"
-#include "drivers/usb/usb.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::test {
-namespace usb_test {
+namespace previz::test::usb_test {
 
 using std::chrono::milliseconds;
 
@@ -111,5 +101,4 @@ std::vector<std::string> drivers_of_usb_cameras() {
 INSTANTIATE_TEST_SUITE_P(Drivers, UsbCamera, testing::ValuesIn(drivers_of_usb_cameras()),
                          [](const auto& instance) { return instance.param; });
 
-}  // namespace usb_test
-}  // namespace previz::test
+}  // namespace previz::test::usb_test

@@ -1,12 +1,10 @@
 // The V4L2 driver on a stand-in for the kernel: what it makes of the rate that a set asks for.
-#include <gtest/gtest.h>
-
 #include "drivers/error.hpp"
 #include "drivers/v4l2/v4l2_camera.hpp"
 #include "tests/devices/v4l2_fake_node.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::v4l2 {
-namespace v4l2_rate_test {
+namespace previz::v4l2::v4l2_rate_test {
 
 CameraSettings asking(double rate_hz) {
   CameraSettings settings;
@@ -93,5 +91,4 @@ TEST(V4l2Configure, ARateThatNoDeviceHasIsRefusedWithThoseOnOffer) {
   }
 }
 
-}  // namespace v4l2_rate_test
-}  // namespace previz::v4l2
+}  // namespace previz::v4l2::v4l2_rate_test

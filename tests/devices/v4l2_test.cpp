@@ -1,22 +1,15 @@
 // The V4L2 driver on a stand-in for the kernel: what is agreed, and what malformed buffers do. On
 // real nodes it runs in the compliance suite.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <functional>
-#include <limits>
-
 #include "drivers/error.hpp"
 #include "drivers/v4l2/find.hpp"
 #include "drivers/v4l2/formats.hpp"
 #include "drivers/v4l2/v4l2_camera.hpp"
 #include "tests/devices/v4l2_fake_node.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::v4l2 {
-namespace v4l2_test {
+namespace previz::v4l2::v4l2_test {
 
 using std::chrono::milliseconds;
-using testing::HasSubstr;
 
 CameraSettings settings() {
   CameraSettings settings;
@@ -584,5 +577,4 @@ TEST_F(V4l2Stream, ExposuresAreOnTheFramesThatSurelyHaveThem) {
   EXPECT_FALSE(camera_->set_exposure(-1, 1));
 }
 
-}  // namespace v4l2_test
-}  // namespace previz::v4l2
+}  // namespace previz::v4l2::v4l2_test

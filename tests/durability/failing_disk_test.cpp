@@ -1,16 +1,5 @@
 // Takes and sets are read from disks whose calls fail, the reading ones too: whichever it is, the
 // fault is said, nothing that was recorded is lost, and all is in order once the disk works again.
-#include <gtest/gtest.h>
-
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <optional>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "daemon/output/asset_store.hpp"
 #include "daemon/output/salvage.hpp"
 #include "daemon/output/take_list.hpp"
@@ -26,10 +15,10 @@
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_shot.hpp"
 #include "tests/support/small_take.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::post {
-namespace failing_disk_test {
+namespace previz::post::failing_disk_test {
 
 namespace fs = std::filesystem;
 using session::TemporaryDirectory;
@@ -256,5 +245,4 @@ TEST_P(FailingDisk, DeliversAnAssetWholeOrSaysThatItIsMissing) {
   });
 }
 
-}  // namespace failing_disk_test
-}  // namespace previz::post
+}  // namespace previz::post::failing_disk_test

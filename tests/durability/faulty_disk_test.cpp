@@ -2,16 +2,12 @@
 #include "tests/durability/faulty_disk.hpp"
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <fstream>
-
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace faulty_disk_test {
+namespace previz::test::faulty_disk_test {
 
 using session::content_of;
 using session::TemporaryDirectory;
@@ -100,5 +96,4 @@ TEST(FaultyDisk, FailsTheCallThatItIsAskedTo) {
   ::close(file);
 }
 
-}  // namespace faulty_disk_test
-}  // namespace previz::test
+}  // namespace previz::test::faulty_disk_test

@@ -1,9 +1,4 @@
 // Files that are whole or not there, on disks that lose power and that fail.
-#include <gtest/gtest.h>
-
-#include <functional>
-#include <random>
-
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/output/video.hpp"
@@ -13,9 +8,9 @@
 #include "drivers/session/draft.hpp"
 #include "tests/durability/faulty_disk.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace file_power_test {
+namespace previz::test::file_power_test {
 
 using session::content_of;
 using session::TemporaryDirectory;
@@ -154,5 +149,4 @@ TEST(Files, OfASecondAreNotSynced) {
   EXPECT_EQ(output::read_png(directory / "briefly/a.png").samples, picture(1).samples);
 }
 
-}  // namespace file_power_test
-}  // namespace previz::test
+}  // namespace previz::test::file_power_test

@@ -3,26 +3,21 @@
 // the process (nlohmann's json and the standard library's directory_iterator where a destructor or
 // a noexcept function lacks memory, libavformat where it opens a file); what they leave is then
 // brought in order by the next process, as after any crash.
-#include <gtest/gtest.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <csignal>
-#include <filesystem>
-#include <memory>
-#include <string>
 
 #include "daemon/output/recorder.hpp"
 #include "daemon/output/salvage.hpp"
 #include "tests/durability/scarce_memory.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::output {
-namespace scarce_memory_test {
+namespace previz::output::scarce_memory_test {
 
 using test::ScarceMemory;
 using test::TemporaryDirectory;
@@ -196,5 +191,4 @@ TEST_P(ScarceMemoryOfARecorder, CostsAtMostItsTakeWhicheverAllocationFails) {
   fail_every(1);
 }
 
-}  // namespace scarce_memory_test
-}  // namespace previz::output
+}  // namespace previz::output::scarce_memory_test

@@ -1,21 +1,15 @@
 // Sessions on disks that lose power and that fail: what was acknowledged is there, and nothing is
 // taken for whole that is not.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <functional>
-#include <optional>
-
 #include "daemon/output/asset_store.hpp"
 #include "daemon/output/recorder.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/durability/faulty_disk.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::test {
-namespace session_power_test {
+namespace previz::test::session_power_test {
 
 using session::is_frame;
 using session::noise_frame;
@@ -358,5 +352,4 @@ TEST(TakeFolders, OfWhichOneFailsForgetTheWishInTheOther) {
   EXPECT_FALSE(folders.kept_wish());
 }
 
-}  // namespace session_power_test
-}  // namespace previz::test
+}  // namespace previz::test::session_power_test

@@ -1,19 +1,11 @@
 // A day of the whole rig in simulated time: the crew records a take in every hour, and each hour
 // has its own mishap.
-#include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
-#include <array>
-#include <cstdlib>
-#include <fstream>
-#include <functional>
 #include <iostream>
-#include <map>
-#include <set>
-#include <sstream>
 
 #include "daemon/output/take_writer.hpp"
 #include "daemon/post/check.hpp"
@@ -28,10 +20,10 @@
 #include "tests/support/other_camera.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::rig {
-namespace simulated_day_test {
+namespace previz::rig::simulated_day_test {
 
 using test::SimulatedDevice;
 using test::SimulatedTime;
@@ -564,5 +556,4 @@ TEST_F(SimulatedDay, HasEveryTakeWholeAndEveryAlarmInTime) {
   std::cout << delivered_ << " frames, " << time_.jumps() << " jumps of the clock\n";
 }
 
-}  // namespace simulated_day_test
-}  // namespace previz::rig
+}  // namespace previz::rig::simulated_day_test

@@ -1,24 +1,16 @@
 // The simulated time itself, which every promise of the simulated day rests on.
 #include "tests/durability/simulated_time.hpp"
+#include "tests/support/test.hpp"
 
-#include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/timerfd.h>
 #include <unistd.h>
 
-#include <chrono>
-#include <condition_variable>
-#include <future>
-#include <mutex>
-#include <thread>
-#include <utility>
-
 #include "daemon/rig/event_loop.hpp"
 #include "drivers/host_clock.hpp"
 
-namespace previz::test {
-namespace simulated_time_test {
+namespace previz::test::simulated_time_test {
 
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
@@ -130,5 +122,4 @@ TEST(SimulatedTimeTest, WaitsThatAreCoalescedEndLateAndTogether) {
   EXPECT_LT(time.now_ns() % second, 2000);
 }
 
-}  // namespace simulated_time_test
-}  // namespace previz::test
+}  // namespace previz::test::simulated_time_test

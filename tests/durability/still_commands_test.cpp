@@ -1,14 +1,6 @@
 // What reads and writes takes beside the recording, on disks that stand still at any call: it
 // waits, goes on where it was, and shows nobody half of anything meanwhile.
-#include <gtest/gtest.h>
-
-#include <atomic>
-#include <filesystem>
-#include <functional>
 #include <stop_token>
-#include <string>
-#include <thread>
-#include <vector>
 
 #include "daemon/output/salvage.hpp"
 #include "daemon/output/take_list.hpp"
@@ -19,10 +11,10 @@
 #include "tests/durability/still_disk.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_shot.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::post {
-namespace still_commands_test {
+namespace previz::post::still_commands_test {
 
 namespace fs = std::filesystem;
 using session::TemporaryDirectory;
@@ -141,5 +133,4 @@ TEST(StillDiskOfARender, AtAnyCallIsWaitedForAndTheRenderGoesOn) {
   }
 }
 
-}  // namespace still_commands_test
-}  // namespace previz::post
+}  // namespace previz::post::still_commands_test

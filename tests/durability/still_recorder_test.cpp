@@ -1,21 +1,13 @@
 // Takes on disks that stand still, at any call: nobody but the recorder's own threads waits, and
 // what is offered meanwhile is recorded or counted.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <functional>
-#include <string>
-#include <thread>
-#include <vector>
-
 #include "daemon/output/recorder.hpp"
 #include "drivers/error.hpp"
 #include "tests/durability/still_disk.hpp"
 #include "tests/support/recorder_fixture.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::output {
-namespace still_recorder_test {
+namespace previz::output::still_recorder_test {
 
 using session::TemporaryDirectory;
 using test::StillDisk;
@@ -91,5 +83,4 @@ TEST(StillDisk, ThatIsTheSecondKeepsNothingFromTheFirst) {
   EXPECT_EQ(frame_count(rig.first / "12A_take001"), frames_offered);
 }
 
-}  // namespace still_recorder_test
-}  // namespace previz::output
+}  // namespace previz::output::still_recorder_test

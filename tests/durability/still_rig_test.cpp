@@ -1,19 +1,13 @@
 // A rig whose disks stand still: pictures and buttons go on.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "daemon/rig/set_keeper.hpp"
 #include "tests/durability/still_disk.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/notify_socket.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace still_rig_test {
+namespace previz::rig::still_rig_test {
 
 using test::NotifySocket;
 using test::RigLive;
@@ -177,5 +171,4 @@ TEST(SetKeeperOnAStillDisk, ReadsOnAThreadOfItsOwnAndGivesUp) {
   ASSERT_TRUE(test::wait_until("nobody waits", [&] { return disk.waiting() == 0; }));
 }
 
-}  // namespace still_rig_test
-}  // namespace previz::rig
+}  // namespace previz::rig::still_rig_test

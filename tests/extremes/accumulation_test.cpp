@@ -7,8 +7,7 @@
 #include "shaders/accumulate.spv.h"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace accumulation_test {
+namespace previz::test::accumulation_test {
 
 using render::Buffer;
 using render::Device;
@@ -153,5 +152,4 @@ TEST(Accumulation, CountsWhatCannotBe) {
   EXPECT_EQ(layers.diff[0].g, 0);
 }
 
-}  // namespace accumulation_test
-}  // namespace previz::test
+}  // namespace previz::test::accumulation_test

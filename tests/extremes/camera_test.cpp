@@ -1,13 +1,5 @@
 // Pixels at the ends of the sensor's codes, both ways; brackets that are clipped or black in every
 // exposure.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <numbers>
-#include <string>
-
 #include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/response.hpp"
@@ -16,9 +8,9 @@
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/pixels_by_hand.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace camera_test {
+namespace previz::lighting::camera_test {
 
 using test::fisheye_camera;
 using test::looking;
@@ -89,10 +81,8 @@ TEST(ExtremeCamera, AClippedOrBlackBracketIsFlagged) {
     EXPECT_NEAR(signal > 0 ? report.overexposed_sr : report.underexposed_sr, report.seen_sr, 1e-6);
     EXPECT_EQ(signal > 0 ? report.underexposed_sr : report.overexposed_sr, 0);
     ASSERT_FALSE(report.notes.empty());
-    EXPECT_NE(
-        report.notes[0].find(signal > 0 ? "clipped in every exposure" : "black in every exposure"),
-        std::string::npos)
-        << report.notes[0];
+    EXPECT_THAT(report.notes[0],
+                HasSubstr(signal > 0 ? "clipped in every exposure" : "black in every exposure"));
   }
 }
 
@@ -128,8 +118,7 @@ TEST(ExtremeCamera, ASunInFrameIsAToldLowerBoundInTheRightDirection) {
   EXPECT_GT(report.overexposed_sr, 0);
   EXPECT_LT(report.overexposed_sr, cap_sr(radius + std::sqrt(2.0) * pixel));
   ASSERT_FALSE(report.notes.empty());
-  EXPECT_NE(report.notes[0].find("an exposure below 0.00391 is needed"), std::string::npos)
-      << report.notes[0];
+  EXPECT_THAT(report.notes[0], HasSubstr("an exposure below 0.00391 is needed"));
   glm::dvec3 moment(0);
   for (int j = 0; j < lighting.environment.size; ++j) {
     for (int i = 0; i < lighting.environment.size; ++i) {
@@ -198,5 +187,4 @@ TEST(ExtremeCamera, AFrameOfAnotherSizeIsRefusedByName) {
   }
 }
 
-}  // namespace camera_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::camera_test

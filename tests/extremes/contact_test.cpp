@@ -4,8 +4,7 @@
 
 #include "tests/extremes/every_way.hpp"
 
-namespace previz::test {
-namespace contact_test {
+namespace previz::test::contact_test {
 
 constexpr int width = 64, height = 48;
 constexpr double albedo = 0.5;
@@ -239,5 +238,4 @@ TEST(Contact, AGlassBallAroundTheCameraTakesNothing) {
   for (const float mask : result.layers.mask) ASSERT_EQ(mask, 1.0f);
 }
 
-}  // namespace contact_test
-}  // namespace previz::test
+}  // namespace previz::test::contact_test

@@ -1,8 +1,7 @@
 // White furnaces at the ends of the materials' ranges: what goes in comes out, to 1e-3.
 #include "tests/extremes/every_way.hpp"
 
-namespace previz::test {
-namespace furnace_test {
+namespace previz::test::furnace_test {
 
 constexpr double energy = 1e-3;  // the bound of shaders/README.md, "Numerical extremes"
 
@@ -157,5 +156,4 @@ TEST_P(FurnaceByEveryWay, AWhiteBallOnAWhiteFloorIsNotSeen) {
   }
 }
 
-}  // namespace furnace_test
-}  // namespace previz::test
+}  // namespace previz::test::furnace_test

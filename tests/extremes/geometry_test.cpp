@@ -6,8 +6,7 @@
 #include "tests/support/gltf_test.hpp"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace geometry_test {
+namespace previz::test::geometry_test {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
@@ -158,5 +157,4 @@ TEST_F(GltfGeometry, BadTrianglesAreCountedAndTheRestIsShown) {
   for (const float depth : result.layers.depth) EXPECT_GT(depth, 0);
 }
 
-}  // namespace geometry_test
-}  // namespace previz::test
+}  // namespace previz::test::geometry_test

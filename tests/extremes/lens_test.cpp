@@ -6,8 +6,7 @@
 #include "drivers/session/session_toml.hpp"
 #include "tests/extremes/every_way.hpp"
 
-namespace previz::test {
-namespace lens_test {
+namespace previz::test::lens_test {
 
 // A glowing chequerboard of 8 x 8 fields, `distance` before the camera and as wide as the picture.
 View chequers(double distance) {
@@ -181,5 +180,4 @@ TEST(ExtremeLens, ASessionsImpossibleLensIsRefusedToo) {
         << value;
 }
 
-}  // namespace lens_test
-}  // namespace previz::test
+}  // namespace previz::test::lens_test

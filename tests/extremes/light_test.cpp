@@ -3,8 +3,7 @@
 
 #include "tests/extremes/every_way.hpp"
 
-namespace previz::test {
-namespace light_test {
+namespace previz::test::light_test {
 
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.5;
@@ -220,5 +219,4 @@ TEST_P(LightByEveryWay, BlackLampsLightNothing) {
   EXPECT_EQ(mean(show(view, 4).mixed), glm::dvec3(0));
 }
 
-}  // namespace light_test
-}  // namespace previz::test
+}  // namespace previz::test::light_test

@@ -3,8 +3,7 @@
 #include "daemon/render/photon_schedule.hpp"
 #include "tests/extremes/every_way.hpp"
 
-namespace previz::test {
-namespace photon_test {
+namespace previz::test::photon_test {
 
 // A diffuse floor with a glass ball over it under a lamp.
 View caustic_set() {
@@ -119,5 +118,4 @@ TEST_P(PhotonsByEveryWay, NoneStoredIsNoCaustic) {
   EXPECT_EQ(show(hidden, 4, photons_of_radius(2)).mixed, show(hidden, 4, none).mixed);
 }
 
-}  // namespace photon_test
-}  // namespace previz::test
+}  // namespace previz::test::photon_test

@@ -2,28 +2,17 @@
 // allocated.
 #include "daemon/render/picture_memory.hpp"
 
-#include <gmock/gmock.h>
-
-#include <functional>
-
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace picture_size_test {
-
-using testing::HasSubstr;
+namespace previz::test::picture_size_test {
 
 constexpr std::uint64_t gib = 1ull << 30;
 
 std::string words_of(const std::function<void()>& refusing) {
-  try {
-    refusing();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { refusing(); });
 }
 
 std::string refusal(int width, int height, const render::PictureMemory& memory) {
@@ -100,14 +89,14 @@ TEST(PictureSize, Of8192x4320FitsOrIsRefused) {
   const std::uint64_t texels = 1u << 27;
   EXPECT_EQ(refusal(8192, 4320, {.bytes = 8 * gib, .texels = texels}), "");
   const std::string no_memory = refusal(8192, 4320, {.bytes = 4 * gib, .texels = texels});
-  EXPECT_NE(no_memory.find("8192x4320 takes 7.2 GB"), std::string::npos) << no_memory;
-  EXPECT_NE(no_memory.find("but there is only 4.29 GB"), std::string::npos) << no_memory;
+  EXPECT_THAT(no_memory, HasSubstr("8192x4320 takes 7.2 GB"));
+  EXPECT_THAT(no_memory, HasSubstr("but there is only 4.29 GB"));
   // Made into layers in the same memory: 140 bytes more.
   const std::string shared =
       refusal(8192, 4320, {.bytes = 8 * gib, .texels = texels, .read_back = true});
-  EXPECT_NE(shared.find("takes 12.2 GB"), std::string::npos) << shared;
+  EXPECT_THAT(shared, HasSubstr("takes 12.2 GB"));
   const std::string no_texels = refusal(8192, 4320, {.bytes = 64 * gib, .texels = 1u << 16});
-  EXPECT_NE(no_texels.find("65536 pixels"), std::string::npos) << no_texels;
+  EXPECT_THAT(no_texels, HasSubstr("65536 pixels"));
 }
 
 // A megapixel that is averaged with two frames on each side takes 5 kept frames of 182 bytes a
@@ -148,10 +137,9 @@ TEST(PictureSize, OfMoreThanTheDeviceHoldsIsRefusedByTheRenderer) {
       const render::Renderer renderer(shared_device(), {}, pinhole(width, height, 0.5));
       FAIL() << "taken";
     } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find(std::to_string(width) + "x"), std::string::npos);
+      EXPECT_THAT(error.what(), HasSubstr(std::to_string(width) + "x"));
     }
   }
 }
 
-}  // namespace picture_size_test
-}  // namespace previz::test
+}  // namespace previz::test::picture_size_test

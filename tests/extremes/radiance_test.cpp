@@ -6,8 +6,7 @@
 #include "shaders/lib/octahedral.h"
 #include "tests/extremes/every_way.hpp"
 
-namespace previz::test {
-namespace radiance_test {
+namespace previz::test::radiance_test {
 
 View lit_set() {
   RandomScene options;
@@ -130,5 +129,4 @@ TEST(Radiance, OfASunAMillionTimesItsSkyIsUnbiasedAndSoIsTheSky) {
   }
 }
 
-}  // namespace radiance_test
-}  // namespace previz::test
+}  // namespace previz::test::radiance_test

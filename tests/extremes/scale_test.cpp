@@ -7,8 +7,7 @@
 #include "drivers/plate.hpp"
 #include "tests/extremes/every_way.hpp"
 
-namespace previz::test {
-namespace scale_test {
+namespace previz::test::scale_test {
 
 // Every material, a lens, lamps with and without an extent, and glass that casts a caustic.
 View rich_set() {
@@ -166,5 +165,4 @@ TEST(Scale, NoSurfaceOfAnySizeShadowsItself) {
   }
 }
 
-}  // namespace scale_test
-}  // namespace previz::test
+}  // namespace previz::test::scale_test

@@ -1,14 +1,8 @@
 // Tags at grazing angles, at the detection limit, and seen so that two poses explain them.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
-namespace previz::tracking {
-namespace tracking_test {
+namespace previz::tracking::tracking_test {
 
 // One small tag seen nearly face on, at many tilts: both poses explain it. Whatever is tracked must
 // be the true one; the rest must say so and hold the truth among their candidates.
@@ -131,5 +125,4 @@ TEST(ExtremeTracking, DetectionLimit) {
   EXPECT_EQ(status, TrackStatus::lost);
 }
 
-}  // namespace tracking_test
-}  // namespace previz::tracking
+}  // namespace previz::tracking::tracking_test

@@ -1,25 +1,16 @@
 // Runs every target of the fuzzer over the bytes that are kept in tests/fuzz/corpus: those it began
 // with, and those that once broke a reader. It also runs cuts and changes of them, the same ones on
 // every run. Nothing may crash, throw what is no previz::Error, or break a promise.
-#include <gtest/gtest.h>
 
 extern "C" {
 #include <libavutil/log.h>
 }
 
-#include <algorithm>
-#include <array>
-#include <cstdlib>
-#include <cstring>
-#include <filesystem>
-#include <random>
-#include <vector>
-
 #include "tests/fuzz/targets.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::fuzz {
-namespace fuzz_corpus_test {
+namespace previz::fuzz::fuzz_corpus_test {
 
 const std::filesystem::path corpus = std::filesystem::path(PREVIZ_SOURCE_DIR) / "tests/fuzz/corpus";
 
@@ -101,5 +92,4 @@ TEST(FuzzTargets, HaveAFolderEach) {
 INSTANTIATE_TEST_SUITE_P(Targets, FuzzCorpus, testing::ValuesIn(targets().begin(), targets().end()),
                          [](const auto& target) { return std::string(target.param.name); });
 
-}  // namespace fuzz_corpus_test
-}  // namespace previz::fuzz
+}  // namespace previz::fuzz::fuzz_corpus_test

@@ -1,23 +1,14 @@
 // Thousands of changes of structure, the same ones on every run: what comes out is still of its
 // format and other than what went in, and every kind of change is among them.
-#include <gtest/gtest.h>
 #include <toml++/toml.h>
 
-#include <algorithm>
-#include <array>
-#include <bit>
-#include <filesystem>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
-#include <sstream>
-#include <vector>
 
 #include "tests/fuzz/mutators.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::fuzz {
-namespace mutators_test {
+namespace previz::fuzz::mutators_test {
 
 using Json = nlohmann::json;
 
@@ -430,5 +421,4 @@ TEST(Mutators, TakeAnyBytes) {
   }
 }
 
-}  // namespace mutators_test
-}  // namespace previz::fuzz
+}  // namespace previz::fuzz::mutators_test

@@ -16,8 +16,7 @@
 #include "tests/storm/storm.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
-namespace previz::rig {
-namespace network_storm_test {
+namespace previz::rig::network_storm_test {
 
 using namespace test::hostile;
 using storm_test::Gust;
@@ -149,5 +148,4 @@ TEST_F(NetworkStorm, TheRigOutlivesItAndEveryTakeIsWhole) {
   EXPECT_TRUE(receivers().empty());
 }
 
-}  // namespace network_storm_test
-}  // namespace previz::rig
+}  // namespace previz::rig::network_storm_test

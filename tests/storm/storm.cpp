@@ -15,8 +15,7 @@
 #include "tests/devices/private_network.hpp"
 #include "tests/support/other_camera.hpp"
 
-namespace previz::rig {
-namespace storm_test {
+namespace previz::rig::storm_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -236,5 +235,4 @@ void Storm::weather(const std::vector<Gust>& gusts) {
   print();
 }
 
-}  // namespace storm_test
-}  // namespace previz::rig
+}  // namespace previz::rig::storm_test

@@ -4,21 +4,11 @@
 // without it.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <atomic>
-#include <chrono>
-#include <functional>
-#include <memory>
-#include <random>
-#include <string>
-#include <vector>
-
 #include "tests/support/live_rig.hpp"
 #include "tests/support/private_bus.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace storm_test {
+namespace previz::rig::storm_test {
 
 // Random choices for any thread; which ones fall together is up to the threads anyway.
 class Dice {
@@ -75,5 +65,4 @@ class Storm : public test::RigLive {
   std::atomic<bool> blows_ = false;
 };
 
-}  // namespace storm_test
-}  // namespace previz::rig
+}  // namespace previz::rig::storm_test

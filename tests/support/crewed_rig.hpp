@@ -1,25 +1,13 @@
 // Runs the rig on the small take, looped, with one Hand as its crew.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <condition_variable>
-#include <cstdint>
-#include <filesystem>
-#include <functional>
-#include <memory>
-#include <mutex>
-#include <ostream>
 #include <stop_token>
-#include <string>
-#include <thread>
-#include <utility>
-#include <vector>
 
 #include "daemon/rig/live.hpp"
 #include "daemon/set/actions.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/hand.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
 namespace previz::test {

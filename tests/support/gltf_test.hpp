@@ -1,17 +1,13 @@
 // A glTF file that a test writes and loads as the only object of a set.
 #pragma once
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <string>
-
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
 namespace previz::test {
 
@@ -27,12 +23,7 @@ class GltfTest : public ::testing::Test {
 
   // The message of the previz::Error that loading throws; "" where it loads.
   std::string error(const char* name = "test.gltf") {
-    try {
-      load(name);
-    } catch (const Error& thrown) {
-      return thrown.what();
-    }
-    return "";
+    return test::error_of([&] { load(name); });
   }
 
   test::TemporaryDirectory directory;

@@ -1,13 +1,11 @@
 #include "tests/support/import_fixture.hpp"
-
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
 extern "C" {
 #include <libavutil/imgutils.h>
 #include <libavutil/pixdesc.h>
 }
 
-#include <cstring>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 

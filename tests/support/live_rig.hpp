@@ -2,20 +2,14 @@
 // it waits for.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <condition_variable>
-#include <functional>
-#include <mutex>
 #include <nlohmann/json.hpp>
-#include <sstream>
-#include <string>
 
 #include "daemon/post/render.hpp"
 #include "daemon/rig/live.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
 namespace previz::test {

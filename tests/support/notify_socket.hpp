@@ -1,21 +1,11 @@
 #pragma once
 
-#include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
-#include <array>
-#include <chrono>
-#include <condition_variable>
-#include <cstdlib>
-#include <deque>
-#include <filesystem>
-#include <mutex>
-#include <string>
-#include <thread>
-
 #include "drivers/descriptor.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
 namespace previz::test {

@@ -1,12 +1,9 @@
 // Shared by the renderer's tests: one device with the validation layer on, and pictures of a view.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "daemon/render/renderer.hpp"
 #include "tests/support/scenes.hpp"
+#include "tests/support/test.hpp"
 
 namespace previz::test {
 

@@ -1,10 +1,7 @@
 // Test data that is too large, or not free, to be in the repository.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <cstdlib>
-#include <filesystem>
+#include "tests/support/test.hpp"
 
 namespace previz::test {
 

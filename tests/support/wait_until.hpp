@@ -1,13 +1,7 @@
 // Waits of tests: each has a limit, and its failure says which condition was missed.
 #pragma once
 
-#include <gtest/gtest.h>
-
-#include <chrono>
-#include <functional>
-#include <stdexcept>
-#include <string>
-#include <thread>
+#include "tests/support/test.hpp"
 
 namespace previz::test {
 

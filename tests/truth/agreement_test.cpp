@@ -1,15 +1,11 @@
 // The test of agreement must accept estimators that agree and reject those that do not.
 #include "tests/truth/agreement.hpp"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
+#include "tests/support/test.hpp"
 
 #include "drivers/error.hpp"
 #include "tests/truth/cpu_random.hpp"
 
-namespace previz::truth {
-namespace agreement_test {
+namespace previz::truth::agreement_test {
 
 // Every pixel 1 +- 0.2 (uniform noise), 160x128 = 10x8 blocks; `bias` is added to one channel of
 // the blocks whose index is below `biased_blocks`.
@@ -82,5 +78,4 @@ TEST(Agreement, TailsOfTheDistributions) {
   EXPECT_EQ(binomial_quantile(80, 3.8e-4, 0.999), 1);
 }
 
-}  // namespace agreement_test
-}  // namespace previz::truth
+}  // namespace previz::truth::agreement_test

@@ -1,17 +1,13 @@
 // The measures on constructed pictures whose answers are known.
 #include "tests/truth/compare.hpp"
-
-#include <gtest/gtest.h>
-
-#include <cmath>
+#include "tests/support/test.hpp"
 
 #include "daemon/lighting/response.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/truth/cpu_random.hpp"
 
-namespace previz::truth {
-namespace compare_test {
+namespace previz::truth::compare_test {
 
 // 32x24: 4x3 blocks. The mask covers x >= 20: block columns 0 and 1 are uncovered, 2 is the edge,
 // 3 is covered. Lr = 0.2; where uncovered Lm = 0.1 (D = -0.1), where covered Lm = 0.4.
@@ -216,5 +212,4 @@ TEST(Bounds, AllowTheTruthsNoiseAndNameWhatIsViolated) {
   EXPECT_THROW(bounds_named("loose"), Error);
 }
 
-}  // namespace compare_test
-}  // namespace previz::truth
+}  // namespace previz::truth::compare_test

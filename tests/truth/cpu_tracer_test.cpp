@@ -2,20 +2,14 @@
 // the estimate itself (one false alarm in 1.7 million checks) plus the stated bound of the formula.
 #include "tests/truth/cpu_tracer.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <numbers>
-
 #include "shaders/lib/octahedral.h"
 #include "tests/support/scenes.hpp"
+#include "tests/support/test.hpp"
 #include "tests/truth/cpu_bsdf.hpp"
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/cpu_environment.hpp"
 
-namespace previz::truth {
-namespace cpu_tracer_test {
+namespace previz::truth::cpu_tracer_test {
 
 using test::diffuse;
 using test::emitter;
@@ -450,5 +444,4 @@ TEST(CpuTracer, ScaleAndPlaceChangeNothing) {
   }
 }
 
-}  // namespace cpu_tracer_test
-}  // namespace previz::truth
+}  // namespace previz::truth::cpu_tracer_test

@@ -4,8 +4,7 @@
 
 #include "tests/truth/two_tracers.hpp"
 
-namespace previz::test {
-namespace material_agreement_test {
+namespace previz::test::material_agreement_test {
 
 // Patches of normals up to half a radian off.
 scene::Texture bumps() {
@@ -344,5 +343,4 @@ TEST(Patchwork, HasTheSameDifferenceByBothEstimators) {
   expect_same_difference(patchwork(), 16, true);
 }
 
-}  // namespace material_agreement_test
-}  // namespace previz::test
+}  // namespace previz::test::material_agreement_test

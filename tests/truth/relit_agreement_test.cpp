@@ -9,8 +9,7 @@
 #include "tests/truth/agreement.hpp"
 #include "tests/truth/cpu_tracer.hpp"
 
-namespace previz::test {
-namespace relit_agreement_test {
+namespace previz::test::relit_agreement_test {
 
 constexpr double degree = 0.017453292519943295;
 constexpr int scrambles = 16, samples = 32;
@@ -176,5 +175,4 @@ TEST(RelitLamps, AreTheSameByBothEstimators) {
   EXPECT_TRUE(agreement.agree) << agreement.report();
 }
 
-}  // namespace relit_agreement_test
-}  // namespace previz::test
+}  // namespace previz::test::relit_agreement_test

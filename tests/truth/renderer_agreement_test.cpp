@@ -14,8 +14,7 @@
 #include "tests/truth/truth_set.hpp"
 #include "tests/truth/two_tracers.hpp"
 
-namespace previz::test {
-namespace renderer_agreement_test {
+namespace previz::test::renderer_agreement_test {
 
 class RandomSets : public ::testing::TestWithParam<std::uint32_t> {
  protected:
@@ -222,5 +221,4 @@ TEST_P(TruthScenes, HaveTheSameDifferenceByBothEstimators) {
 INSTANTIATE_TEST_SUITE_P(Sets, TruthScenes, ::testing::Values("glass", "desk", "statues"),
                          [](const auto& set) { return set.param; });
 
-}  // namespace renderer_agreement_test
-}  // namespace previz::test
+}  // namespace previz::test::renderer_agreement_test

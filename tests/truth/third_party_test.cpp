@@ -8,8 +8,7 @@
 #include "tests/support/render_fixture.hpp"
 #include "tests/support/shared_data.hpp"
 
-namespace previz::test {
-namespace third_party_test {
+namespace previz::test::third_party_test {
 
 using std::numbers::pi;
 
@@ -219,5 +218,4 @@ TEST_F(Mitsuba, SpheresInAMuseum) {
   expect_equal(pictures, {23.5, 42, 4}, 0.005, "what is behind");
 }
 
-}  // namespace third_party_test
-}  // namespace previz::test
+}  // namespace previz::test::third_party_test

@@ -1,20 +1,12 @@
 // The tracker is held to its bounds (README.md, "Pose") by ground truth sets with exact poses and
 // corners, and by real photographs and video. All but the committed set live outside the
 // repository, in the folder that PREVIZ_SHARED names.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <filesystem>
-#include <glm/geometric.hpp>
-#include <set>
-#include <string>
-
 #include "tests/support/shared_data.hpp"
+#include "tests/support/test.hpp"
 #include "tests/truth/tracking_measure.hpp"
 #include "tests/truth/tracking_photographs.hpp"
 
-namespace previz::truth {
-namespace tracking_truth_test {
+namespace previz::truth::tracking_truth_test {
 
 namespace fs = std::filesystem;
 
@@ -135,5 +127,4 @@ TEST(TrackingPhotographs, Video) {
   }
 }
 
-}  // namespace tracking_truth_test
-}  // namespace previz::truth
+}  // namespace previz::truth::tracking_truth_test

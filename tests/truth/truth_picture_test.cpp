@@ -1,19 +1,13 @@
 // The bundled set against Cycles' truth, from the session to the picture's file, in so few samples
 // that a gate has the time.
-#include <gmock/gmock.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-
 #include "daemon/output/png.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/truth/truth_render.hpp"
 #include "tests/truth/truth_take.hpp"
 
-namespace previz::truth {
-namespace truth_picture_test {
+namespace previz::truth::truth_picture_test {
 
 constexpr int judged_frame = 0;
 constexpr int samples = 32;
@@ -189,5 +183,4 @@ TEST(TruthPicture, HoldsItsBoundsAndNoBrokenOneDoes) {
   expect_refused("no plate", composited(elsewhere, good), {"psnr"});
 }
 
-}  // namespace truth_picture_test
-}  // namespace previz::truth
+}  // namespace previz::truth::truth_picture_test

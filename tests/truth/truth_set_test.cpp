@@ -1,12 +1,8 @@
 // Ground truth sets: read from disk, refused where they are wrong, turned into sessions.
 #include "tests/truth/truth_set.hpp"
+#include "tests/support/test.hpp"
 
-#include <gtest/gtest.h>
-
-#include <fstream>
-#include <glm/geometric.hpp>
 #include <nlohmann/json.hpp>
-#include <numbers>
 
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
@@ -15,8 +11,7 @@
 #include "drivers/session/session.hpp"
 #include "tests/truth/truth_take.hpp"
 
-namespace previz::truth {
-namespace truth_set_test {
+namespace previz::truth::truth_set_test {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -112,7 +107,7 @@ TEST_F(ChangedSet, UnderstandsOtherResponses) {
   json_["observer"]["response"] = "linear";
   EXPECT_EQ(load().observer.response.kind, ResponseCurve::Kind::linear);
   json_["observer"]["response"] = "S-Log3";
-  EXPECT_NE(refusal().find("set.observer.response: 'S-Log3' is not understood"), std::string::npos);
+  EXPECT_THAT(refusal(), HasSubstr("set.observer.response: 'S-Log3' is not understood"));
 }
 
 TEST_F(ChangedSet, WithoutLightCameraTagsOrStatisticsStillLoads) {
@@ -130,17 +125,16 @@ TEST_F(ChangedSet, WithoutLightCameraTagsOrStatisticsStillLoads) {
 
 TEST_F(ChangedSet, RefusalsNameFileAndKey) {
   json_["observer"]["exposure"] = 0;
-  EXPECT_NE(refusal().find("set.json: set.observer.exposure: must be above 0"), std::string::npos);
+  EXPECT_THAT(refusal(), HasSubstr("set.json: set.observer.exposure: must be above 0"));
   json_["observer"]["exposure"] = 1.1;
   json_["observer"]["lens"].erase("focus_distance_m");
-  EXPECT_NE(refusal().find("set.observer.lens: has no 'focus_distance_m'"), std::string::npos);
+  EXPECT_THAT(refusal(), HasSubstr("set.observer.lens: has no 'focus_distance_m'"));
   json_["observer"]["lens"]["focus_distance_m"] = 1;
   json_["observer"]["vignetting"] = "cos4";
-  EXPECT_NE(refusal().find("set.observer.vignetting: vignetting is not supported"),
-            std::string::npos);
+  EXPECT_THAT(refusal(), HasSubstr("set.observer.vignetting: vignetting is not supported"));
   json_["observer"]["vignetting"] = nullptr;
   json_["truth"]["frames"] = {23};
-  EXPECT_NE(refusal().find("no frame has both truth and picture"), std::string::npos);
+  EXPECT_THAT(refusal(), HasSubstr("no frame has both truth and picture"));
 }
 
 TEST_F(ChangedSet, BecomesASession) {
@@ -192,5 +186,4 @@ TEST_F(ChangedSet, ItsSetFileIsOneTheParserTakes) {
   }
 }
 
-}  // namespace truth_set_test
-}  // namespace previz::truth
+}  // namespace previz::truth::truth_set_test

@@ -1,10 +1,8 @@
-#include <gtest/gtest.h>
-
 #include "tests/bench/equal_error/time_to_error.hpp"
 #include "tests/bench/equal_error/view.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::bench {
-namespace equal_error_test {
+namespace previz::bench::equal_error_test {
 
 // Noise: e = 0.4 / sqrt(t).
 TEST(TimeToError, FollowsThePowerLawBetweenPoints) {
@@ -55,5 +53,4 @@ TEST(WorldAlone, HasWhatItsWorldHas) {
   EXPECT_EQ(real.lights[0].gain_real, 1);
 }
 
-}  // namespace equal_error_test
-}  // namespace previz::bench
+}  // namespace previz::bench::equal_error_test

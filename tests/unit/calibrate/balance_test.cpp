@@ -1,13 +1,5 @@
 // The balance between the cameras: its statistics, and on ground truth sets, whose two cameras see
 // by one scale and whose surfaces have known albedos.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <fstream>
-#include <random>
-
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/sensor/balance_fit.hpp"
 #include "daemon/scene/load.hpp"
@@ -16,10 +8,10 @@
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/truth/truth_take.hpp"
 
-namespace previz::calibrate {
-namespace balance_test {
+namespace previz::calibrate::balance_test {
 
 namespace fs = std::filesystem;
 
@@ -102,7 +94,7 @@ TEST(BalanceFit, ReferencesAloneCountWhereTheyAreNamed) {
     fit_balance(seen, {"grey card"});
     FAIL() << "an unknown reference was taken";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("surface 0, surface 1"), std::string::npos);
+    EXPECT_THAT(error.what(), HasSubstr("surface 0, surface 1"));
   }
 }
 
@@ -205,5 +197,4 @@ TEST_F(TruthBalance, TheAlbedoOfAGuessedSurfaceIsFound) {
     EXPECT_NEAR(estimate.albedo[c], truth[c], 0.05 * truth[c] + 3 * estimate.sigma[c]);
 }
 
-}  // namespace balance_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::balance_test

@@ -1,8 +1,4 @@
 // Boards as they are written, and found in pictures whose corners are known exactly.
-#include <gtest/gtest.h>
-
-#include <glm/geometric.hpp>
-#include <memory>
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -10,18 +6,13 @@
 #include "daemon/calibrate/lens/board_finder.hpp"
 #include "daemon/calibrate/lens/board_guess.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
-namespace previz::calibrate {
-namespace board_test {
+namespace previz::calibrate::board_test {
 
 std::string problem(const std::string& text) {
-  try {
-    parse_board(text);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { parse_board(text); });
 }
 
 TEST(Board, IsReadAsWritten) {
@@ -45,23 +36,21 @@ TEST(Board, IsReadAsWritten) {
 }
 
 TEST(Board, EveryMistakeIsNamed) {
-  EXPECT_NE(problem("checkers:9x6:25mm").find("kind \"checkers\""), std::string::npos);
-  EXPECT_NE(problem("chessboard:9:25mm").find("size \"9\""), std::string::npos);
-  EXPECT_NE(problem("chessboard:9x2:25mm").find("rows \"2\""), std::string::npos);
-  EXPECT_NE(problem("chessboard:9x6").find("no square"), std::string::npos);
-  EXPECT_NE(problem("chessboard:9x6:25").find("square \"25\""), std::string::npos);
-  EXPECT_NE(problem("chessboard:9x6:-25mm").find("square \"-25mm\""), std::string::npos);
-  EXPECT_NE(problem("chessboard:9x6:25mm:3").find("an extra field \"3\""), std::string::npos);
-  EXPECT_NE(problem("charuco:5x5:20mm:20mm:4x4_50").find("needs markers smaller"),
-            std::string::npos);
-  EXPECT_NE(problem("chessboard:9x6:25mm:3").find(board_grammar), std::string::npos);
+  EXPECT_THAT(problem("checkers:9x6:25mm"), HasSubstr("kind \"checkers\""));
+  EXPECT_THAT(problem("chessboard:9:25mm"), HasSubstr("size \"9\""));
+  EXPECT_THAT(problem("chessboard:9x2:25mm"), HasSubstr("rows \"2\""));
+  EXPECT_THAT(problem("chessboard:9x6"), HasSubstr("no square"));
+  EXPECT_THAT(problem("chessboard:9x6:25"), HasSubstr("square \"25\""));
+  EXPECT_THAT(problem("chessboard:9x6:-25mm"), HasSubstr("square \"-25mm\""));
+  EXPECT_THAT(problem("chessboard:9x6:25mm:3"), HasSubstr("an extra field \"3\""));
+  EXPECT_THAT(problem("charuco:5x5:20mm:20mm:4x4_50"), HasSubstr("needs markers smaller"));
+  EXPECT_THAT(problem("chessboard:9x6:25mm:3"), HasSubstr(board_grammar));
 }
 
 TEST(Board, UnknownDictionariesAndFamiliesAreNamed) {
   EXPECT_THROW(make_board_finder(parse_board("charuco:5x5:20mm:15mm:8x8_50"), {}), Error);
   EXPECT_THROW(make_board_finder(parse_board("charuco:20x20:20mm:15mm:4x4_50"), {}), Error);
-  EXPECT_NE(problem("aprilgrid:6x6:24mm:7mm:tag99h9").find("family \"tag99h9\""),
-            std::string::npos);
+  EXPECT_THAT(problem("aprilgrid:6x6:24mm:7mm:tag99h9"), HasSubstr("family \"tag99h9\""));
 }
 
 constexpr int width = 640, height = 480;
@@ -210,10 +199,9 @@ TEST(OtherBoard, AChessboardIsCountedByItsInnerCorners) {
 
 TEST(OtherBoard, MarkersAreNamedByTheirDictionary) {
   const std::string words = other(charuco_drawing(), "charuco:7x5:40mm:30mm:6x6_250");
-  EXPECT_NE(words.find("markers of 4x4_50 (ids 0 to 16)"), std::string::npos) << words;
+  EXPECT_THAT(words, HasSubstr("markers of 4x4_50 (ids 0 to 16)"));
   const std::string miscounted = other(charuco_drawing(), "charuco:5x4:40mm:30mm:4x4_50");
-  EXPECT_NE(miscounted.find("such a board has 33 squares at least"), std::string::npos)
-      << miscounted;
+  EXPECT_THAT(miscounted, HasSubstr("such a board has 33 squares at least"));
   // Three tags that look like markers of 4x4_1000 here and there are no board of it.
   EXPECT_EQ(other(picture_of(six_tags()), "charuco:7x5:40mm:30mm:6x6_250"), "");
 }
@@ -221,14 +209,12 @@ TEST(OtherBoard, MarkersAreNamedByTheirDictionary) {
 TEST(OtherBoard, TagsAreNamedByTheirFamilyAndIds) {
   const Frame picture = picture_of(six_tags());
   const std::string words = other(picture, "aprilgrid:3x2:60mm:20mm:tag25h9");
-  EXPECT_NE(words.find("tags of tag36h11, ids 7 to 12: name that family"), std::string::npos)
-      << words;
+  EXPECT_THAT(words, HasSubstr("tags of tag36h11, ids 7 to 12: name that family"));
   const std::string first = other(picture, "aprilgrid:3x2:60mm:20mm");
-  EXPECT_NE(first.find("aprilgrid:COLUMNSxROWS:TAG:GAP:tag36h11:7"), std::string::npos) << first;
+  EXPECT_THAT(first, HasSubstr("aprilgrid:COLUMNSxROWS:TAG:GAP:tag36h11:7"));
   const std::string kalibr = other(picture, "aprilgrid:3x2:60mm:20mm:kalibr:7");
-  EXPECT_NE(kalibr.find("remove the word kalibr"), std::string::npos) << kalibr;
+  EXPECT_THAT(kalibr, HasSubstr("remove the word kalibr"));
   EXPECT_EQ(other(picture, "aprilgrid:3x2:60mm:20mm:tag36h11:7"), "");
 }
 
-}  // namespace board_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::board_test

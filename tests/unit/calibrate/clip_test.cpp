@@ -1,12 +1,5 @@
 // The code from which on a camera clips, from brackets of cameras that clip at a known one.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <fstream>
-#include <functional>
 #include <opencv2/imgcodecs.hpp>
-#include <random>
-#include <sstream>
 
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/sensor/clip_fit.hpp"
@@ -17,9 +10,9 @@
 #include "drivers/session/session.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::calibrate {
-namespace clip_test {
+namespace previz::calibrate::clip_test {
 
 namespace fs = std::filesystem;
 
@@ -137,8 +130,8 @@ TEST(ClipFit, TheLowestChannelDecidesAndEachIsNamed) {
   EXPECT_EQ(fit.channels[0].lowest, 255);
   EXPECT_EQ(fit.channels[2].lowest, 240);
   EXPECT_EQ(fit.code(), 240);
-  EXPECT_NE(describe(fit).find("blue: from code 240"), std::string::npos) << describe(fit);
-  EXPECT_NE(describe(fit).find("red: from code 255"), std::string::npos) << describe(fit);
+  EXPECT_THAT(describe(fit), HasSubstr("blue: from code 240"));
+  EXPECT_THAT(describe(fit), HasSubstr("red: from code 255"));
 }
 
 // A third of what the longest exposure clips turns black in it: that moved, and is no clipped code.
@@ -157,7 +150,7 @@ TEST(ClipFit, WithoutClippedLightItSaysWhichPictureIsMissing) {
     const ClipFit fit = fit_of(hard, std::exp2(longest - stops * (exposures - 1)));
     EXPECT_FALSE(fit.code());
     EXPECT_FALSE(fit.share());
-    EXPECT_NE(describe(fit).find("add a picture of two stops more exposure"), std::string::npos);
+    EXPECT_THAT(describe(fit), HasSubstr("add a picture of two stops more exposure"));
   }
 }
 
@@ -268,28 +261,26 @@ class ClipCommand : public testing::Test {
 
 TEST_F(ClipCommand, WritesTheKeyUnderItsEvidence) {
   write_pictures(bracket_of(limited));
-  EXPECT_NE(printed(CameraRole::observer).find("the camera clips from code 235 of 255 on"),
-            std::string::npos);
-  EXPECT_NE(table().find("clip_share = 0.91796\n"), std::string::npos) << table();
-  EXPECT_NE(table().find("# the camera clips from code 235"), std::string::npos) << table();
+  EXPECT_THAT(printed(CameraRole::observer), HasSubstr("the camera clips from code 235 of 255 on"));
+  EXPECT_THAT(table(), HasSubstr("clip_share = 0.91796\n"));
+  EXPECT_THAT(table(), HasSubstr("# the camera clips from code 235"));
   EXPECT_EQ(counted_from(0.91796, 8), 235u);
 }
 
 TEST_F(ClipCommand, KeepsTheKeyWhereNothingClips) {
   write_pictures(bracket_of(hard, std::exp2(-6 - stops * (exposures - 1))));
-  EXPECT_NE(printed(CameraRole::observer).find("keep the one that the set file has"),
-            std::string::npos);
-  EXPECT_EQ(table().find("clip_share"), std::string::npos) << table();
+  EXPECT_THAT(printed(CameraRole::observer), HasSubstr("keep the one that the set file has"));
+  EXPECT_THAT(table(), Not(HasSubstr("clip_share")));
 }
 
 // The light camera's table is accepted by a set file, and with it what brackets are merged by.
 TEST_F(ClipCommand, WritesTheLightCamerasKeyToo) {
   write_pictures(bracket_of(limited));
   const std::string output = printed(CameraRole::light);
-  EXPECT_NE(output.find("the camera clips from code 235 of 255 on"), std::string::npos) << output;
-  EXPECT_NE(table().find("[light_camera.response]"), std::string::npos) << table();
-  EXPECT_NE(table().find("# the camera clips from code 235"), std::string::npos) << table();
-  EXPECT_EQ(table().find("DOUBT: the light camera clips"), std::string::npos) << table();
+  EXPECT_THAT(output, HasSubstr("the camera clips from code 235 of 255 on"));
+  EXPECT_THAT(table(), HasSubstr("[light_camera.response]"));
+  EXPECT_THAT(table(), HasSubstr("# the camera clips from code 235"));
+  EXPECT_THAT(table(), Not(HasSubstr("DOUBT: the light camera clips")));
   const set::Set set = set::parse_set(
       set::intrinsics_toml(light_camera()) + set::light_pose_toml(glm::dmat4(1.0)) + table(),
       "printed.toml");
@@ -302,8 +293,8 @@ TEST_F(ClipCommand, WritesTheLightCamerasKeyToo) {
 TEST_F(ClipCommand, LeavesTheLightCamerasKeyOutWhereNothingClips) {
   write_pictures(bracket_of(hard, std::exp2(-6 - stops * (exposures - 1))));
   const std::string output = printed(CameraRole::light);
-  EXPECT_NE(output.find("the table has no clip_share"), std::string::npos) << output;
-  EXPECT_EQ(table().find("clip_share"), std::string::npos) << table();
+  EXPECT_THAT(output, HasSubstr("the table has no clip_share"));
+  EXPECT_THAT(table(), Not(HasSubstr("clip_share")));
 }
 
 // A session's own clip_share is compared with what its pictures show, and kept where they show
@@ -343,23 +334,21 @@ TEST_F(ClipCommand, ComparesWithWhatTheSessionSays) {
     return out.str();
   };
   const std::string clips = output(take("clips", "observer", hard, 1.0 / 32), CameraRole::observer);
-  EXPECT_NE(clips.find("the session has clip_share = 0.9, which counts codes from 230 on: pixels "
-                       "that still show light"),
-            std::string::npos)
-      << clips;
-  EXPECT_NE(clips.find("\nclip_share = 0.99609\n"), std::string::npos) << clips;
+  EXPECT_THAT(clips,
+              HasSubstr("the session has clip_share = 0.9, which counts codes from 230 on: pixels "
+                        "that still show light"));
+  EXPECT_THAT(clips, HasSubstr("\nclip_share = 0.99609\n"));
   const std::string dark =
       output(take("dark", "observer", hard, std::exp2(-6 - stops * (exposures - 1))),
              CameraRole::observer);
-  EXPECT_NE(dark.find("clip_share stays 0.9\n"), std::string::npos) << dark;
-  EXPECT_NE(dark.find("\nclip_share = 0.9\n"), std::string::npos) << dark;
+  EXPECT_THAT(dark, HasSubstr("clip_share stays 0.9\n"));
+  EXPECT_THAT(dark, HasSubstr("\nclip_share = 0.9\n"));
   const std::string light = output(take("light", "light", limited, 1.0 / 32), CameraRole::light);
-  EXPECT_NE(light.find("the session has clip_share = 1, which counts codes from 255 on: pixels "
-                       "below it are clipped but pass for measured light, so that lamps come out "
-                       "too dark"),
-            std::string::npos)
-      << light;
-  EXPECT_NE(light.find("\nclip_share = 0.91796\n"), std::string::npos) << light;
+  EXPECT_THAT(light,
+              HasSubstr("the session has clip_share = 1, which counts codes from 255 on: pixels "
+                        "below it are clipped but pass for measured light, so that lamps come out "
+                        "too dark"));
+  EXPECT_THAT(light, HasSubstr("\nclip_share = 0.91796\n"));
 }
 
 // A phone's JPEGs of a window clip at the largest codes.
@@ -377,5 +366,4 @@ TEST(RealClip, AWindowsBracketShowsWhereItClips) {
       describe(fit_clip(memorial, fit_response(memorial, ResponseMethod::debevec).curve)).c_str());
 }
 
-}  // namespace clip_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::clip_test

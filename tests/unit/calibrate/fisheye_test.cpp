@@ -1,11 +1,7 @@
 // The light camera's calibration: its lens on boards seen beyond 90 degrees, its pose by tags.
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
-#include <gtest/gtest.h>
 
-#include <cmath>
-#include <cstdlib>
-#include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 
 #include "daemon/calibrate/lens/coverage.hpp"
@@ -16,10 +12,10 @@
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/calibrate_pictures.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
-namespace previz::calibrate {
-namespace fisheye_test {
+namespace previz::calibrate::fisheye_test {
 
 using test::degree;
 
@@ -122,14 +118,14 @@ TEST(FisheyeCapture, AsksForTheEdgeOfTheCircle) {
   const Views views = ring({10, 30}, 8);
   const auto missing = missing_views(views, fit_fisheye(views));
   ASSERT_EQ(missing.size(), 1u);
-  EXPECT_NE(missing[0].find("near the edge of the image circle"), std::string::npos);
+  EXPECT_THAT(missing[0], HasSubstr("near the edge of the image circle"));
 }
 
 TEST(FisheyeCapture, AsksForMoreViews) {
   const Views views = ring({60}, 4);
   const auto missing = missing_views(views, fit_fisheye(views));
   ASSERT_FALSE(missing.empty());
-  EXPECT_NE(missing[0].find("more views: 4"), std::string::npos);
+  EXPECT_THAT(missing[0], HasSubstr("more views: 4"));
 }
 
 // Tags on the inside of a room, as a fisheye sees them: 4x4 rays a pixel.
@@ -273,9 +269,8 @@ TEST(LightPose, OneTagIsNotEnough) {
     find_light_pose(picture, small_lens(), {}, tracking(room()));
     FAIL() << "one tag was taken";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("only tag 0"), std::string::npos) << error.what();
+    EXPECT_THAT(error.what(), HasSubstr("only tag 0"));
   }
 }
 
-}  // namespace fisheye_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::fisheye_test

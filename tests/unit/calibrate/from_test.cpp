@@ -1,14 +1,7 @@
 // Lenses of other programs: what their files say is projected as their documentation says, and
 // what previzd cannot do right is refused with the words that help.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <fstream>
-#include <glm/geometric.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
-#include <sstream>
 
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/lens/lens_file.hpp"
@@ -20,11 +13,9 @@
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::calibrate {
-namespace from_test {
-
-using testing::HasSubstr;
+namespace previz::calibrate::from_test {
 
 // The table has 12 digits: of 2000 px that is 1e-9, and the formulas differ by rounding alone.
 constexpr double exact_px = 1e-6;
@@ -544,5 +535,4 @@ TEST(LensFiles, HostileFilesEndSoon) {
   EXPECT_THAT(from("a: 1\na: 2\n").error, HasSubstr("lens.txt:2: a: is given twice"));
 }
 
-}  // namespace from_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::from_test

@@ -1,25 +1,19 @@
 // Kalibr's AprilGrid: tags with a black border of two cells, and squares at their corners.
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
-#include <gtest/gtest.h>
 
-#include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <glm/geometric.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <sstream>
 
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/lens/board_finder.hpp"
 #include "daemon/calibrate/lens/observer.hpp"
 #include "daemon/calibrate/lens/views.hpp"
 #include "daemon/tracking/photometry.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::calibrate {
-namespace kalibr_test {
+namespace previz::calibrate::kalibr_test {
 
 constexpr int width = 640, height = 480;
 constexpr double focal_px = 620;
@@ -275,5 +269,4 @@ TEST(KeptKalibrBoard, ItsFormIsSaidOnce) {
   EXPECT_EQ(out.str().find("the tags have", at + 1), std::string::npos) << out.str();
 }
 
-}  // namespace kalibr_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::kalibr_test

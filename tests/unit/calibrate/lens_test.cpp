@@ -1,16 +1,12 @@
 // What depth of field needs of the lens, from what is known of it.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "daemon/calibrate/lens/lens_fit.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::calibrate {
-namespace lens_test {
+namespace previz::calibrate::lens_test {
 
 // A 35 mm lens focused at 1.2 m before a sensor 24 mm wide: its image stands at
 // v = f d / (d - f) = 36.0515... mm.
@@ -50,7 +46,7 @@ TEST(ThinLensFit, AZoomThatWasMovedIsSaid) {
   const LensFound found = find_lens(facts);
   EXPECT_EQ(found.lens.focal_length_m, 0.050);
   ASSERT_EQ(found.notes.size(), 4u);
-  EXPECT_NE(found.notes[3].find("35.00 mm"), std::string::npos);
+  EXPECT_THAT(found.notes[3], HasSubstr("35.00 mm"));
 }
 
 TEST(ThinLensFit, WhatIsMissingIsNamed) {
@@ -60,7 +56,7 @@ TEST(ThinLensFit, WhatIsMissingIsNamed) {
     find_lens(facts);
     FAIL() << "a lens without f-number was taken";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("f-number is unknown"), std::string::npos);
+    EXPECT_THAT(error.what(), HasSubstr("f-number is unknown"));
   }
   facts = known_lens();
   facts.sensor_width_m.reset();
@@ -96,5 +92,4 @@ TEST(ThinLensFit, WritesTheTableThatASetFileTakes) {
   EXPECT_EQ(set.observer.calibration->lens->focus_distance_m, 1.2);
 }
 
-}  // namespace lens_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::lens_test

@@ -1,11 +1,6 @@
 // The observer's calibration on boards seen by a lens that is known, and what it asks for where
 // views are missing.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <opencv2/core.hpp>
-#include <sstream>
 
 #include "daemon/calibrate/lens/coverage.hpp"
 #include "daemon/calibrate/lens/observer.hpp"
@@ -17,9 +12,9 @@
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/calibrate_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::calibrate {
-namespace observer_test {
+namespace previz::calibrate::observer_test {
 
 using test::Held;
 
@@ -176,7 +171,7 @@ TEST(ObserverCalibration, AViewThatDoesNotFitIsLeftOutWhole) {
 TEST(ObserverCapture, AsksForMoreViews) {
   auto how = test::careful_capture();
   how.resize(4);
-  EXPECT_NE(first_missing(how).find("more views: 4"), std::string::npos);
+  EXPECT_THAT(first_missing(how), HasSubstr("more views: 4"));
 }
 
 TEST(ObserverCapture, AsksForTheFieldsThatAreEmpty) {
@@ -189,10 +184,10 @@ TEST(ObserverCapture, AsksForTheFieldsThatAreEmpty) {
 TEST(ObserverCapture, AsksForTilt) {
   auto how = test::careful_capture();
   for (Held& held : how) held.tip_deg /= 10;
-  EXPECT_NE(first_missing(how).find("tipped forwards and backwards"), std::string::npos);
+  EXPECT_THAT(first_missing(how), HasSubstr("tipped forwards and backwards"));
   how = test::careful_capture();
   for (Held& held : how) held.turn_deg /= 10;
-  EXPECT_NE(first_missing(how).find("turned left and right"), std::string::npos);
+  EXPECT_THAT(first_missing(how), HasSubstr("turned left and right"));
 }
 
 // Why: the same capture without tilt knows the focal length at least ten times worse.
@@ -208,7 +203,7 @@ TEST(ObserverCapture, AsksForTheBoardFromNearer) {
   for (const Held& held : test::careful_capture())
     how.push_back({held.turn_deg, held.tip_deg, held.roll_deg,
                    glm::dvec3(0.53 * held.middle.x / 0.12, 0.27 * held.middle.y / 0.09, 1.2)});
-  EXPECT_NE(first_missing(how).find("the board from closer"), std::string::npos);
+  EXPECT_THAT(first_missing(how), HasSubstr("the board from closer"));
 }
 
 TEST(ObserverCalibration, WritesTheTableThatASetFileTakes) {
@@ -280,8 +275,7 @@ TEST(ObserverCalibration, SaysWhereItIsNotCertain) {
   EXPECT_TRUE(doubts_of(observer).empty());
   observer.picture[0].sigma_px = 1.4;
   ASSERT_EQ(doubts_of(observer).size(), 1u);
-  EXPECT_NE(doubts_of(observer)[0].find("certain only to 1.4 px near 40, 40"), std::string::npos)
-      << doubts_of(observer)[0];
+  EXPECT_THAT(doubts_of(observer)[0], HasSubstr("certain only to 1.4 px near 40, 40"));
   EXPECT_TRUE(missing_views(views, observer).empty());
   std::ostringstream out;
   EXPECT_EQ(warn(doubts_of(observer), out).find("# WITH A DOUBT: the lens is certain only to 1.4"),
@@ -290,11 +284,10 @@ TEST(ObserverCalibration, SaysWhereItIsNotCertain) {
   observer.picture[0].sigma_px = 0.5;
   observer.reach = 0.55;
   ASSERT_EQ(doubts_of(observer).size(), 1u);
-  EXPECT_NE(doubts_of(observer)[0].find("beyond 55 % of the way"), std::string::npos);
+  EXPECT_THAT(doubts_of(observer)[0], HasSubstr("beyond 55 % of the way"));
   observer.picture[0].sigma_px = 6.8;
   ASSERT_EQ(missing_views(views, observer).size(), 1u);
-  EXPECT_NE(missing_views(views, observer)[0].find("the lens is certain only to 6.8 px"),
-            std::string::npos);
+  EXPECT_THAT(missing_views(views, observer)[0], HasSubstr("the lens is certain only to 6.8 px"));
 }
 
 // One frontal view, as a phone on a table: however small its stated deviation, no lens follows.
@@ -302,8 +295,7 @@ TEST(ObserverByForce, OneViewGivesNoLens) {
   const Views views = captured({Held{}});
   EXPECT_TRUE(has_few_views(views, fit_observer(views)));
   const std::string why = why_useless(fit_observer_by_few(views));
-  EXPECT_NE(why.find("from 1 view), even with --force: film the board turned"), std::string::npos)
-      << why;
+  EXPECT_THAT(why, HasSubstr("from 1 view), even with --force: film the board turned"));
 }
 
 // Three tilted views: the nine parameters of the whole lens run away, and two do not. What the two
@@ -340,5 +332,4 @@ TEST(ObserverByForce, TheTableSaysWhatItLacks) {
   EXPECT_NO_THROW(set::parse_set(comment + set::balance_toml({1, 1, 1}), "printed.toml"));
 }
 
-}  // namespace observer_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::observer_test

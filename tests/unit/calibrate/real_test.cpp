@@ -1,22 +1,14 @@
 // The calibrations on real pictures, where they are there.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <glm/mat4x4.hpp>
-#include <map>
 #include <opencv2/calib3d.hpp>
-#include <sstream>
 
 #include "daemon/calibrate/lens/coverage.hpp"
 #include "daemon/calibrate/lens/fisheye.hpp"
 #include "daemon/calibrate/lens/observer.hpp"
 #include "daemon/calibrate/lens/source.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::calibrate {
-namespace real_test {
+namespace previz::calibrate::real_test {
 
 namespace fs = std::filesystem;
 
@@ -89,8 +81,8 @@ TEST(RealObserver, ACharucoBoardThatWasHardlyTiltedIsRefused) {
   EXPECT_LE(observer.fit.rms_px, 0.32);
   const std::vector<std::string> missing = missing_views(views, observer);
   ASSERT_EQ(missing.size(), 2u);
-  EXPECT_NE(missing[0].find("turned left and right"), std::string::npos);
-  EXPECT_NE(missing[1].find("tipped forwards and backwards"), std::string::npos);
+  EXPECT_THAT(missing[0], HasSubstr("turned left and right"));
+  EXPECT_THAT(missing[1], HasSubstr("tipped forwards and backwards"));
 }
 
 // Boards of the deltille format: their corners as listed, in the frame of the first board.
@@ -174,5 +166,4 @@ TEST(RealFisheye, PlaneSeenBeyond90Degrees) {
   expect_fisheye("ov_plane", 0.60);
 }
 
-}  // namespace real_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::real_test

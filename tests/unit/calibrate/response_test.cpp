@@ -1,10 +1,5 @@
 // Response curves from brackets whose curve is known, and from the real ones.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
-#include <random>
 
 #include "daemon/calibrate/sensor/brackets.hpp"
 #include "daemon/calibrate/sensor/response_fit.hpp"
@@ -16,9 +11,9 @@
 #include "drivers/session/session.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::calibrate {
-namespace response_test {
+namespace previz::calibrate::response_test {
 
 namespace fs = std::filesystem;
 
@@ -127,7 +122,7 @@ TEST(ResponseFit, WhatMovedIsNotTaken) {
     fit_response(bracket, ResponseMethod::debevec);
     FAIL() << "a picture that got darker was taken";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("brighten with exposure"), std::string::npos);
+    EXPECT_THAT(error.what(), HasSubstr("brighten with exposure"));
   }
 }
 
@@ -182,12 +177,7 @@ class BracketFiles : public testing::Test {
     return folder() / "exposures.txt";
   }
   std::string problem(const std::string& text) const {
-    try {
-      read_bracket(folder(), "", list(text));
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return test::error_of([&] { read_bracket(folder(), "", list(text)); });
   }
   test::TemporaryDirectory directory_;
 };
@@ -203,16 +193,14 @@ TEST_F(BracketFiles, ComeDarkestFirst) {
 }
 
 TEST_F(BracketFiles, EveryMistakeIsNamed) {
-  EXPECT_NE(problem("a.png 1\nb.png 2\n").find("no line for c.png"), std::string::npos);
-  EXPECT_NE(problem("a.png 1\nb.png two\n").find(":2: \"two\" is not an exposure"),
-            std::string::npos);
-  EXPECT_NE(problem("a.png 1\nb.png 2\nc.png 2.001\n").find("the same exposure as"),
-            std::string::npos);
+  EXPECT_THAT(problem("a.png 1\nb.png 2\n"), HasSubstr("no line for c.png"));
+  EXPECT_THAT(problem("a.png 1\nb.png two\n"), HasSubstr(":2: \"two\" is not an exposure"));
+  EXPECT_THAT(problem("a.png 1\nb.png 2\nc.png 2.001\n"), HasSubstr("the same exposure as"));
   try {
     read_bracket(folder(), "", std::nullopt);
     FAIL() << "pictures without EXIF were taken";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("has no EXIF exposure time"), std::string::npos);
+    EXPECT_THAT(error.what(), HasSubstr("has no EXIF exposure time"));
   }
 }
 
@@ -285,16 +273,12 @@ TEST(ResponseCalibration, AJumpIsNamedWithItsCause) {
   EXPECT_TRUE(doubts_of(fit).empty());
   for (std::size_t code = 0; code < 245; ++code) fit.curve.inverse_table[code] *= 0.07;
   ASSERT_EQ(doubts_of(fit).size(), 1u);
-  EXPECT_NE(doubts_of(fit)[0].find("clips its light at about code 240"), std::string::npos)
-      << doubts_of(fit)[0];
-  EXPECT_NE(doubts_of(fit)[0].find("give clip_share = 0.94"), std::string::npos);
+  EXPECT_THAT(doubts_of(fit)[0], HasSubstr("clips its light at about code 240"));
+  EXPECT_THAT(doubts_of(fit)[0], HasSubstr("give clip_share = 0.94"));
   // What was measured already need not be given.
-  EXPECT_NE(doubts_of(fit, 244)[0].find("clip_share, which counts codes from 244 on"),
-            std::string::npos)
-      << doubts_of(fit, 244)[0];
+  EXPECT_THAT(doubts_of(fit, 244)[0], HasSubstr("clip_share, which counts codes from 244 on"));
   fit.error_codes = 12;
-  EXPECT_NE(doubts_of(fit)[0].find("predicted only to 12.0 codes"), std::string::npos);
+  EXPECT_THAT(doubts_of(fit)[0], HasSubstr("predicted only to 12.0 codes"));
 }
 
-}  // namespace response_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::response_test

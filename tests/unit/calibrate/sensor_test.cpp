@@ -1,17 +1,12 @@
 // Dark level and vignetting of the light camera, from pictures made by code.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <random>
-
 #include "daemon/calibrate/sensor/dark_fit.hpp"
 #include "daemon/calibrate/sensor/vignetting_fit.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::calibrate {
-namespace sensor_test {
+namespace previz::calibrate::sensor_test {
 
 using test::degree;
 
@@ -152,8 +147,8 @@ TEST(VignettingFit, PicturesThatCannotBeUsedAreLeftOutAndTold) {
   std::vector<std::string> notes;
   std::vector<FlatPicture> pictures_seen = read_flat_pictures(source, camera(), notes);
   ASSERT_EQ(notes.size(), 2u);
-  EXPECT_NE(notes[0].find("64x64"), std::string::npos);
-  EXPECT_NE(notes[1].find("black or white"), std::string::npos);
+  EXPECT_THAT(notes[0], HasSubstr("64x64"));
+  EXPECT_THAT(notes[1], HasSubstr("black or white"));
   EXPECT_THROW(fit_vignetting(pictures_seen, 1), Error);
 }
 
@@ -164,5 +159,4 @@ TEST(VignettingFit, ALensThatLetsNothingThroughIsRefused) {
   EXPECT_THROW(fit_vignetting(pictures_seen, 110 * degree), Error);
 }
 
-}  // namespace sensor_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::sensor_test

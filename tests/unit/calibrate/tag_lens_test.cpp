@@ -1,11 +1,7 @@
 // The lens refined by tags, where boards filled the centre of the picture alone: made by the test
 // from a lens that is known.
-#include <gtest/gtest.h>
-
-#include <cstdio>
-
-#include "daemon/calibrate/lens/observer.hpp"
 #include "daemon/calibrate/tags/tag_lens.hpp"
+#include "daemon/calibrate/lens/observer.hpp"
 #include "daemon/calibrate/tags/tag_tables.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
@@ -13,10 +9,10 @@
 #include "drivers/error.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/tag_walks.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
-namespace previz::calibrate {
-namespace tag_lens_test {
+namespace previz::calibrate::tag_lens_test {
 
 constexpr double noise_px = 0.1;
 
@@ -114,8 +110,7 @@ TEST(TagLens, StaysWhereFewPicturesShowTags) {
   const RefinedLens refined =
       survey_tags_and_lens(walk(4, 5), boards.intrinsics, {}, prior_of(boards));
   EXPECT_FALSE(refined.is_refined);
-  EXPECT_NE(refined.why_not.find("pictures show tags; 5 are needed"), std::string::npos)
-      << refined.why_not;
+  EXPECT_THAT(refined.why_not, HasSubstr("pictures show tags; 5 are needed"));
   EXPECT_EQ(lens_vector(refined.survey.lens), lens_vector(boards.intrinsics));
   EXPECT_EQ(with_lens("# as it is\n", boards.intrinsics, refined.survey.lens), "# as it is\n");
 }
@@ -125,10 +120,10 @@ TEST(TagLens, StatisticsOfAnotherLensAreRecognised) {
   EXPECT_EQ(why_not_of(prior_of(boards), boards.intrinsics), "");
   PinholeIntrinsics other = boards.intrinsics;
   other.fy *= 1.03;
-  EXPECT_NE(why_not_of(prior_of(boards), other).find("fy"), std::string::npos);
+  EXPECT_THAT(why_not_of(prior_of(boards), other), HasSubstr("fy"));
   other = boards.intrinsics;
   other.k4 = 0.1;
-  EXPECT_NE(why_not_of(prior_of(boards), other).find("k4"), std::string::npos);
+  EXPECT_THAT(why_not_of(prior_of(boards), other), HasSubstr("k4"));
 }
 
 TEST(TagLens, IsWrittenIntoItsTableAlone) {
@@ -147,12 +142,8 @@ std::string refusal(const std::string& table) {
   PinholeIntrinsics lens = test::plain_lens(640, 480, 600);
   ObserverCalibration camera;
   camera.intrinsics = lens;
-  try {
-    set::parse_set(set::intrinsics_toml(camera) + table, "stage.toml");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of(
+      [&] { set::parse_set(set::intrinsics_toml(camera) + table, "stage.toml"); });
 }
 
 // The coefficients are correlated to more than 0.99, and 12 digits are written: the information
@@ -172,11 +163,8 @@ TEST(LensFit, ThatIsNoneIsRefused) {
   table.values.assign(8, 0.0);
   table.covariance_root.assign(45, 0.0);
   const std::string said = refusal(set::lens_fit_toml(table));
-  EXPECT_NE(said.find("observer.lens_fit.values: has 8 numbers; allowed: 9"), std::string::npos)
-      << said;
-  EXPECT_NE(said.find("observer.lens_fit.covariance_root: is not the root"), std::string::npos)
-      << said;
+  EXPECT_THAT(said, HasSubstr("observer.lens_fit.values: has 8 numbers; allowed: 9"));
+  EXPECT_THAT(said, HasSubstr("observer.lens_fit.covariance_root: is not the root"));
 }
 
-}  // namespace tag_lens_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::tag_lens_test

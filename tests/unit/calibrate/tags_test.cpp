@@ -1,16 +1,8 @@
 // The map of tags from a walk whose truth is known: corners made by the test, then pictures.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
-#include <glm/matrix.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <sstream>
 
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/tags/moved_tags.hpp"
@@ -22,11 +14,11 @@
 #include "drivers/session/files.hpp"
 #include "tests/support/tag_walks.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 #include "tests/support/units.hpp"
 
-namespace previz::calibrate {
-namespace tags_test {
+namespace previz::calibrate::tags_test {
 
 using test::degree;
 
@@ -144,9 +136,8 @@ TEST(TagSurvey, ATagBumpedByACentimetreIsFoundAndNamed) {
     expect_within_sigmas(survey, still(0), 5);
     const auto missing = missing_of_tags(survey, {}, 0);
     ASSERT_EQ(missing.size(), 1u);
-    EXPECT_NE(missing[0].find("tag " + std::to_string(id) + " again, once it is fixed in place"),
-              std::string::npos)
-        << missing[0];
+    EXPECT_THAT(missing[0],
+                HasSubstr("tag " + std::to_string(id) + " again, once it is fixed in place"));
   }
 }
 
@@ -164,24 +155,17 @@ TEST(TagSurvey, ATagThatSwingsIsLeftOut) {
 
 std::string refusal(const TagWalk& walk, const TagSurveyOptions& options,
                     const PinholeIntrinsics& lens = walk_lens()) {
-  try {
-    survey_tags(walk, lens, options);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { survey_tags(walk, lens, options); });
 }
 
 TEST(TagSurvey, AnOriginThatMovedIsRefused) {
   const TagWalk walk = walk_past([](int picture) { return bumped(picture, 0); });
   const std::string said = refusal(walk, {});
-  EXPECT_NE(said.find("tag 0, which defines the world, did not stay in place (moved by "),
-            std::string::npos)
-      << said;
-  EXPECT_NE(said.find("--origin"), std::string::npos);
+  EXPECT_THAT(said, HasSubstr("tag 0, which defines the world, did not stay in place (moved by "));
+  EXPECT_THAT(said, HasSubstr("--origin"));
   TagSurveyOptions elsewhere;
   elsewhere.origin = 99;
-  EXPECT_NE(refusal(walk, elsewhere).find("tag 99 is in no picture"), std::string::npos);
+  EXPECT_THAT(refusal(walk, elsewhere), HasSubstr("tag 99 is in no picture"));
 }
 
 TEST(TagSurvey, ATagOfAnotherSizeThanStatedIsMeasured) {
@@ -218,7 +202,7 @@ TEST(TagSurvey, AStatedDistanceGivesAllLengths) {
               0.001);
   }
   options.stated->a = 99;
-  EXPECT_NE(refusal(walk, options).find("tag 99 of --distance"), std::string::npos);
+  EXPECT_THAT(refusal(walk, options), HasSubstr("tag 99 of --distance"));
 }
 
 TEST(TagSurvey, TheSetSaysWhereTheOriginIs) {
@@ -252,18 +236,17 @@ TEST(TagSurvey, SaysWhichPicturesAreMissing) {
   const std::vector<std::string> missing = missing_of_tags(survey, {0, 31}, 0);
   std::string all;
   for (const std::string& line : missing) all += line + "\n";
-  EXPECT_NE(all.find("tag 31, together with another tag"), std::string::npos) << all;
-  EXPECT_NE(all.find("tags 7, 8 and 9 together with others: step back"), std::string::npos) << all;
-  EXPECT_NE(all.find("tag 20 in more pictures: 3 are usable"), std::string::npos) << all;
-  EXPECT_NE(all.find("tag 4 from further to the side: walk around it"), std::string::npos) << all;
+  EXPECT_THAT(all, HasSubstr("tag 31, together with another tag"));
+  EXPECT_THAT(all, HasSubstr("tags 7, 8 and 9 together with others: step back"));
+  EXPECT_THAT(all, HasSubstr("tag 20 in more pictures: 3 are usable"));
+  EXPECT_THAT(all, HasSubstr("tag 4 from further to the side: walk around it"));
 }
 
 TEST(TagSurvey, TheLensOfAnotherCameraIsSuspected) {
   PinholeIntrinsics other = walk_lens();
   other.fx *= 1.25, other.fy *= 0.8, other.k1 = 0.5;
   const std::string said = refusal(walk_past(still), {}, other);
-  EXPECT_NE(said.find("is the lens calibration the one for this camera"), std::string::npos)
-      << said;
+  EXPECT_THAT(said, HasSubstr("is the lens calibration the one for this camera"));
 }
 
 TEST(TagSizes, AreReadAsWritten) {
@@ -379,12 +362,11 @@ class TagCommand : public ::testing::Test {
 
 TEST_F(TagCommand, RefusesAWalkWithABumpUnlessForcedAndWritesTheRest) {
   const std::string refused = said();
-  EXPECT_NE(refused.find("tag 4 again, once it is fixed in place: moved by 1"), std::string::npos)
-      << refused;
-  EXPECT_NE(refused.find("0007.png and "), std::string::npos) << refused;
+  EXPECT_THAT(refused, HasSubstr("tag 4 again, once it is fixed in place: moved by 1"));
+  EXPECT_THAT(refused, HasSubstr("0007.png and "));
   options.force = options.write = true;
   const std::string done = said();
-  EXPECT_NE(done.find("stage.toml.1.old"), std::string::npos) << done;
+  EXPECT_THAT(done, HasSubstr("stage.toml.1.old"));
   const set::Set set = set::load_set(set_file());
   ASSERT_EQ(set.tracking.tags.size(), 3u) << done;
   const std::vector<set::Tag> truths = tags_at(0);
@@ -396,7 +378,7 @@ TEST_F(TagCommand, RefusesAWalkWithABumpUnlessForcedAndWritesTheRest) {
   std::ostringstream text;
   text << std::ifstream(set_file()).rdbuf();
   EXPECT_EQ(text.str().find("# The attic\n"), 0u);
-  EXPECT_NE(text.str().find("[[tag]]  # in the middle\n"), std::string::npos);
+  EXPECT_THAT(text.str(), HasSubstr("[[tag]]  # in the middle\n"));
 }
 
 // Whoever opens the set file next week sees that the map was forced; a good one takes that away.
@@ -408,11 +390,11 @@ TEST_F(TagCommand, AForcedMapSaysSoInTheSetFile) {
   const std::size_t doubt = forced.find("# UNRELIABLE: accepted with --force although");
   ASSERT_NE(doubt, std::string::npos) << forced;
   EXPECT_LT(doubt, forced.find("[[tag]]"));
-  EXPECT_NE(forced.find("# tag 4 again"), std::string::npos) << forced;
+  EXPECT_THAT(forced, HasSubstr("# tag 4 again"));
   said();
   EXPECT_EQ(text_of_set(), forced);
-  EXPECT_EQ(with_tags(forced, two_tags(), "").find("UNRELIABLE"), std::string::npos);
-  EXPECT_EQ(with_tags(forced, two_tags(), "").find("# tag 4"), std::string::npos);
+  EXPECT_THAT(with_tags(forced, two_tags(), ""), Not(HasSubstr("UNRELIABLE")));
+  EXPECT_THAT(with_tags(forced, two_tags(), ""), Not(HasSubstr("# tag 4")));
 }
 
 // Each picture links two neighbours of a row of tags: their errors add up.
@@ -430,27 +412,24 @@ TEST(TagSurvey, AChainOfPairsIsNamed) {
   survey.pictures_of_pairs = 37;
   const auto missing = missing_of_tags(survey, {}, 0);
   ASSERT_EQ(missing.size(), 1u);
-  EXPECT_NE(missing[0].find("37 of 40 pictures show two only, and a chain of pairs bends"),
-            std::string::npos);
-  EXPECT_NE(missing[0].find("tag 7, the worst, to 28 mm"), std::string::npos) << missing[0];
+  EXPECT_THAT(missing[0], HasSubstr("37 of 40 pictures show two only, and a chain of pairs bends"));
+  EXPECT_THAT(missing[0], HasSubstr("tag 7, the worst, to 28 mm"));
   survey.pictures_of_pairs = 3;
   EXPECT_EQ(missing_of_tags(survey, {}, 0).size(), 7u);
 }
 
 TEST_F(TagCommand, SaysWhatItLacks) {
   options.sizes = "";
-  EXPECT_NE(said().find("the size of tags 2, 3 and 4 is unknown: give --size"), std::string::npos)
-      << said();
+  EXPECT_THAT(said(), HasSubstr("the size of tags 2, 3 and 4 is unknown: give --size"));
   options.sizes = "80mm";
   options.set_file.reset();
-  EXPECT_NE(said().find("the film camera has no lens calibration"), std::string::npos) << said();
+  EXPECT_THAT(said(), HasSubstr("the film camera has no lens calibration"));
   options.write = true;
-  EXPECT_NE(said().find("--write needs --set"), std::string::npos);
+  EXPECT_THAT(said(), HasSubstr("--write needs --set"));
   options.write = false;
   options.set_file = set_file();
   options.distance = "1-1:2m";
-  EXPECT_NE(said().find("distance \"1-1:2m\" is not valid"), std::string::npos) << said();
+  EXPECT_THAT(said(), HasSubstr("distance \"1-1:2m\" is not valid"));
 }
 
-}  // namespace tags_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::tags_test

@@ -1,14 +1,6 @@
 // The map of tags on pictures whose tags are known: rendered sets, and photographs where they are
 // there.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/lens/source.hpp"
@@ -20,11 +12,11 @@
 #include "drivers/session/session.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/units.hpp"
 #include "tests/truth/truth_set.hpp"
 
-namespace previz::calibrate {
-namespace tags_truth_test {
+namespace previz::calibrate::tags_truth_test {
 
 namespace fs = std::filesystem;
 
@@ -178,5 +170,4 @@ TEST(RealTags, RoomByBoardsThatFilledHalfOfThePicture) {
   EXPECT_LT(refined.survey.rms_px, refined.rms_before_px);
 }
 
-}  // namespace tags_truth_test
-}  // namespace previz::calibrate
+}  // namespace previz::calibrate::tags_truth_test

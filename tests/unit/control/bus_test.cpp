@@ -2,31 +2,17 @@
 #include "daemon/control/bus.hpp"
 
 #include <grp.h>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <systemd/sd-bus.h>
 #include <systemd/sd-event.h>
 
-#include <array>
-#include <atomic>
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <iterator>
-#include <stdexcept>
-#include <string>
-#include <thread>
-#include <vector>
-
 #include "drivers/error.hpp"
 #include "tests/support/private_bus.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::control {
-namespace bus_test {
+namespace previz::control::bus_test {
 
 struct Said {
   std::string out;
@@ -117,10 +103,10 @@ TEST_F(RigOnTheBus, PrevizctlOperatesIt) {
   for (const char* line :
        {"Mode: live\n", "Recording: no\n", "Writing: yes\n", "Take: 12A_take003\n",
         "TakeFrames: 120\n", "Samples: 16\n", "Set: desk\n"})
-    EXPECT_NE(status.out.find(line), std::string::npos) << status.out;
+    EXPECT_THAT(status.out, HasSubstr(line));
   EXPECT_EQ(previzctl("mode refine").out, "refine\n");
   EXPECT_EQ(previzctl("record on").out, "recording\n");
-  EXPECT_NE(previzctl("status").out.find("Recording: yes\n"), std::string::npos);
+  EXPECT_THAT(previzctl("status").out, HasSubstr("Recording: yes\n"));
   EXPECT_EQ(previzctl("action move_left").out, "move_left\n");
   EXPECT_EQ(previzctl("set next").out, "next_set\n");
   EXPECT_EQ(previzctl("metrics").out, "{}\n");
@@ -132,7 +118,7 @@ TEST_F(RigOnTheBus, WhatIsRefusedOrUnknownIsSaidAndFails) {
   EXPECT_EQ(refused.out, "previzctl: standby\n");
   const Said unknown = previzctl("action make_coffee");
   EXPECT_EQ(unknown.status, 1);
-  EXPECT_NE(unknown.out.find("\"make_coffee\""), std::string::npos);
+  EXPECT_THAT(unknown.out, HasSubstr("\"make_coffee\""));
   EXPECT_EQ(previzctl("mode faster").status, 2);
 }
 
@@ -143,7 +129,7 @@ TEST_F(RigOnTheBus, WhatAVerbThrowsIsAnErrorInReplyAndTheRigGoesOn) {
     fallen_ = verb;
     const Said said = previzctl(call);
     EXPECT_EQ(said.status, 1) << said.out;
-    EXPECT_NE(said.out.find("lamp fell down"), std::string::npos) << said.out;
+    EXPECT_THAT(said.out, HasSubstr("lamp fell down"));
     fallen_.clear();
     EXPECT_EQ(previzctl("action move_left").out, "move_left\n");
   }
@@ -152,16 +138,12 @@ TEST_F(RigOnTheBus, WhatAVerbThrowsIsAnErrorInReplyAndTheRigGoesOn) {
 // The bus disconnects whoever sends anything else.
 TEST_F(RigOnTheBus, WhatIsNotUtf8OrNoCharacterIsSentWithoutIt) {
   status_.set = "d\xc3\xa4sk \xff\xc3";
-  EXPECT_NE(previzctl("status").out.find("Set: d\xc3\xa4sk ??\n"), std::string::npos)
-      << previzctl("status").out;
+  EXPECT_THAT(previzctl("status").out, HasSubstr("Set: d\xc3\xa4sk ??\n"));
   status_.set = "\xed\xa0\x80 \xf4\x90\x80\x80 \xc0\xaf \xf0\x9f\x8e\xac";
-  EXPECT_NE(previzctl("status").out.find("Set: ??? ???? ?? \xf0\x9f\x8e\xac\n"), std::string::npos)
-      << previzctl("status").out;
+  EXPECT_THAT(previzctl("status").out, HasSubstr("Set: ??? ???? ?? \xf0\x9f\x8e\xac\n"));
   // The last of a plane, the first of those in Arabic's block, and characters beside them.
   status_.set = "\xf0\xbf\xbf\xbf \xef\xbf\xbe \xef\xb7\x90 \xef\xbf\xbd \xef\xb7\xb0";
-  EXPECT_NE(previzctl("status").out.find("Set: ???? ??? ??? \xef\xbf\xbd \xef\xb7\xb0\n"),
-            std::string::npos)
-      << previzctl("status").out;
+  EXPECT_THAT(previzctl("status").out, HasSubstr("Set: ???? ??? ??? \xef\xbf\xbd \xef\xb7\xb0\n"));
 }
 
 // Every action of the table has its own method, and a change its signal.
@@ -334,9 +316,8 @@ TEST(RigWithoutABus, SaysSo) {
   setenv("DBUS_SYSTEM_BUS_ADDRESS", "unix:path=/nonexistent/bus", 1);
   const Said said = previzctl("status");
   EXPECT_EQ(said.status, 1);
-  EXPECT_NE(said.out.find("bus cannot be reached"), std::string::npos) << said.out;
+  EXPECT_THAT(said.out, HasSubstr("bus cannot be reached"));
   unsetenv("DBUS_SYSTEM_BUS_ADDRESS");
 }
 
-}  // namespace bus_test
-}  // namespace previz::control
+}  // namespace previz::control::bus_test

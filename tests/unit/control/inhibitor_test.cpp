@@ -1,25 +1,16 @@
 // The lock that holds off a shutdown, of a logind that the test plays on a bus of its own.
 #include "daemon/control/inhibitor.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <systemd/sd-bus.h>
 #include <systemd/sd-event.h>
 #include <unistd.h>
 
 #include <poll.h>
 
-#include <algorithm>
-#include <functional>
-#include <string>
-#include <vector>
-
 #include "tests/support/private_bus.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::control {
-namespace inhibitor_test {
-
-using testing::ElementsAre;
+namespace previz::control::inhibitor_test {
 
 // Inhibitor and logind are on one loop, in one thread.
 class InhibitorTest : public testing::Test {
@@ -134,5 +125,4 @@ TEST_F(InhibitorTest, AMachineWithoutLogindOrBusIsSaid) {
   EXPECT_TRUE(runs_until([&] { return troubles_.size() == 4; }));
 }
 
-}  // namespace inhibitor_test
-}  // namespace previz::control
+}  // namespace previz::control::inhibitor_test

@@ -1,11 +1,9 @@
 #include "drivers/bracket.hpp"
 
-#include <gtest/gtest.h>
-
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace bracket_test {
+namespace previz::bracket_test {
 
 using std::chrono::milliseconds;
 
@@ -66,5 +64,4 @@ TEST(Bracket, AnExposureThatIsRefusedIsToldOnce) {
   EXPECT_EQ(troubles, 1);
 }
 
-}  // namespace bracket_test
-}  // namespace previz
+}  // namespace previz::bracket_test

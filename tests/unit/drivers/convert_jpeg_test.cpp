@@ -1,20 +1,12 @@
 // Motion JPEG: decoded right, and refused where it is not whole.
-#include <gtest/gtest.h>
 
-#include <cstdio>
 // jpeglib.h needs what <cstdio> declares.
 #include <jpeglib.h>
 
-#include <algorithm>
-#include <array>
-#include <cstdlib>
-#include <memory>
-#include <random>
-
 #include "drivers/convert/convert.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::convert {
-namespace convert_jpeg_test {
+namespace previz::convert::convert_jpeg_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -193,5 +185,4 @@ TEST(Mjpeg, DamageDoesNoHarm) {
   }
 }
 
-}  // namespace convert_jpeg_test
-}  // namespace previz::convert
+}  // namespace previz::convert::convert_jpeg_test

@@ -1,18 +1,10 @@
 #include "drivers/convert/convert.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstring>
-#include <random>
-
 #include "daemon/lighting/response.hpp"
 #include "drivers/plate.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::convert {
-namespace convert_test {
+namespace previz::convert::convert_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -493,5 +485,4 @@ TEST(DeepSamples, KeepTheirBitsUpToTheLinearFloatPicture) {
   }
 }
 
-}  // namespace convert_test
-}  // namespace previz::convert
+}  // namespace previz::convert::convert_test

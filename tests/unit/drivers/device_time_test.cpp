@@ -1,22 +1,12 @@
 // Clocks and exposures of devices that do not keep the host's.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <functional>
-#include <limits>
-#include <random>
-#include <utility>
-#include <vector>
-
 #include "drivers/clock_map.hpp"
 #include "drivers/exposure_ledger.hpp"
 #include "drivers/frame_order.hpp"
 #include "drivers/host_clock.hpp"
 #include "drivers/other_clock.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace device_time_test {
+namespace previz::device_time_test {
 
 constexpr std::int64_t ms = 1'000'000, second = 1000 * ms;
 
@@ -383,5 +373,4 @@ TEST(FrameOrderTest, AStampThatStandsStillOrIsOfLongAgoGivesWayToTheArrival) {
   EXPECT_EQ(counters["frames without a kernel time stamp"], 1u);
 }
 
-}  // namespace device_time_test
-}  // namespace previz
+}  // namespace previz::device_time_test

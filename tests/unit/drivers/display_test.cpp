@@ -1,19 +1,15 @@
 // What a display shows, read back: where the picture goes, its colours, overlays; and its life.
 #include "drivers/display.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "drivers/display_drivers.hpp"
 #include "drivers/display_lifeline.hpp"
 #include "drivers/error.hpp"
 #include "drivers/gles/placement.hpp"
 #include "drivers/headless/headless_display.hpp"
 #include "drivers/plate.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace display_test {
+namespace previz::display_test {
 
 using gles::place;
 using gles::Rectangle;
@@ -180,7 +176,7 @@ TEST(DisplayDrivers, NamesWhatThisBuildHas) {
     display_driver("projector");
     FAIL();
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("headless"), std::string::npos) << error.what();
+    EXPECT_THAT(error.what(), HasSubstr("headless"));
   }
 }
 
@@ -254,5 +250,4 @@ TEST(DisplayLifeline, OpensWaitsBacksOffAndOpensAgain) {
   EXPECT_EQ(cable.opened, 2);
 }
 
-}  // namespace display_test
-}  // namespace previz
+}  // namespace previz::display_test

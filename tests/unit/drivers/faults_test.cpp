@@ -1,15 +1,11 @@
 #include "drivers/faults.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace faults_test {
+namespace previz::faults_test {
 
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
@@ -159,5 +155,4 @@ TEST(FaultPlan, MistakesAreQuoted) {
   }
 }
 
-}  // namespace faults_test
-}  // namespace previz
+}  // namespace previz::faults_test

@@ -1,15 +1,10 @@
-#include <gtest/gtest.h>
-#include <cmath>
-
-#include <array>
-#include <stdexcept>
 
 #include "drivers/error.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace frame_conversion_test {
+namespace previz::frame_conversion_test {
 
 Frame frame_of(PixelFormat format, int width, int height, std::vector<std::uint8_t> bytes) {
   Frame frame;
@@ -118,5 +113,4 @@ TEST(Frame, WrongLengthIsRefused) {
   EXPECT_THROW(to_plate(frame_of(PixelFormat::rgb8, 2, 2, {1, 2, 3})), Error);
 }
 
-}  // namespace frame_conversion_test
-}  // namespace previz
+}  // namespace previz::frame_conversion_test

@@ -1,12 +1,9 @@
 // The rates of cameras, and what is said of one that a camera does not have.
 #include "drivers/frame_rate.hpp"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-#include <limits>
-
-namespace previz {
-namespace frame_rate_test {
+namespace previz::frame_rate_test {
 
 constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double no_number = std::numeric_limits<double>::quiet_NaN();
@@ -60,5 +57,4 @@ TEST(FrameRate, BoundsThatAreImpossibleAreUnknown) {
   }
 }
 
-}  // namespace frame_rate_test
-}  // namespace previz
+}  // namespace previz::frame_rate_test

@@ -1,16 +1,12 @@
 // A device that comes and goes, in a time that passes only when somebody sleeps.
 #include "drivers/lifeline.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace lifeline_test {
+namespace previz::lifeline_test {
 
 using std::chrono::milliseconds;
 using Kind = Fault::Kind;
@@ -313,5 +309,4 @@ TEST_F(LifelineTest, WhatADeviceDoesOtherwiseIsPassedOnAtEveryOpening) {
   EXPECT_EQ(lifeline.counters().at("lost"), 2u);
 }
 
-}  // namespace lifeline_test
-}  // namespace previz
+}  // namespace previz::lifeline_test

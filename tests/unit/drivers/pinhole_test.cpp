@@ -1,19 +1,11 @@
 // The film camera's lens in numbers, against OpenCV's and against what is known in closed form.
 #include "drivers/calibration/pinhole.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <limits>
 #include <opencv2/calib3d.hpp>
-#include <optional>
-#include <ostream>
-#include <string>
-#include <vector>
 
-namespace previz {
-namespace pinhole_test {
+#include "tests/support/test.hpp"
+
+namespace previz::pinhole_test {
 
 // Focal lengths are about 600 px, and the picture's corners are 0.8 off the axis or less.
 PinholeIntrinsics plain_lens() {
@@ -188,5 +180,4 @@ TEST(PinholeFold, IsNotPassedByHostileNumbers) {
     EXPECT_FALSE(undistort(plain_lens(), {value, 0}));
 }
 
-}  // namespace pinhole_test
-}  // namespace previz
+}  // namespace previz::pinhole_test

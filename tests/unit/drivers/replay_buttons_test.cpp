@@ -1,13 +1,12 @@
 #include "drivers/replay/replay_buttons.hpp"
 
-#include <gtest/gtest.h>
 #include <poll.h>
 
 #include "drivers/error.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace replay_buttons_test {
+namespace previz::replay_buttons_test {
 
 using std::chrono::hours;
 
@@ -107,5 +106,4 @@ TEST(ReplayButtons, WrongSpeedsAreErrors) {
   EXPECT_THROW(replay_buttons({}, "take", due_at({}, -1)), Error);
 }
 
-}  // namespace replay_buttons_test
-}  // namespace previz
+}  // namespace previz::replay_buttons_test

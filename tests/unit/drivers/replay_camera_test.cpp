@@ -1,14 +1,10 @@
-#include <gtest/gtest.h>
 
-#include <algorithm>
-#include <limits>
-
-#include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
+#include "drivers/error.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace replay_camera_test {
+namespace previz::replay_camera_test {
 
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
@@ -264,5 +260,4 @@ TEST_F(Replay, WrongOptionsAreErrors) {
   EXPECT_THROW(open_replay(directory_.path() / "nowhere", "observer"), Error);
 }
 
-}  // namespace replay_camera_test
-}  // namespace previz
+}  // namespace previz::replay_camera_test

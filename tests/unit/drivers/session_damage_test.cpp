@@ -1,4 +1,3 @@
-#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -7,16 +6,12 @@ extern "C" {
 #include <libavformat/avformat.h>
 }
 
-#include <algorithm>
-#include <chrono>
-#include <random>
-
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::session {
-namespace session_damage_test {
+namespace previz::session::session_damage_test {
 
 constexpr int frame_count = 6;
 
@@ -452,5 +447,4 @@ TEST_F(Damage, TrackLinesCutAnywhere) {
   }
 }
 
-}  // namespace session_damage_test
-}  // namespace previz::session
+}  // namespace previz::session::session_damage_test

@@ -2,20 +2,16 @@
 #include "drivers/session/draft.hpp"
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <fstream>
-#include <string>
-
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::session {
-namespace session_draft_test {
+namespace previz::session::session_draft_test {
 
 namespace fs = std::filesystem;
 
@@ -125,12 +121,7 @@ TEST(DraftFolder, GetsItsNameWhereNothingIs) {
 }
 
 std::string refusal(const fs::path& file) {
-  try {
-    read_plain_file(file);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { read_plain_file(file); });
 }
 
 TEST(PlainFile, IsNoLinkPipeDeviceOrFolder) {
@@ -142,13 +133,13 @@ TEST(PlainFile, IsNoLinkPipeDeviceOrFolder) {
   fs::create_symlink("nothing", directory / "dangling");
   fs::create_directory(directory / "folder");
   ASSERT_EQ(::mkfifo((directory / "pipe").c_str(), 0600), 0);
-  EXPECT_NE(refusal(directory / "link").find("is a link (to a)"), std::string::npos);
-  EXPECT_NE(refusal(directory / "device").find("is a link (to /dev/zero)"), std::string::npos);
-  EXPECT_NE(refusal(directory / "dangling").find("is a link"), std::string::npos);
-  EXPECT_NE(refusal(directory / "folder").find("is a folder"), std::string::npos);
-  EXPECT_NE(refusal(directory / "pipe").find("is a pipe"), std::string::npos);
-  EXPECT_NE(refusal("/dev/null").find("is a device"), std::string::npos);
-  EXPECT_NE(refusal(directory / "missing").find("cannot be opened"), std::string::npos);
+  EXPECT_THAT(refusal(directory / "link"), HasSubstr("is a link (to a)"));
+  EXPECT_THAT(refusal(directory / "device"), HasSubstr("is a link (to /dev/zero)"));
+  EXPECT_THAT(refusal(directory / "dangling"), HasSubstr("is a link"));
+  EXPECT_THAT(refusal(directory / "folder"), HasSubstr("is a folder"));
+  EXPECT_THAT(refusal(directory / "pipe"), HasSubstr("is a pipe"));
+  EXPECT_THAT(refusal("/dev/null"), HasSubstr("is a device"));
+  EXPECT_THAT(refusal(directory / "missing"), HasSubstr("cannot be opened"));
 }
 
 // What a daemon does with the takes of the process before must not hit one that is being written.
@@ -168,5 +159,4 @@ TEST(Salvage, LeavesASessionAloneThatIsBeingWritten) {
   EXPECT_FALSE(salvage(directory / "empty"));
 }
 
-}  // namespace session_draft_test
-}  // namespace previz::session
+}  // namespace previz::session::session_draft_test

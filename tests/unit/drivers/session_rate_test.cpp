@@ -1,15 +1,10 @@
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <random>
 
 #include "drivers/session/nominal_rate.hpp"
 #include "drivers/session/session_toml.hpp"
 #include "drivers/session/timecode.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::session {
-namespace session_rate_test {
+namespace previz::session::session_rate_test {
 
 // Times of `count` frames at a rate, rounded as containers do.
 std::vector<std::int64_t> times_at(double fps, int count, std::int64_t resolution_ns = 1) {
@@ -160,5 +155,4 @@ TEST(Timecode, OfAClipIsInTheSession) {
   EXPECT_EQ(timecode_of(recorded), (Timecode{"14:03:27:12", 24}));
 }
 
-}  // namespace session_rate_test
-}  // namespace previz::session
+}  // namespace previz::session::session_rate_test

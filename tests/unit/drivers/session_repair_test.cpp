@@ -1,15 +1,11 @@
 // A damaged session is written anew as far as it is whole, and stays as it is itself.
 #include "drivers/session/repair.hpp"
 
-#include <gtest/gtest.h>
-
-#include <map>
-
 #include "drivers/error.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::session {
-namespace session_repair_test {
+namespace previz::session::session_repair_test {
 
 namespace fs = std::filesystem;
 
@@ -122,7 +118,7 @@ TEST_F(Repair, OfATornHeadIsAWholeSession) {
   EXPECT_EQ(content_of(repaired_ / session.info.assets.at("model.glb")), "a model");
   const std::string events = content_of(repaired_ / "events.jsonl");
   EXPECT_TRUE(events.starts_with(content_of(take_ / "events.jsonl")));
-  EXPECT_NE(events.find("repaired from take, which was damaged: observer.mkv"), std::string::npos);
+  EXPECT_THAT(events, HasSubstr("repaired from take, which was damaged: observer.mkv"));
 }
 
 TEST_F(Repair, NamesAnAssetThatWasChanged) {
@@ -139,7 +135,7 @@ TEST_F(Repair, LeavesOutAnEventThatIsTorn) {
   const session::Repair repair = repair_session(take_, repaired_);
   EXPECT_FALSE(repair.is_complete);
   EXPECT_TRUE(mentions(repair.lacked, "events.jsonl: line 7 unreadable"));
-  EXPECT_EQ(content_of(repaired_ / "events.jsonl").find("{\"timest\n"), std::string::npos);
+  EXPECT_THAT(content_of(repaired_ / "events.jsonl"), Not(HasSubstr("{\"timest\n")));
 }
 
 TEST_F(Repair, RefusesAPlaceThatIsTaken) {
@@ -165,5 +161,4 @@ TEST_F(Repair, LeavesNothingIfItIsStoppedOrFindsNoFrame) {
   EXPECT_EQ(names(), before);
 }
 
-}  // namespace session_repair_test
-}  // namespace previz::session
+}  // namespace previz::session::session_repair_test

@@ -1,19 +1,12 @@
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <limits>
-#include <span>
-#include <tuple>
 
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/crc32.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::session {
-namespace session_round_trip_test {
+namespace previz::session::session_round_trip_test {
 
 struct Picture {
   PixelFormat format;
@@ -80,8 +73,7 @@ TEST(Session, OnlyATakeWithRawVideoNeedsANewerPrevizd) {
     writer.close();
     const std::string text = content_of(directory / "session.toml");
     const bool is_raw = codec == VideoCodec::raw;
-    EXPECT_NE(text.find(is_raw ? "format_version = 2\n" : "format_version = 1\n"),
-              std::string::npos);
+    EXPECT_THAT(text, HasSubstr(is_raw ? "format_version = 2\n" : "format_version = 1\n"));
     EXPECT_EQ(text.find("codec = \"raw\"") != std::string::npos, is_raw);
     EXPECT_EQ(text.find("codec"), text.rfind("codec"));  // not the composite's
     Session session = open_session(directory.path());
@@ -330,5 +322,4 @@ TEST(Session, TheSameFramesMakeTheSameFiles) {
     EXPECT_EQ(content_of(directory.path() / "a" / file), content_of(directory.path() / "b" / file));
 }
 
-}  // namespace session_round_trip_test
-}  // namespace previz::session
+}  // namespace previz::session::session_round_trip_test

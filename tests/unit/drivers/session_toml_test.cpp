@@ -1,28 +1,17 @@
-#include <gtest/gtest.h>
 
-#include <bit>
-#include <cmath>
-#include <limits>
-#include <random>
-
+#include "drivers/session/session_toml.hpp"
 #include "drivers/calibration/pose.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/session_toml.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::session {
-namespace session_toml_test {
+namespace previz::session::session_toml_test {
 
 SessionFile through_toml(const SessionFile& file) {
   return parse_session_toml(to_toml(file), "session.toml");
 }
 
 std::string error_of(const std::string& text) {
-  try {
-    parse_session_toml(text, "take/session.toml");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { parse_session_toml(text, "take/session.toml"); });
 }
 
 class AnyText : public testing::TestWithParam<std::string> {};
@@ -69,7 +58,7 @@ TEST(SessionToml, RandomBytesComeBackAsTheSet) {
 TEST(SessionToml, AnOrdinarySetStaysReadable) {
   SessionFile file;
   file.info.set_text = "[observer]\ndriver = \"replay\"\n";
-  EXPECT_NE(to_toml(file).find("'''\n[observer]\ndriver = \"replay\"\n'''"), std::string::npos);
+  EXPECT_THAT(to_toml(file), HasSubstr("'''\n[observer]\ndriver = \"replay\"\n'''"));
 }
 
 TEST(SessionToml, EveryNumberComesBackBitForBit) {
@@ -158,32 +147,28 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
     return error_of(text);
   };
   for (const char* number : {"1.0", "1.2e41", "nan"})
-    EXPECT_NE(with("format_version = 1", std::string("format_version = ") + number)
-                  .find("session.toml:2: format_version must be"),
-              std::string::npos)
+    EXPECT_THAT(with("format_version = 1", std::string("format_version = ") + number),
+                HasSubstr("session.toml:2: format_version must be"))
         << number;
-  EXPECT_NE(with("format_version = 1", "format_version = 3").find("session.toml:2: format_version"),
-            std::string::npos);
-  EXPECT_NE(with("format = \"rgb8\"", "format = \"nv12\"").find("observer.video.format"),
-            std::string::npos);
-  EXPECT_NE(with("fx = 5.0", "fx = \"wide\"").find("observer.calibration.fx: \"wide\" is not"),
-            std::string::npos);
-  EXPECT_NE(with("fx = 5.0\n", "").find("observer.calibration.fx: is missing"), std::string::npos);
-  EXPECT_NE(with("width = 640", "width = -640").find("observer.video.width"), std::string::npos);
-  EXPECT_NE(with("kind = \"srgb\"", "kind = \"log\"").find("observer.calibration.response.kind"),
-            std::string::npos);
-  EXPECT_NE(with("vignetting = [0.0, 0.0, 0.0]", "vignetting = [-0.5, 0.0, 0.0]")
-                .find("light.calibration.vignetting: passes no"),
-            std::string::npos);
-  EXPECT_NE(with("dark_level = [0.0, 0.0, 0.0]", "dark_level = [0.0, 0.6, 0.0]")
-                .find("light.calibration.dark_level: 0.6 is not"),
-            std::string::npos);
+  EXPECT_THAT(with("format_version = 1", "format_version = 3"),
+              HasSubstr("session.toml:2: format_version"));
+  EXPECT_THAT(with("format = \"rgb8\"", "format = \"nv12\""), HasSubstr("observer.video.format"));
+  EXPECT_THAT(with("fx = 5.0", "fx = \"wide\""),
+              HasSubstr("observer.calibration.fx: \"wide\" is not"));
+  EXPECT_THAT(with("fx = 5.0\n", ""), HasSubstr("observer.calibration.fx: is missing"));
+  EXPECT_THAT(with("width = 640", "width = -640"), HasSubstr("observer.video.width"));
+  EXPECT_THAT(with("kind = \"srgb\"", "kind = \"log\""),
+              HasSubstr("observer.calibration.response.kind"));
+  EXPECT_THAT(with("vignetting = [0.0, 0.0, 0.0]", "vignetting = [-0.5, 0.0, 0.0]"),
+              HasSubstr("light.calibration.vignetting: passes no"));
+  EXPECT_THAT(with("dark_level = [0.0, 0.0, 0.0]", "dark_level = [0.0, 0.6, 0.0]"),
+              HasSubstr("light.calibration.dark_level: 0.6 is not"));
   // Sessions of before these were known.
   EXPECT_EQ(with("vignetting = [0.0, 0.0, 0.0]\n", ""), "");
   EXPECT_EQ(with("dark_level = [0.0, 0.0, 0.0]\n", ""), "");
-  EXPECT_NE(with("[set]", "[[set]]").find("set must be a table"), std::string::npos);
-  EXPECT_NE(error_of("garbage").find("take/session.toml:1:"), std::string::npos);
-  EXPECT_NE(error_of("").find("format_version is missing"), std::string::npos);
+  EXPECT_THAT(with("[set]", "[[set]]"), HasSubstr("set must be a table"));
+  EXPECT_THAT(error_of("garbage"), HasSubstr("take/session.toml:1:"));
+  EXPECT_THAT(error_of(""), HasSubstr("format_version is missing"));
   for (std::size_t length = 0; length + 1 < good.size(); ++length)  // never anything but an Error
     static_cast<void>(error_of(good.substr(0, length)));
 }
@@ -206,7 +191,7 @@ TEST(SessionToml, CalibrationsAreWrittenAsEver) {
   light.world_from_camera = glm::dmat4(0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0.5, 0, 1.6, 1);
   file.info.light = light;
   const std::string text = to_toml(file);
-  EXPECT_NE(text.find(R"(
+  EXPECT_THAT(text, HasSubstr(R"(
 [observer.calibration]  # pixels; Brown-Conrady in OpenCV's order
 width = 64
 height = 48
@@ -250,9 +235,7 @@ kind = "table"
 inverse_table = [0.0, 0.25, 1.0]
 clip_share = 0.93
 
-[assets])"),
-            std::string::npos)
-      << text;
+[assets])"));
 }
 
 TEST(SessionToml, RationalTermsAreWrittenIfOneIsNotZero) {
@@ -260,11 +243,9 @@ TEST(SessionToml, RationalTermsAreWrittenIfOneIsNotZero) {
   ObserverCalibration observer;
   observer.intrinsics = {64, 48, 60, 60, 31.5, 23, -0.1, 0.03, 1e-3, 0, 0};
   file.info.observer = observer;
-  EXPECT_EQ(to_toml(file).find("k4"), std::string::npos);
+  EXPECT_THAT(to_toml(file), Not(HasSubstr("k4")));
   file.info.observer->intrinsics.k5 = 0.25;
-  EXPECT_NE(to_toml(file).find("k3 = 0.0\nk4 = 0.0\nk5 = 0.25\nk6 = 0.0\nresponsivity"),
-            std::string::npos)
-      << to_toml(file);
+  EXPECT_THAT(to_toml(file), HasSubstr("k3 = 0.0\nk4 = 0.0\nk5 = 0.25\nk6 = 0.0\nresponsivity"));
 }
 
 TEST(SessionToml, WhatIsMissingComesBack) {
@@ -288,5 +269,4 @@ TEST(SessionToml, NamesMustBeText) {
   EXPECT_THROW(to_toml(file), Error);
 }
 
-}  // namespace session_toml_test
-}  // namespace previz::session
+}  // namespace previz::session::session_toml_test

@@ -1,14 +1,6 @@
 // A calibration in each of its three formats: the same numbers give the same camera, and the same
 // mistake gives the same words, at the place where it is.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <numbers>
-#include <string>
 
 #include "daemon/exchange/import_description.hpp"
 #include "daemon/set/load.hpp"
@@ -18,9 +10,9 @@
 #include "drivers/error.hpp"
 #include "drivers/session/session_toml.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace import_calibration_test {
+namespace previz::import_calibration_test {
 
 const char* const set_text = R"([observer.intrinsics]
 width = 64
@@ -96,12 +88,7 @@ exchange::ImportDescription describe(const std::string& json) {
 
 template <typename Read>
 std::string message_of(const Read& read) {
-  try {
-    read();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { read(); });
 }
 
 // `text` with another value for a key of a TOML table, a further key, or (value "") without it; and
@@ -349,10 +336,10 @@ TEST(Calibration, AFoldingFisheyeIsRefusedWhereItIsWrittenAndUsedWhereItIsRecord
       "k: the lens model folds back at 73.9 degrees off axis; allowed: a growing radius up to "
       "max_angle_deg";
   const std::string set = edited(set_text, key, "k", k).first;
-  EXPECT_NE(message_of([&] { set::parse_set(set, "stage.toml"); }).find(words), std::string::npos);
+  EXPECT_THAT(message_of([&] { set::parse_set(set, "stage.toml"); }), HasSubstr(words));
   nlohmann::json json = nlohmann::json::parse(frames_text);
   json["light"]["intrinsics"]["k"] = nlohmann::json::parse(k);
-  EXPECT_NE(message_of([&] { describe(json.dump()); }).find(words), std::string::npos);
+  EXPECT_THAT(message_of([&] { describe(json.dump()); }), HasSubstr(words));
 
   const std::string session = edited(session_text(), "light.calibration", "k", k).first;
   const auto light = session::parse_session_toml(session, "session.toml").info.light;
@@ -372,5 +359,4 @@ TEST(Calibration, SessionsOfBeforeTheLensAndTheSensorWereMeasuredOpen) {
   EXPECT_EQ(light->dark_level, glm::dvec3(0));
 }
 
-}  // namespace import_calibration_test
-}  // namespace previz
+}  // namespace previz::import_calibration_test

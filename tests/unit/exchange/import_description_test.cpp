@@ -1,14 +1,11 @@
-#include <gtest/gtest.h>
-
-#include <numbers>
 #include <opencv2/core.hpp>
 
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::exchange {
-namespace import_description_test {
+namespace previz::exchange::import_description_test {
 
 using namespace std::string_literals;
 
@@ -62,9 +59,9 @@ TEST(ImportDescription, ASetThatIsWrongIsTheSetsError) {
   Shoot shoot;
   write_set(shoot, "[set]\nnmae = \"x\"\n");
   shoot.json["set"] = "desk.toml";
-  EXPECT_NE(shoot.error().find("desk.toml:2"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("desk.toml:2"));
   shoot.json["set"] = "absent.toml";
-  EXPECT_NE(shoot.error().find("absent.toml"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("absent.toml"));
 }
 
 TEST(ImportDescription, AGltfThatNeedsOtherFilesIsAnError) {
@@ -74,10 +71,10 @@ TEST(ImportDescription, AGltfThatNeedsOtherFilesIsAnError) {
   session::write_content(
       shoot.folder() / "models" / "table.glb",
       glb(R"({"images":[{"uri":"data:image/png;base64,"},{"uri":"wood.png"}]})"));
-  EXPECT_NE(shoot.error().find("table.glb: needs wood.png beside it"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("table.glb: needs wood.png beside it"));
   session::write_content(shoot.folder() / "models" / "table.glb",
                          "glTF\2\0\0\0\1\0\0\0\xff\xff\xff\xffJSON"s);
-  EXPECT_NE(shoot.error().find("table.glb: its glTF header is damaged"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("table.glb: its glTF header is damaged"));
 }
 
 TEST(ImportDescription, PosesBecomeTheTrack) {
@@ -177,7 +174,7 @@ TEST_P(Mistakes, AreToldWithTheirPathBeforeAnythingIsWritten) {
   else
     shoot.json[at.parent_pointer()].erase(at.back());
   const std::string error = shoot.error();
-  EXPECT_NE(error.find(message), std::string::npos) << error;
+  EXPECT_THAT(error, HasSubstr(message));
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -256,9 +253,9 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(ImportDescription, PicturesOfDifferentSizesAreAnError) {
   Shoot shoot;
   write_picture(shoot.folder() / "observer" / "0002.png", noise_picture(1, CV_8UC3, 32, 25));
-  EXPECT_NE(shoot.error().find("0002.png: is rgb8 32x25; all pictures of observer must be rgb8 "
-                               "32x24 like the first"),
-            std::string::npos);
+  EXPECT_THAT(shoot.error(),
+              HasSubstr("0002.png: is rgb8 32x25; all pictures of observer must be rgb8 "
+                        "32x24 like the first"));
 }
 
 // How many frames a video has is not known while FRAMES.json is read.
@@ -268,14 +265,10 @@ TEST(ImportDescription, ListsOfAVideoMustBeForAsManyFrames) {
               std::vector(4, std::vector<std::uint8_t>(32 * 16, 7)), 32, 16, 50, false);
   shoot.json["observer"] = {
       {"video", "take.mkv"}, {"exposure_s", {0.01, 0.01, 0.02, 0.02}}, {"gain", {1, 2}}};
-  EXPECT_NE(shoot.error().find("observer.gain has 2 entries; there are 4 frames"),
-            std::string::npos)
-      << shoot.error();
+  EXPECT_THAT(shoot.error(), HasSubstr("observer.gain has 2 entries; there are 4 frames"));
   shoot.json["observer"] = {
       {"video", "take.mkv"}, {"exposure", {1, 1, 2, 2}}, {"exposure_s", {0.01, 0.01, 0.02}}};
-  EXPECT_NE(shoot.error().find("observer.exposure_s has 3 entries; there are 4 frames"),
-            std::string::npos)
-      << shoot.error();
+  EXPECT_THAT(shoot.error(), HasSubstr("observer.exposure_s has 3 entries; there are 4 frames"));
   shoot.json["observer"]["exposure_s"].push_back(0.02);
   shoot.json["observer"]["gain"] = {1, 1, 2, 2};
   EXPECT_EQ(shoot.error(), "");
@@ -288,8 +281,7 @@ TEST(ImportDescription, ExposuresThatNoNumberHoldsAreRefused) {
     shoot.json["observer"].erase("exposure");
     shoot.json["observer"]["exposure_s"] = factor;
     shoot.json["observer"]["gain"] = {1, factor, 1};
-    EXPECT_NE(shoot.error().find("observer.exposure_s: frame 1: "), std::string::npos)
-        << shoot.error();
+    EXPECT_THAT(shoot.error(), HasSubstr("observer.exposure_s: frame 1: "));
   }
 }
 
@@ -301,16 +293,14 @@ TEST(ImportDescription, TablesNameFileAndLine) {
     session::write_content(shoot.folder() / "t.csv", table);
     return shoot.error();
   };
-  EXPECT_NE(error_with("").find("t.csv: has no rows"), std::string::npos);
-  EXPECT_NE(error_with("timestamp_ns,kind\n1\n").find("t.csv:2: has 1 cells"), std::string::npos);
-  EXPECT_NE(error_with("timestamp_ns\n\"1\"\n").find("t.csv:2: quotes"), std::string::npos);
-  EXPECT_NE(error_with("timestamp_ns\n1\n2\n3.5\n").find("column timestamp_ns, row 3: \"3.5\""),
-            std::string::npos);
-  EXPECT_NE(error_with("timestamp_ns,exposure\n1,1\n2,2\n3,3\n")
-                .find("observer.exposure is also a column of"),
-            std::string::npos);
-  EXPECT_NE(error_with("timestamp_ns\n1\n2\n").find("has 2 entries; there are 3 pictures"),
-            std::string::npos);
+  EXPECT_THAT(error_with(""), HasSubstr("t.csv: has no rows"));
+  EXPECT_THAT(error_with("timestamp_ns,kind\n1\n"), HasSubstr("t.csv:2: has 1 cells"));
+  EXPECT_THAT(error_with("timestamp_ns\n\"1\"\n"), HasSubstr("t.csv:2: quotes"));
+  EXPECT_THAT(error_with("timestamp_ns\n1\n2\n3.5\n"),
+              HasSubstr("column timestamp_ns, row 3: \"3.5\""));
+  EXPECT_THAT(error_with("timestamp_ns,exposure\n1,1\n2,2\n3,3\n"),
+              HasSubstr("observer.exposure is also a column of"));
+  EXPECT_THAT(error_with("timestamp_ns\n1\n2\n"), HasSubstr("has 2 entries; there are 3 pictures"));
   EXPECT_EQ(error_with("\xef\xbb\xbftimestamp_ns,note\r\n1,\r\n2,b\r\n\r\n3,c"), "");
 }
 
@@ -333,7 +323,7 @@ TEST(ImportDescription, ANameThatIsTooLongIsAMissingFile) {
     import_session({folder.path() / "F.json", folder.path() / "take"});
     ADD_FAILURE() << "not refused";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("observer.video"), std::string::npos) << error.what();
+    EXPECT_THAT(error.what(), HasSubstr("observer.video"));
   }
 }
 
@@ -341,25 +331,21 @@ TEST(ImportDescription, WhatIsNotJsonIsAnError) {
   const test::TemporaryDirectory folder;
   const auto error_of = [&](const std::string& text) -> std::string {
     session::write_content(folder.path() / "F.json", text);
-    try {
+    return test::error_of([&] {
       import_session({folder.path() / "F.json", folder.path() / "take"});
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    });
   };
-  EXPECT_NE(error_of("{\n\"name\": }").find("F.json: is not JSON: "), std::string::npos);
-  EXPECT_NE(error_of("{\n\"name\": }").find("line 2"), std::string::npos);
-  EXPECT_NE(error_of("[]").find("F.json: the document must be an object"), std::string::npos);
-  EXPECT_NE(error_of("").find("F.json: is not JSON"), std::string::npos);
-  EXPECT_EQ(error_of("{\n\"name\": }").find("A video or a picture"), std::string::npos);
-  EXPECT_NE(error_of(std::string("\0\0\0\x20"
-                                 "ftypisom",
-                                 12))
-                .find("A video or a picture is named in a JSON file; config/frames.example.json"),
-            std::string::npos);
+  EXPECT_THAT(error_of("{\n\"name\": }"), HasSubstr("F.json: is not JSON: "));
+  EXPECT_THAT(error_of("{\n\"name\": }"), HasSubstr("line 2"));
+  EXPECT_THAT(error_of("[]"), HasSubstr("F.json: the document must be an object"));
+  EXPECT_THAT(error_of(""), HasSubstr("F.json: is not JSON"));
+  EXPECT_THAT(error_of("{\n\"name\": }"), Not(HasSubstr("A video or a picture")));
+  EXPECT_THAT(
+      error_of(std::string("\0\0\0\x20"
+                           "ftypisom",
+                           12)),
+      HasSubstr("A video or a picture is named in a JSON file; config/frames.example.json"));
   EXPECT_THROW(import_session({folder.path() / "absent.json", folder.path() / "take"}), Error);
 }
 
-}  // namespace import_description_test
-}  // namespace previz::exchange
+}  // namespace previz::exchange::import_description_test

@@ -1,9 +1,3 @@
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <numeric>
-#include <random>
 
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/picture_header.hpp"
@@ -11,9 +5,9 @@
 #include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::exchange {
-namespace import_footage_test {
+namespace previz::exchange::import_footage_test {
 
 std::unique_ptr<session::StreamReader> open(const Shoot& shoot, const std::string& source) {
   session::Session opened = session::open_session(shoot.session());
@@ -93,7 +87,7 @@ TEST(Import, ATableOfTimesAndExposuresInAnyOrder) {
                          "b1.png,1700000000304751644,8.54492187e-05,bracket\r\n"
                          "b2.png,1700000000344751644,0.0013671875,bracket\r\n");
   shoot.json["light"] = {{"csv", "light/light.csv"}};
-  EXPECT_NE(shoot.error().find("light.timestamps_ns must increase; entry 2"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("light.timestamps_ns must increase; entry 2"));
   shoot.json["light"]["sort_by_time"] = true;
   EXPECT_EQ(shoot.import().light_frames, 3u);
   const auto stream = open(shoot, "light");
@@ -145,7 +139,7 @@ TEST(Import, WildcardsSortByNumber) {
   }
   shoot.json["observer"]["pictures"] = "shots/img%d.png";
   std::filesystem::remove_all(shoot.session());
-  EXPECT_NE(shoot.error().find("number 3 is missing"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("number 3 is missing"));
 }
 
 // "%03d" takes three digits or more, "%d" any without padding; what only looks alike is left alone.
@@ -176,7 +170,7 @@ TEST(Import, AVideoOfBt709KeepsItsSamples) {
       {"video", "take.mkv"}, {"timestamps_ns", "container"}, {"start_ns", 1000}, {"exposure", 1}};
   const ImportReport report = shoot.import();
   ASSERT_EQ(report.notes.size(), 2u);
-  EXPECT_NE(report.notes[0].find("kept as it is"), std::string::npos) << report.notes[0];
+  EXPECT_THAT(report.notes[0], HasSubstr("kept as it is"));
   const auto stream = open(shoot, "observer");
   ASSERT_EQ(stream->records().size(), 4u);
   for (int i = 0; i < 4; ++i) {
@@ -205,7 +199,7 @@ TEST(Import, TimesThatNoSessionCanHoldAreRefused) {
     shoot.json["observer"]["fps"] = fps;
     shoot.json["observer"]["start_ns"] = start_ns;
     const std::string error = shoot.error();
-    EXPECT_NE(error.find("0001.png: its time does not fit"), std::string::npos) << fps << error;
+    EXPECT_THAT(error, HasSubstr("0001.png: its time does not fit")) << fps;
   }
   Shoot slow;
   slow.json["observer"]["fps"] = 2.2e-10;  // frame 2 at 9.09e18
@@ -247,7 +241,7 @@ TEST(Import, AnyOtherVideoBecomesRgb) {
     write_video(shoot.folder() / "take.mkv", "yuv420p", {frame}, 64, 48, 25, matrix.bt709);
     shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
     const ImportReport report = shoot.import();
-    EXPECT_NE(report.notes.at(0).find("converted to rgb8"), std::string::npos);
+    EXPECT_THAT(report.notes.at(0), HasSubstr("converted to rgb8"));
     EXPECT_EQ(report.notes.at(0).find("matrix smpte170m (assumed)") == std::string::npos,
               matrix.bt709);
     const FramePtr rgb = open(shoot, "observer")->read(0);
@@ -282,9 +276,9 @@ TEST(Import, AVideoWithMoreOrFewerFramesThanTimes) {
   write_video(shoot.folder() / "take.mkv", "gray", {noise_bytes(512, 1), noise_bytes(512, 2)}, 32,
               16, 25, false);
   shoot.json["observer"] = {{"video", "take.mkv"}, {"timestamps_ns", {1}}, {"exposure", 1}};
-  EXPECT_NE(shoot.error().find("frame 1: exceeds the 1 frames"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("frame 1: exceeds the 1 frames"));
   shoot.json["observer"]["timestamps_ns"] = {1, 2, 3};
-  EXPECT_NE(shoot.error().find("observer has 2 frames; 3 are described"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("observer has 2 frames; 3 are described"));
   shoot.json["observer"]["timestamps_ns"] = {1, 2};
   EXPECT_EQ(shoot.error(), "");
 }
@@ -292,10 +286,10 @@ TEST(Import, AVideoWithMoreOrFewerFramesThanTimes) {
 TEST(Import, DamagedFootageIsAnError) {
   Shoot shoot;
   session::write_content(shoot.folder() / "observer" / "0001.png", "no PNG");
-  EXPECT_NE(shoot.error().find("0001.png: cannot be read as a picture"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("0001.png: cannot be read as a picture"));
   session::write_content(shoot.folder() / "a.mp4", "no video");
   shoot.json["observer"] = {{"video", "a.mp4"}, {"fps", 25}, {"exposure", 1}};
-  EXPECT_NE(shoot.error().find("a.mp4: cannot be read as a video"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("a.mp4: cannot be read as a video"));
 }
 
 // Formats that are not on the list are refused by what a file is, whatever it is called; a play
@@ -305,7 +299,7 @@ TEST(Import, FootageOfOtherFormatsIsRefused) {
   write_picture(shoot.folder() / "a.bmp", noise_picture(1, CV_8UC3, 16, 16));
   std::filesystem::rename(shoot.folder() / "a.bmp", shoot.folder() / "a.png");
   shoot.json["observer"]["pictures"] = {"a.png"};
-  EXPECT_NE(shoot.error().find("allowed: PNG, JPEG, TIFF"), std::string::npos) << shoot.error();
+  EXPECT_THAT(shoot.error(), HasSubstr("allowed: PNG, JPEG, TIFF"));
 
   write_video(shoot.folder() / "real.mkv", "gray", {noise_bytes(512, 1)}, 32, 16, 25, false);
   session::write_content(shoot.folder() / "list.mkv", "ffconcat version 1.0\nfile real.mkv\n");
@@ -386,7 +380,7 @@ TEST(Import, TransparencyIsAnErrorUnlessThereIsNone) {
   cv::Mat picture = noise_picture(1, CV_8UC4, 16, 16);
   shoot.json["observer"]["pictures"] = {"a.png"};
   write_picture(shoot.folder() / "a.png", picture);
-  EXPECT_NE(shoot.error().find("is transparent in places"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("is transparent in places"));
   std::vector<cv::Mat> channels;
   cv::split(picture, channels);
   channels[3].setTo(255);
@@ -395,5 +389,4 @@ TEST(Import, TransparencyIsAnErrorUnlessThereIsNone) {
   EXPECT_EQ(shoot.error(), "");
 }
 
-}  // namespace import_footage_test
-}  // namespace previz::exchange
+}  // namespace previz::exchange::import_footage_test

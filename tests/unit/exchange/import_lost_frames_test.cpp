@@ -1,19 +1,13 @@
 // Videos of others that are damaged, cut or lack frames: what comes in, when, and with which poses.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <iterator>
 #include <opencv2/imgproc.hpp>
 
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::exchange {
-namespace import_lost_frames_test {
+namespace previz::exchange::import_lost_frames_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -306,11 +300,10 @@ TEST(ImportVideo, PosesOfLostFramesAreLeftOut) {
   const ImportReport report = shoot.import();
   EXPECT_EQ(report.observer_frames, std::uint64_t{texture_frames - 1});
   EXPECT_EQ(report.poses, 2u);
-  EXPECT_NE(report.notes.back().find("1 pose belongs to a lost frame"), std::string::npos);
+  EXPECT_THAT(report.notes.back(), HasSubstr("1 pose belongs to a lost frame"));
   const auto stream = shoot.open_observer();
   EXPECT_EQ(stream->read(1)->sequence, 2u);
   EXPECT_EQ(stream->read(1)->timestamp_ns, 80'000'000);
 }
 
-}  // namespace import_lost_frames_test
-}  // namespace previz::exchange
+}  // namespace previz::exchange::import_lost_frames_test

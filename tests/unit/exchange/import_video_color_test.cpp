@@ -1,19 +1,13 @@
 // Videos of others: what their tags say of colour.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <iterator>
 #include <opencv2/imgproc.hpp>
 
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::exchange {
-namespace import_video_color_test {
+namespace previz::exchange::import_video_color_test {
 
 using Rgb = std::array<double, 3>;
 using Matrix = std::array<Rgb, 3>;
@@ -344,5 +338,4 @@ TEST(ImportVideo, PrimariesOfSmallDifferenceAreConvertedToo) {
   }
 }
 
-}  // namespace import_video_color_test
-}  // namespace previz::exchange
+}  // namespace previz::exchange::import_video_color_test

@@ -1,19 +1,13 @@
 // Videos and photographs of others: which side is up, the shape of a pixel, and what is refused.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <fstream>
-#include <iterator>
 #include <opencv2/imgproc.hpp>
 
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::exchange {
-namespace import_video_test {
+namespace previz::exchange::import_video_test {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -80,10 +74,10 @@ TEST(ImportVideo, AnAngleThatIsNoQuarterTurnIsRefused) {
   Shoot shoot;
   write_video(shoot.folder() / "take.mov", form, {marked_picture(48, 16)});
   shoot.json["observer"] = {{"video", "take.mov"}, {"fps", 25}, {"exposure", 1}};
-  EXPECT_NE(shoot.error().find("\"rotation_deg\": 0"), std::string::npos) << shoot.error();
+  EXPECT_THAT(shoot.error(), HasSubstr("\"rotation_deg\": 0"));
   shoot.json["observer"]["read_as"] = {{"rotation_deg", 0}};
   shoot.json["observer"]["read_as"] = {{"rotation_deg", 45}};
-  EXPECT_NE(shoot.error().find("must be 0, 90, 180 or 270"), std::string::npos);
+  EXPECT_THAT(shoot.error(), HasSubstr("must be 0, 90, 180 or 270"));
   shoot.json["observer"]["read_as"] = {{"rotation_deg", 0}};
   EXPECT_EQ(shoot.error(), "");
   EXPECT_EQ(shoot.open_observer()->read(0)->width, 48);
@@ -172,9 +166,9 @@ TEST(ImportVideo, WhatIsNotConvertedIsRefusedWithARemedy) {
     Shoot shoot;
     write_video(shoot.folder() / "take.mkv", form, {Bytes(32 * 16 * 3 / 2, 100)});
     shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
-    EXPECT_NE(shoot.error().find(unknown.named), std::string::npos) << shoot.error();
-    EXPECT_NE(shoot.error().find(unknown.remedy), std::string::npos) << shoot.error();
-    EXPECT_NE(shoot.error().find("read_as"), std::string::npos) << shoot.error();
+    EXPECT_THAT(shoot.error(), HasSubstr(unknown.named));
+    EXPECT_THAT(shoot.error(), HasSubstr(unknown.remedy));
+    EXPECT_THAT(shoot.error(), HasSubstr("read_as"));
     shoot.json["observer"]["read_as"] = unknown.read_as;
     EXPECT_EQ(shoot.error(), "");
   }
@@ -193,12 +187,11 @@ TEST(ImportVideo, ACamerasLogarithmicCurveIsRefused) {
   Shoot shoot;
   write_video(shoot.folder() / "take.mkv", form, {noise()});
   shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
-  EXPECT_NE(shoot.error().find("logarithmic curve: its GAMMA is \"S-Log3\""), std::string::npos)
-      << shoot.error();
+  EXPECT_THAT(shoot.error(), HasSubstr("logarithmic curve: its GAMMA is \"S-Log3\""));
   shoot.json["observer"]["read_as"] = {{"transfer", "as recorded"}};
   const ImportReport report = shoot.import();
   EXPECT_EQ(shoot.open_observer()->read(0)->bytes, noise());
-  EXPECT_NE(report.notes.at(0).find("as recorded"), std::string::npos);
+  EXPECT_THAT(report.notes.at(0), HasSubstr("as recorded"));
 
   form.metadata = {{"comment", "graded from S-Log3"}};  // people's words
   Shoot commented;
@@ -231,5 +224,4 @@ TEST(ImportVideo, ReadAsIsCheckedMemberByMember) {
   EXPECT_EQ(error_of({{"range", "full"}, {"primaries", "p3-d65"}, {"pixel_aspect", {1, 1}}}), "");
 }
 
-}  // namespace import_video_test
-}  // namespace previz::exchange
+}  // namespace previz::exchange::import_video_test

@@ -1,14 +1,7 @@
 // A take that came without poses: they are found by the set's tags without rendering, and its
 // camera and its objects are exported where they are.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <fstream>
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
-#include <random>
-#include <sstream>
 
 #include "daemon/exchange/camera_track.hpp"
 #include "daemon/exchange/placed_model.hpp"
@@ -21,14 +14,12 @@
 #include "drivers/session/files.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
-namespace previz::exchange {
-namespace take_track_test {
+namespace previz::exchange::take_track_test {
 
 namespace fs = std::filesystem;
-using testing::HasSubstr;
-using testing::Not;
 
 constexpr int width = 320, height = 240, frames = 4, unseen = 2;
 
@@ -220,5 +211,4 @@ TEST(PlacedModel, WhatIsNoGltfIsRefused) {
     EXPECT_THROW(placed_model(content, "x", place), Error) << content;
 }
 
-}  // namespace take_track_test
-}  // namespace previz::exchange
+}  // namespace previz::exchange::take_track_test

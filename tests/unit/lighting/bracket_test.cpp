@@ -2,18 +2,12 @@
 // missing, what is stated wrongly.
 #include "daemon/lighting/bracket.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <random>
-
 #include "daemon/lighting/hdr.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace bracket_test {
+namespace previz::lighting::bracket_test {
 
 const ResponseCurve linear_curve{
     .kind = ResponseCurve::Kind::linear, .inverse_table = {}, .clip_share = 1};
@@ -250,5 +244,4 @@ TEST(Disagreements, AMovingLampIsNone) {
   EXPECT_TRUE(disagreements(Bracket(bracket.frames, linear_curve, {})).empty());
 }
 
-}  // namespace bracket_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::bracket_test

@@ -2,15 +2,7 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
-#include <gtest/gtest.h>
 #include <half.h>
-
-#include <cmath>
-#include <fstream>
-#include <glm/geometric.hpp>
-#include <numbers>
-#include <random>
-#include <string>
 
 #include "daemon/lighting/exr_picture.hpp"
 #include "daemon/lighting/lighting.hpp"
@@ -18,9 +10,9 @@
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace environment_file_test {
+namespace previz::lighting::environment_file_test {
 
 using std::numbers::pi;
 using test::towards;
@@ -210,25 +202,20 @@ TEST(LoadEnvironment, ReadsTheUsualChannels) {
 }
 
 std::string message_of(const std::filesystem::path& file) {
-  try {
-    load_environment(settings_for(file));
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { load_environment(settings_for(file)); });
 }
 
 TEST(LoadEnvironment, SaysWhatIsWrongWithAFile) {
   const previz::test::TemporaryDirectory directory;
   const auto file = directory / "sky.exr";
   write_channels(file, {{"R", 1}, {"G", 1}, {"left.B", 1}});
-  EXPECT_NE(message_of(file).find("found G, R, left.B"), std::string::npos) << message_of(file);
+  EXPECT_THAT(message_of(file), HasSubstr("found G, R, left.B"));
   write_channels(file, {{"Y", 1}, {"RY", 0}, {"BY", 0}});
-  EXPECT_NE(message_of(file).find("found BY, RY, Y"), std::string::npos) << message_of(file);
+  EXPECT_THAT(message_of(file), HasSubstr("found BY, RY, Y"));
   write_exr_picture(file, {30, 20, std::vector<glm::vec3>(600)});
-  EXPECT_NE(message_of(file).find("30x20"), std::string::npos);
-  EXPECT_NE(message_of(directory / "none.exr").find("none.exr"), std::string::npos);
-  EXPECT_NE(message_of(directory.path()).find("cannot be read"), std::string::npos);
+  EXPECT_THAT(message_of(file), HasSubstr("30x20"));
+  EXPECT_THAT(message_of(directory / "none.exr"), HasSubstr("none.exr"));
+  EXPECT_THAT(message_of(directory.path()), HasSubstr("cannot be read"));
 }
 
 // A file of some kilobytes may claim to hold a picture that no memory holds.
@@ -242,8 +229,7 @@ TEST(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
       header.channels().insert(channel, Imf::Channel(Imf::HALF));
     const Imf::OutputFile without_pixels(file.c_str(), header);
   }
-  EXPECT_NE(message_of(file).find("65536x32768 pixels; allowed: at most"), std::string::npos)
-      << message_of(file);
+  EXPECT_THAT(message_of(file), HasSubstr("65536x32768 pixels; allowed: at most"));
 }
 
 // So may an attribute of its header, which OpenEXR would ask as much memory for.
@@ -253,8 +239,7 @@ TEST(LoadEnvironment, AHugeAttributeIsRefusedBeforeMemoryIsAskedFor) {
   const std::string name("owner\0string\0", 13);
   std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name
                                         << std::string("\xff\xff\xff\x7f", 4) << "and little more";
-  EXPECT_NE(message_of(file).find("its header is damaged"), std::string::npos) << message_of(file);
+  EXPECT_THAT(message_of(file), HasSubstr("its header is damaged"));
 }
 
-}  // namespace environment_file_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::environment_file_test

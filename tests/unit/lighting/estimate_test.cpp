@@ -1,17 +1,10 @@
 // From made-up skies through made-up fisheye pictures to the map, and back to the sky.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <numbers>
-#include <string>
-
 #include "daemon/lighting/lighting.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace estimate_test {
+namespace previz::lighting::estimate_test {
 
 using std::numbers::pi;
 using test::degree;
@@ -184,9 +177,9 @@ TEST(Estimate, ReportsClippedAndBlackSolidAngles) {
   EXPECT_LT(report.underexposed_sr, cap(10 * degree) * 1.001);
   EXPECT_GT(report.underexposed_sr, cap(10 * degree - pixel_diagonal_rad));
   ASSERT_GE(report.notes.size(), 3u);
-  EXPECT_NE(report.notes[0].find("clipped in every exposure"), std::string::npos);
-  EXPECT_NE(report.notes[1].find("black in every exposure"), std::string::npos);
-  EXPECT_NE(report.notes[2].find("\"constant\""), std::string::npos);
+  EXPECT_THAT(report.notes[0], HasSubstr("clipped in every exposure"));
+  EXPECT_THAT(report.notes[1], HasSubstr("black in every exposure"));
+  EXPECT_THAT(report.notes[2], HasSubstr("\"constant\""));
 }
 
 // A cap of half angle r has a solid angle of 2 pi (1 - cos r).
@@ -245,8 +238,7 @@ TEST(UnseenHorizon, DoesNotSmearALampAtTheEdge) {
                      ASSERT_LT(radiance.r, 0.3);
                    }
                  });
-  EXPECT_NE(lighting.report.notes.back().find("8 times as bright as its median"),
-            std::string::npos);
+  EXPECT_THAT(lighting.report.notes.back(), HasSubstr("8 times as bright as its median"));
 }
 
 TEST(UnseenMirror, ShowsTheUpperHalfBelow) {
@@ -272,8 +264,7 @@ TEST(UnseenMirror, FallsBackToTheHorizonWhereTheMirrorIsUnseenToo) {
   const Lighting lighting = estimate_one(camera, uniform, 0.25, with_rule(set::UnseenRule::mirror));
   for (const glm::vec3& radiance : lighting.environment.radiance)
     ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
-  EXPECT_NE(lighting.report.notes.back().find("not in the mirrored picture either"),
-            std::string::npos);
+  EXPECT_THAT(lighting.report.notes.back(), HasSubstr("not in the mirrored picture either"));
 }
 
 // A lens whose circle is wider than the picture: the edge is where the picture ends.
@@ -311,5 +302,4 @@ TEST(Estimate, RefusesFramesThatDoNotFit) {
   EXPECT_THROW(estimate({}, camera, {}), Error);  // no frame
 }
 
-}  // namespace estimate_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::estimate_test

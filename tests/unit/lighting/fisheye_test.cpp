@@ -1,15 +1,9 @@
 #include "drivers/calibration/fisheye.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <numbers>
-
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace fisheye_test {
+namespace previz::lighting::fisheye_test {
 
 using std::numbers::pi;
 using test::degree;
@@ -119,5 +113,4 @@ TEST(Fisheye, StopsWherePolynomialTurnsBack) {
   EXPECT_EQ(monotonic_limit_rad({0, 0, 0, 0}), pi);
 }
 
-}  // namespace fisheye_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::fisheye_test

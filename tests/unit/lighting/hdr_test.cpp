@@ -1,19 +1,12 @@
 #include "daemon/lighting/hdr.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <random>
-#include <string>
-
 #include "daemon/lighting/response.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace hdr_test {
+namespace previz::lighting::hdr_test {
 
 using test::make_frame;
 
@@ -133,8 +126,7 @@ TEST(MergeExposures, ADarkLevelAtWhatIsClippedIsRefused) {
     const Bracket refused({&frame, 1}, half, glm::dvec3(0, 0, 0.501));
     FAIL() << "not refused";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("dark_level is 0.501"), std::string::npos)
-        << error.what();
+    EXPECT_THAT(error.what(), HasSubstr("dark_level is 0.501"));
   }
 }
 
@@ -202,24 +194,15 @@ TEST(MergeExposures, IsUnbiasedAndNearTheBestUnderSensorNoise) {
 }
 
 std::string merge_error(const std::vector<FramePtr>& frames) {
-  try {
-    merge_exposures(frames, srgb);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { merge_exposures(frames, srgb); });
 }
 
 TEST(MergeExposures, RefusesWhatCannotBeUsed) {
-  EXPECT_NE(merge_error({}).find("at least one"), std::string::npos);
-  EXPECT_NE(merge_error({srgb8_frame(1, 0, {1, 2, 3})}).find("light frame 12: exposure"),
-            std::string::npos);
-  EXPECT_NE(merge_error({srgb8_frame(1, std::nan(""), {1, 2, 3})}).find("exposure"),
-            std::string::npos);
-  EXPECT_NE(merge_error({srgb8_frame(1, 1, {1, 2, 3}), srgb8_frame(2, 1, {1, 2, 3, 1, 2, 3})})
-                .find("2x1"),
-            std::string::npos);
+  EXPECT_THAT(merge_error({}), HasSubstr("at least one"));
+  EXPECT_THAT(merge_error({srgb8_frame(1, 0, {1, 2, 3})}), HasSubstr("light frame 12: exposure"));
+  EXPECT_THAT(merge_error({srgb8_frame(1, std::nan(""), {1, 2, 3})}), HasSubstr("exposure"));
+  EXPECT_THAT(merge_error({srgb8_frame(1, 1, {1, 2, 3}), srgb8_frame(2, 1, {1, 2, 3, 1, 2, 3})}),
+              HasSubstr("2x1"));
 }
 
-}  // namespace hdr_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::hdr_test

@@ -1,23 +1,13 @@
 // The merge on real exposures: sixteen film scans of Memorial Church, a stop apart, against the
 // radiance map that Debevec published of them (SIGGRAPH 97).
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/photo.hpp>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include "tests/support/lighting.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace memorial_test {
+namespace previz::lighting::memorial_test {
 
 struct Memorial {
   std::vector<cv::Mat> pictures;  // 8-bit BGR
@@ -123,5 +113,4 @@ TEST(MergeExposures, MatchesThePublishedMapOfRealExposures) {
   EXPECT_LT(p90, 0.25);
 }
 
-}  // namespace memorial_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::memorial_test

@@ -1,21 +1,15 @@
 // The unseen part of the light filled with what the film camera saw there.
 #include "daemon/lighting/observed.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <limits>
-
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/response.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace observed_test {
+namespace previz::lighting::observed_test {
 
 using test::degree;
 
@@ -138,10 +132,7 @@ TEST(UnseenObserver, FillsWhatItSawAndContinuesTheEdgeElsewhere) {
             std::sqrt(3.0) * tolerance);
   EXPECT_LT(glm::length(radiance(180, -30) - 0.5), 1e-3);  // the edge, continued
   EXPECT_LT(glm::length(radiance(0, 30) - 0.5), 1e-3);     // the light camera's own
-  EXPECT_NE(lighting.report.notes.back().find("not seen by the film camera either"),
-            std::string::npos)
-      << lighting.report.notes.back();
+  EXPECT_THAT(lighting.report.notes.back(), HasSubstr("not seen by the film camera either"));
 }
 
-}  // namespace observed_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::observed_test

@@ -1,24 +1,13 @@
 // What an environment's picture may be besides a latitude-longitude OpenEXR: Radiance .hdr, a cube
 // cross; and what is said about everything else.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <array>
-#include <cmath>
-#include <fstream>
-#include <functional>
-#include <glm/geometric.hpp>
-#include <numbers>
-#include <string>
-
 #include "daemon/lighting/lighting.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace picture_formats_test {
+namespace previz::lighting::picture_formats_test {
 
 using std::numbers::pi;
 using ::testing::HasSubstr;
@@ -313,5 +302,4 @@ TEST_F(PictureFormats, ACoarseMapOfAFinePictureKeepsItsFlux) {
   EXPECT_LT(glm::length(total_flux(load(faces, 1, 8).environment) / fine - 1.0), 0.01);
 }
 
-}  // namespace picture_formats_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::picture_formats_test

@@ -3,21 +3,15 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <half.h>
-
-#include <cmath>
-#include <limits>
-#include <string>
 
 #include "daemon/lighting/lighting.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace picture_repair_test {
+namespace previz::lighting::picture_repair_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -54,12 +48,7 @@ class PictureRepair : public ::testing::Test {
     return load_file(1);
   }
   std::string refusal(const LinearPicture& picture, double gain = 1) {
-    try {
-      load(picture, gain);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return test::error_of([&] { load(picture, gain); });
   }
   // Expects the two pictures to give the same light, and returns the first one's notes.
   std::vector<std::string> expect_like(const LinearPicture& picture,
@@ -205,5 +194,4 @@ TEST_F(PictureRepair, APictureWithoutAnyBrightnessIsRefused) {
   EXPECT_THAT(refusal(sky), HasSubstr("sky.exr: no pixel's green holds a brightness"));
 }
 
-}  // namespace picture_repair_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::picture_repair_test

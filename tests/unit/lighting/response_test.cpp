@@ -1,15 +1,9 @@
 #include "daemon/lighting/response.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <limits>
-#include <string>
-
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace response_test {
+namespace previz::lighting::response_test {
 
 ResponseCurve gamma_curve(double gamma) {
   return {.kind = ResponseCurve::Kind::gamma, .gamma = gamma, .inverse_table = {}};
@@ -79,22 +73,16 @@ TEST(Response, ForwardRoundsHalfUpAndClips) {
 }
 
 std::string message_of(const ResponseCurve& curve, int bits) {
-  try {
-    const Response response(curve, bits);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { const Response response(curve, bits); });
 }
 
 TEST(Response, RefusesWhatCannotRoundTrip) {
   // (1/65535)^70 is below the smallest double.
-  EXPECT_NE(message_of(gamma_curve(70), 16).find("code 1"), std::string::npos);
+  EXPECT_THAT(message_of(gamma_curve(70), 16), HasSubstr("code 1"));
   for (const ResponseCurve& curve : {gamma_curve(0), gamma_curve(std::nan("")),
                                      table_curve({0, 0.5, 0.5, 1}), table_curve({0, 0.5})})
-    EXPECT_NE(message_of(curve, 8).find("does not survive"), std::string::npos);
-  EXPECT_NE(message_of({}, 17).find("1 to 16"), std::string::npos);
+    EXPECT_THAT(message_of(curve, 8), HasSubstr("does not survive"));
+  EXPECT_THAT(message_of({}, 17), HasSubstr("1 to 16"));
 }
 
-}  // namespace response_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::response_test

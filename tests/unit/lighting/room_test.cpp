@@ -1,18 +1,14 @@
 // A lamp in a room, seen from the light camera, put where it stands as seen from the set.
 #include "daemon/lighting/room.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "daemon/lighting/lighting.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace room_test {
+namespace previz::lighting::room_test {
 
 using std::numbers::pi;
 using test::degree;
@@ -153,5 +149,4 @@ TEST(Parallax, AUniformRoomIsUniform) {
   }
 }
 
-}  // namespace room_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::room_test

@@ -1,16 +1,10 @@
 // What lens and sensor do to a picture besides the response, and what is done where it clips.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <numbers>
-
 #include "daemon/lighting/expansion.hpp"
 #include "daemon/lighting/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace sensor_test {
+namespace previz::lighting::sensor_test {
 
 using test::degree;
 
@@ -107,9 +101,8 @@ TEST(Estimate, ExpandsWhatOneExposureClipsAndSaysSo) {
     settings.clipped_gain = gain;
     const Lighting lighting = estimate({&frame, 1}, camera, settings);
     EXPECT_NEAR(lighting.report.overexposed_sr / lamp_sr, 1, 0.15);  // a pixel's rim
-    EXPECT_NE(lighting.report.notes[0].find(gain > 1 ? "up to 20 times white" : "a lower bound"),
-              std::string::npos)
-        << lighting.report.notes[0];
+    EXPECT_THAT(lighting.report.notes[0],
+                HasSubstr(gain > 1 ? "up to 20 times white" : "a lower bound"));
     return total_flux(lighting.environment).g;
   };
   // The rim of two pixels of 0.75 degrees is expanded less: of a lamp of 6 degrees 0.44 of its area
@@ -119,5 +112,4 @@ TEST(Estimate, ExpandsWhatOneExposureClipsAndSaysSo) {
   EXPECT_GT(added, 19 * white * lamp_sr * 0.75);
 }
 
-}  // namespace sensor_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::sensor_test

@@ -1,12 +1,8 @@
 #include "daemon/lighting/smoothing.hpp"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-#include <cmath>
-#include <random>
-
-namespace previz::lighting {
-namespace smoothing_test {
+namespace previz::lighting::smoothing_test {
 
 constexpr int picture_side = 64, picture_pixels = picture_side * picture_side;
 constexpr float pixel_sigma = 0.01f;
@@ -139,5 +135,4 @@ TEST(Smoothing, APictureOfAnotherSizeStartsAnew) {
   EXPECT_EQ(small.radiance[0], glm::vec3(3));
 }
 
-}  // namespace smoothing_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::smoothing_test

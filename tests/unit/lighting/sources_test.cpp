@@ -1,21 +1,14 @@
 // Light sources taken out of environment maps made by code, and what is left.
 #include "daemon/lighting/sources.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <numeric>
-
 #include "daemon/lighting/bright_regions.hpp"
 #include "daemon/lighting/light_mode.hpp"
 #include "daemon/lighting/source_tracker.hpp"
 #include "shaders/lib/octahedral.h"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::lighting {
-namespace sources_test {
+namespace previz::lighting::sources_test {
 
 using namespace previz::test;
 
@@ -355,7 +348,7 @@ TEST(LightMode, SaysWhatIsDropped) {
   EXPECT_NEAR(lighting.report.dropped_share, 1 - glm::dot(kept, weights) / glm::dot(whole, weights),
               1e-5);
   ASSERT_EQ(lighting.report.notes.size(), 1u);
-  EXPECT_NE(lighting.report.notes[0].find("dropped"), std::string::npos);
+  EXPECT_THAT(lighting.report.notes[0], HasSubstr("dropped"));
 }
 
 TEST(LightMode, HybridAndBlurredKeepTheFluxAndImageChangesNothing) {
@@ -375,5 +368,4 @@ TEST(LightMode, HybridAndBlurredKeepTheFluxAndImageChangesNothing) {
   }
 }
 
-}  // namespace sources_test
-}  // namespace previz::lighting
+}  // namespace previz::lighting::sources_test

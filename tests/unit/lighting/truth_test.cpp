@@ -1,15 +1,10 @@
 // Captured light on ground truth sets: the bundled one, and all of the shared folder where it is
 // there.
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <numbers>
-
 #include "tests/support/shared_data.hpp"
+#include "tests/support/test.hpp"
 #include "tests/truth/lighting_measure.hpp"
 
-namespace previz::truth {
-namespace truth_test {
+namespace previz::truth::truth_test {
 
 constexpr double degree = std::numbers::pi / 180;
 
@@ -64,5 +59,4 @@ TEST(CapturedLight, MatchesTheSharedSets) {
     if (std::filesystem::exists(entry.path() / "set.json")) expect_captured(entry.path());
 }
 
-}  // namespace truth_test
-}  // namespace previz::truth
+}  // namespace previz::truth::truth_test

@@ -3,7 +3,6 @@
 #include "daemon/output/asset_store.hpp"
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -11,10 +10,10 @@
 #include "drivers/descriptor.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::output {
-namespace asset_store_test {
+namespace previz::output::asset_store_test {
 
 using session::noise_frame;
 using session::TemporaryDirectory;
@@ -143,5 +142,4 @@ TEST(Recorder, DoesNotWaitForAnAssetThatIsStillBeingRead) {
   EXPECT_EQ(session::read_file(session.directory / session.info.assets.at("slow.glb")), "a model");
 }
 
-}  // namespace asset_store_test
-}  // namespace previz::output
+}  // namespace previz::output::asset_store_test

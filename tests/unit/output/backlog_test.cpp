@@ -1,16 +1,10 @@
 // How far a recording may be behind the cameras.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <mutex>
-
 #include "daemon/output/recorder.hpp"
 #include "tests/support/recorder_fixture.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::output {
-namespace backlog_test {
+namespace previz::output::backlog_test {
 
 using session::noise_frame;
 using session::TemporaryDirectory;
@@ -206,5 +200,4 @@ TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
   EXPECT_EQ(heard.left_out(), (Causes{{"too far behind", recorder.status().lost.frames}}));
 }
 
-}  // namespace backlog_test
-}  // namespace previz::output
+}  // namespace previz::output::backlog_test

@@ -9,17 +9,13 @@
 #include <ImfMatrixAttribute.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
-#include <gtest/gtest.h>
-
-#include <fstream>
-#include <set>
 
 #include "drivers/error.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::output {
-namespace exr_test {
+namespace previz::output::exr_test {
 
 using test::TemporaryDirectory;
 
@@ -194,7 +190,7 @@ TEST(Exr, UnwritablePlaceIsNamed) {
     write_exr("/nowhere/at/all/frame.exr", sample_layers(1, 1), {});
     FAIL() << "no error";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("/nowhere/at/all/frame.exr"), std::string::npos);
+    EXPECT_THAT(error.what(), HasSubstr("/nowhere/at/all/frame.exr"));
   }
 }
 
@@ -216,7 +212,7 @@ TEST(Exr, OnAFullDiskThereIsTheWholeFileOrNone) {
       try {
         write_exr(file, layers, {});
       } catch (const Error& error) {
-        EXPECT_NE(std::string(error.what()).find(file.string()), std::string::npos) << error.what();
+        EXPECT_THAT(error.what(), HasSubstr(file.string()));
         written = false;
       }
     }
@@ -256,5 +252,4 @@ TEST(Exr, ADataWindowThatDoesNotBeginAtZeroIsRefused) {
   EXPECT_THROW(read_exr(window_of(0, 0, 1 << 30, 1 << 30)), Error);
 }
 
-}  // namespace exr_test
-}  // namespace previz::output
+}  // namespace previz::output::exr_test

@@ -1,15 +1,10 @@
 // The overlay as pixels: boxes that fit, do not overlap, and can be read on any picture.
 #include "daemon/output/osd_painter.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::output {
-namespace osd_test {
+namespace previz::output::osd_test {
 
 OsdPage busy_page() {
   return {
@@ -110,7 +105,7 @@ TEST(OsdPainter, AFontThatIsMissingIsNamed) {
     const OsdPainter painter(64, 64, 0.1, "/no/such/font.ttf");
     FAIL();
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("/no/such/font.ttf"), std::string::npos);
+    EXPECT_THAT(error.what(), HasSubstr("/no/such/font.ttf"));
   }
 }
 
@@ -125,5 +120,4 @@ TEST(Font, WidthGrowsWithTheTextAndAnyBytesAreDrawn) {
   EXPECT_GT(font.draw("\xff\xfe\x80 not UTF-8").width, 0);
 }
 
-}  // namespace osd_test
-}  // namespace previz::output
+}  // namespace previz::output::osd_test

@@ -1,18 +1,13 @@
 // PNG pictures return bit for bit; the review video keeps the capture times.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <fstream>
-
 #include "daemon/output/png.hpp"
 #include "daemon/output/video.hpp"
 #include "drivers/av.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::output {
-namespace picture_test {
+namespace previz::output::picture_test {
 
 using test::TemporaryDirectory;
 
@@ -49,7 +44,7 @@ TEST(Png, DamagedAndMissingFilesAreNamed) {
     read_png(path);
     FAIL() << "no error";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("picture.png"), std::string::npos);
+    EXPECT_THAT(error.what(), HasSubstr("picture.png"));
   }
   std::ofstream(path) << "not a picture";
   EXPECT_THROW(read_png(path), Error);
@@ -174,5 +169,4 @@ TEST(Video, WrongSizeAndTimeGoingBackAreRefusedAndLeaveNoFile) {
   EXPECT_TRUE(std::filesystem::is_empty(directory.path()));
 }
 
-}  // namespace picture_test
-}  // namespace previz::output
+}  // namespace previz::output::picture_test

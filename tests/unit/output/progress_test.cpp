@@ -1,12 +1,9 @@
 // What people see while a long job runs.
 #include "daemon/output/progress.hpp"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-#include <sstream>
-
-namespace previz::output {
-namespace progress_test {
+namespace previz::output::progress_test {
 
 TEST(Progress, DurationsReadLikeAClock) {
   EXPECT_EQ(duration_words(-1), "0 s");
@@ -52,5 +49,4 @@ TEST(ShareProgress, TellsTheShareOfTheWorkAndTheTimeLeft) {
             "\r\x1b[Kreference (25 %, 30 s left)\r\x1b[Kreference (25 %, 30 s left)\n");
 }
 
-}  // namespace progress_test
-}  // namespace previz::output
+}  // namespace previz::output::progress_test

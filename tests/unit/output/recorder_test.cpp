@@ -1,24 +1,19 @@
 // Takes: every frame is in them or counted, whatever happens to process and disk.
 #include "daemon/output/recorder.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <csignal>
-#include <mutex>
-#include <optional>
-#include <thread>
 
 #include "drivers/bracket.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/recorder_fixture.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::output {
-namespace recorder_test {
+namespace previz::output::recorder_test {
 
 using session::is_frame;
 using session::mentions;
@@ -335,7 +330,7 @@ TEST(Recorder, AnAlmostFullDiskEndsTheTakeInOrder) {
     return !recorder.status().recording;
   }));
   const RecorderStatus status = recorder.status();
-  EXPECT_NE(status.fault.find("almost full"), std::string::npos) << status.fault;
+  EXPECT_THAT(status.fault, HasSubstr("almost full"));
   EXPECT_EQ(status.failures, 1u);
   EXPECT_EQ(status.finished_takes, 1u);
   EXPECT_TRUE(session::open_session(directory / "12A_take001").missing.empty());  // closed
@@ -373,7 +368,7 @@ TEST(Recorder, AFileThatCannotGrowEndsTheTakeWithEverythingSoFarReadable) {
     ASSERT_NO_FATAL_FAILURE(record_until_the_disk_is_full(recorder, next));
   }
   const RecorderStatus status = recorder.status();
-  EXPECT_NE(status.fault.find("12A_take001"), std::string::npos) << status.fault;
+  EXPECT_THAT(status.fault, HasSubstr("12A_take001"));
   EXPECT_GT(status.frames, 10u);
   EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, status.frames - 1));
   EXPECT_EQ(heard.left_out(), (Causes{{"disk failed", status.lost.frames}}));
@@ -405,7 +400,7 @@ TEST(Recorder, AFullDiskEndsTheTakeWithEverythingSoFarReadable) {
       Recorder recorder(options_in(directory.path()));
       ASSERT_NO_FATAL_FAILURE(record_until_the_disk_is_full(recorder, next));
       const RecorderStatus status = recorder.status();
-      EXPECT_NE(status.fault.find("No space left on device"), std::string::npos) << status.fault;
+      EXPECT_THAT(status.fault, HasSubstr("No space left on device"));
       EXPECT_GE(status.frames, 28u);
       EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, status.frames - 1));
     }();
@@ -564,5 +559,4 @@ TEST(Recorder, OfADiskThatHangsKeepsAQueueOfBoundedSizeAndSaysSo) {
     EXPECT_TRUE(mentions(session.missing, words)) << words;
 }
 
-}  // namespace recorder_test
-}  // namespace previz::output
+}  // namespace previz::output::recorder_test

@@ -1,22 +1,16 @@
 // Takes whose disks, files of the set or frames are not as they should be: the recording goes on,
 // and each take says what it lacks.
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
-
-#include <atomic>
-#include <limits>
-#include <mutex>
-#include <thread>
 
 #include "daemon/output/recorder.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/recorder_fixture.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::output {
-namespace take_ends_test {
+namespace previz::output::take_ends_test {
 
 using session::mentions;
 using session::write_content;
@@ -390,7 +384,7 @@ TEST(Recorder, NearTheReserveDoesNotFallApartIntoShortTakes) {
     return !recorder.status().recording || recorder.status().number > 1;
   }));
   EXPECT_EQ(recorder.status().number, 1);
-  EXPECT_NE(recorder.status().fault.find("almost full"), std::string::npos);
+  EXPECT_THAT(recorder.status().fault, HasSubstr("almost full"));
   recorder.start();
   recorder.offer(picture(next));
   EXPECT_TRUE(wait_until("somebody begins again", [&] {
@@ -448,5 +442,4 @@ TEST(Recorder, ThatHasRecordedTakesNoOldWishForOne) {
   EXPECT_EQ(recorder.status().interrupted, std::nullopt);
 }
 
-}  // namespace take_ends_test
-}  // namespace previz::output
+}  // namespace previz::output::take_ends_test

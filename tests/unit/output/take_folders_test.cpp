@@ -1,23 +1,15 @@
 // A recording that goes on in a second folder, and what is kept before the button.
 #include "daemon/output/take_folders.hpp"
 
-#include <gtest/gtest.h>
-
-#include <atomic>
-#include <fstream>
-#include <map>
-#include <mutex>
-#include <thread>
-
 #include "daemon/output/folder_watch.hpp"
 #include "daemon/output/recorder.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/recorder_fixture.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::output {
-namespace take_folders_test {
+namespace previz::output::take_folders_test {
 
 using session::is_frame;
 using session::mentions;
@@ -77,7 +69,7 @@ TEST(TakeFolders, AFolderThatCannotBeMadeIsPassedOverByName) {
   TakeFolders folders({directory / "file/takes", directory / "b"}, 0, {});
   EXPECT_EQ(folders.choose(), 1u);
   folders.give_up(1, "its disk failed");
-  EXPECT_NE(refusal(folders).find("file/takes"), std::string::npos) << refusal(folders);
+  EXPECT_THAT(refusal(folders), HasSubstr("file/takes"));
 }
 
 TEST(TakeFolders, AWishIsKeptInTheFolderOfItsTakeAndTheNewestCounts) {
@@ -211,7 +203,7 @@ TEST(Recorder, OfTwoFullDisksSaysOfEachWhyItCannotRecord) {
   recorder.start();
   ASSERT_TRUE(wait_until("it is refused", [&] { return recorder.status().failures == 1; }));
   for (const char* folder : {"first", "second"})
-    EXPECT_NE(recorder.status().fault.find((disks.directory / folder).string()), std::string::npos);
+    EXPECT_THAT(recorder.status().fault, HasSubstr((disks.directory / folder).string()));
 }
 
 // 25 frames of 2304 bytes a second, of which 23040 bytes hold 10; 4 s are wished.
@@ -273,7 +265,7 @@ TEST(Recorder, WritesTheFormThatTheSetWants) {
   recorder.finish();
   const std::filesystem::path take = disks.directory / "first/12A_take001";
   EXPECT_EQ(frames_of(take, 0), 3u);
-  EXPECT_NE(session::read_file(take / "session.toml").find("codec = \"raw\""), std::string::npos);
+  EXPECT_THAT(session::read_file(take / "session.toml"), HasSubstr("codec = \"raw\""));
 }
 
 // As `umount -l` does it: files that are open stay so, and nobody finds them by name.
@@ -310,14 +302,12 @@ TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
   {
     Recorder second(options);
     ASSERT_TRUE(wait_until("it has looked", [&] { return second.folders()[0].is_looked_at; }));
-    EXPECT_NE(second.folders()[0].why_not.find("another previzd records there (process "),
-              std::string::npos)
-        << second.folders()[0].why_not;
+    EXPECT_THAT(second.folders()[0].why_not, HasSubstr("another previzd records there (process "));
     EXPECT_TRUE(second.status().salvaged.empty());
     second.start();
     second.offer(picture(5));
     ASSERT_TRUE(wait_until("it is refused", [&] { return second.status().failures == 1; }));
-    EXPECT_NE(second.status().fault.find("another previzd"), std::string::npos);
+    EXPECT_THAT(second.status().fault, HasSubstr("another previzd"));
     EXPECT_FALSE(second.status().interrupted);
   }
   first->offer(picture(1));
@@ -331,5 +321,4 @@ TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
   EXPECT_TRUE(wait_until("it has the folder", [&] { return third.folders()[0].is_own; }));
 }
 
-}  // namespace take_folders_test
-}  // namespace previz::output
+}  // namespace previz::output::take_folders_test

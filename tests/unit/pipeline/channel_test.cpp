@@ -1,15 +1,9 @@
 // Mailboxes keep the newest and count the rest; queues keep everything in order; both end cleanly.
 #include "daemon/pipeline/channel.hpp"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-#include <algorithm>
-#include <numeric>
-#include <thread>
-#include <vector>
-
-namespace previz::pipeline {
-namespace channel_test {
+namespace previz::pipeline::channel_test {
 
 TEST(Mailbox, KeepsTheNewestAndCountsTheRest) {
   Mailbox<int> mailbox;
@@ -134,5 +128,4 @@ TEST(RecentQueue, DropsTheOldestOnceTooManyWeighTooMuchAndNeverWaits) {
   EXPECT_EQ(queue.pop(), std::nullopt);
 }
 
-}  // namespace channel_test
-}  // namespace previz::pipeline
+}  // namespace previz::pipeline::channel_test

@@ -1,18 +1,9 @@
 // The frame rate governor on simulated renderers: what a frame costs is written down, not measured.
 #include "daemon/pipeline/governor.hpp"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-#include <cmath>
-#include <functional>
-#include <random>
-#include <set>
-#include <string>
-#include <utility>
-#include <vector>
-
-namespace previz::pipeline {
-namespace governor_test {
+namespace previz::pipeline::governor_test {
 
 constexpr double fps = 25, frame_s = 1 / fps;
 
@@ -362,5 +353,4 @@ TEST(Governor, IgnoresTimesThatAreNone) {
   EXPECT_EQ(governor.samples(), samples);
 }
 
-}  // namespace governor_test
-}  // namespace previz::pipeline
+}  // namespace previz::pipeline::governor_test

@@ -1,19 +1,13 @@
 // Lamps that the set declares and the light camera sees shine once, and can be dimmed and removed.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
 
 #include "daemon/pipeline/light_stage.hpp"
 #include "daemon/pipeline/relight.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::pipeline {
-namespace lamps_test {
+namespace previz::pipeline::lamps_test {
 
 using std::numbers::pi;
 using test::degree;
@@ -414,5 +408,4 @@ TEST(FoundLamp, KeepsItsNameFromLightFrameToLightFrame) {
   }
 }
 
-}  // namespace lamps_test
-}  // namespace previz::pipeline
+}  // namespace previz::pipeline::lamps_test

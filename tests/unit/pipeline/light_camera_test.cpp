@@ -1,15 +1,5 @@
 // The light from frame to frame: what is switched, what is static, what cannot be used, and that
 // nobody waits for it.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <atomic>
-#include <chrono>
-#include <cmath>
-#include <future>
-#include <glm/geometric.hpp>
-#include <random>
-
 #include "daemon/pipeline/light_feed.hpp"
 #include "daemon/pipeline/light_stage.hpp"
 #include "drivers/bracket.hpp"
@@ -18,9 +8,9 @@
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::pipeline {
-namespace light_camera_test {
+namespace previz::pipeline::light_camera_test {
 
 using test::degree;
 
@@ -385,5 +375,4 @@ TEST(LightFeed, ASlowEstimateHoldsUpNoLightFrame) {
   EXPECT_EQ(last, frames - 1);
 }
 
-}  // namespace light_camera_test
-}  // namespace previz::pipeline
+}  // namespace previz::pipeline::light_camera_test

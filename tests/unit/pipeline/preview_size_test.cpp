@@ -1,11 +1,6 @@
 // A preview's smaller picture is the same view through larger pixels, averaged in linear light.
 #include "daemon/pipeline/preview_size.hpp"
 
-#include <gtest/gtest.h>
-
-#include <memory>
-#include <numeric>
-
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/load.hpp"
@@ -13,9 +8,9 @@
 #include "drivers/plate.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::pipeline {
-namespace preview_size_test {
+namespace previz::pipeline::preview_size_test {
 
 const ResponseCurve srgb{};
 const ResponseCurve linear{ResponseCurve::Kind::linear, 1, {}};
@@ -217,5 +212,4 @@ TEST(PreviewSize, AVirtualObjectStandsWhereItStandsInThePlate) {
   EXPECT_NEAR(in_half.centre.y, in_full.centre.y, 4 * 0.026 / 18);
 }
 
-}  // namespace preview_size_test
-}  // namespace previz::pipeline
+}  // namespace previz::pipeline::preview_size_test

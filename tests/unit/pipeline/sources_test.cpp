@@ -1,16 +1,11 @@
 // Light sources from frame to frame, and light from a recording.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <glm/geometric.hpp>
-
 #include "daemon/pipeline/light_stage.hpp"
 #include "daemon/pipeline/track_stage.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::pipeline {
-namespace sources_test {
+namespace previz::pipeline::sources_test {
 
 using test::degree;
 using test::towards;
@@ -156,5 +151,4 @@ TEST(SourceStage, TheSetsOwnLightNeedsNoCamera) {
   EXPECT_EQ(total_flux(stage.light()->lighting.environment), glm::dvec3(0));
 }
 
-}  // namespace sources_test
-}  // namespace previz::pipeline
+}  // namespace previz::pipeline::sources_test

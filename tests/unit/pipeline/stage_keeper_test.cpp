@@ -2,13 +2,9 @@
 // made up.
 #include "daemon/pipeline/stage_keeper.hpp"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-#include <sstream>
-#include <stdexcept>
-
-namespace previz::pipeline {
-namespace stage_keeper_test {
+namespace previz::pipeline::stage_keeper_test {
 
 using std::chrono::milliseconds;
 
@@ -122,7 +118,7 @@ TEST_F(StageKeeperTest, APartThatHadNothingToDoDoesNotWorkAgain) {
 TEST_F(StageKeeperTest, WhatIsThrownNeedBeNoError) {
   StageKeeper keeper = this->keeper();
   EXPECT_FALSE(keeper.attempt([] { throw 7; }));
-  EXPECT_NE(log_.str().find("unknown exception"), std::string::npos) << log_.str();
+  EXPECT_THAT(log_.str(), HasSubstr("unknown exception"));
 }
 
 TEST_F(StageKeeperTest, ATestRehearsesFailures) {
@@ -177,5 +173,4 @@ TEST(Liveness, AThreadThatHasEndedIsNotHung) {
   EXPECT_TRUE(liveness.hung().empty());
 }
 
-}  // namespace stage_keeper_test
-}  // namespace previz::pipeline
+}  // namespace previz::pipeline::stage_keeper_test

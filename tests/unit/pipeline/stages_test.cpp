@@ -1,20 +1,13 @@
 // A line of stages ends in order at the stream's end, cleanly at a stop, and at once at an error.
 #include "daemon/pipeline/stages.hpp"
 
-#include <gtest/gtest.h>
-
-#include <atomic>
-#include <chrono>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
-#include <thread>
 
 #include "daemon/pipeline/metrics.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::pipeline {
-namespace stages_test {
+namespace previz::pipeline::stages_test {
 
 // Counts up to `total`; with a move-only value, as shots are moved and never copied.
 auto count_to(int total) {
@@ -112,7 +105,7 @@ TEST(StageThreads, WhatWaitsInFrontOfAStageIsInItsMetricsUntilItDrops) {
   EXPECT_TRUE(after.stages.at("bounded").dropped.empty());
   for (const char* stage : {"mailbox", "bounded", "recent"})
     EXPECT_EQ(after.stages.at(stage).waiting.values, 0u) << stage;
-  EXPECT_NE(to_json(after).find("\"waiting\": {"), std::string::npos);
+  EXPECT_THAT(to_json(after), HasSubstr("\"waiting\": {"));
 }
 
 TEST(StageThreads, StopEndsTheSourceAndFinishesWhatWasBegun) {
@@ -250,5 +243,4 @@ TEST(Metrics, OldLatenciesLeaveTheWindow) {
   EXPECT_EQ(metrics.snapshot(1).latency_p99_s, 0.5);
 }
 
-}  // namespace stages_test
-}  // namespace previz::pipeline
+}  // namespace previz::pipeline::stages_test

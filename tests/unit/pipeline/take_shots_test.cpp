@@ -1,19 +1,13 @@
 // The tracked and lit shots of a recorded take.
-#include <gtest/gtest.h>
-
-#include <fstream>
-#include <set>
-#include <vector>
-
 #include "daemon/pipeline/take_shots.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::pipeline {
-namespace take_shots_test {
+namespace previz::pipeline::take_shots_test {
 
 class TakeShotsTest : public testing::Test {
  protected:
@@ -63,7 +57,7 @@ TEST_F(TakeShotsTest, ATakeCannotMakeForeignFilesItsAssets) {
   std::ofstream(toml) << text;
   const session::Session read = session::open_session(directory_ / "session");
   ASSERT_EQ(read.missing.size(), 1u);
-  EXPECT_NE(read.missing[0].find("lies outside the session"), std::string::npos) << read.missing[0];
+  EXPECT_THAT(read.missing[0], HasSubstr("lies outside the session"));
   EXPECT_EQ(read.info.assets.size(), 1u);
 }
 
@@ -179,12 +173,11 @@ TEST_F(TakeShotsTest, AStopEndsTheReadingOfATake) {
   };
   const std::filesystem::path session = directory_ / "session";
   const std::string asset = why([&] { open_take(session, {}, false, stop.get_token()); });
-  EXPECT_NE(asset.find(".gltf: reading interrupted"), std::string::npos) << asset;
+  EXPECT_THAT(asset, HasSubstr(".gltf: reading interrupted"));
   session::Session opened = session::open_session(session);
   const std::string video =
       why([&] { session::open_stream(opened, "observer", stop.get_token()); });
-  EXPECT_NE(video.find("observer.mkv: reading interrupted"), std::string::npos) << video;
+  EXPECT_THAT(video, HasSubstr("observer.mkv: reading interrupted"));
 }
 
-}  // namespace take_shots_test
-}  // namespace previz::pipeline
+}  // namespace previz::pipeline::take_shots_test

@@ -1,18 +1,13 @@
 // `previzd check`: right sets are described, wrong ones refused with every problem.
-#include <gtest/gtest.h>
-
-#include <fstream>
-#include <sstream>
-
 #include "daemon/post/check.hpp"
 #include "daemon/set/table.hpp"
 #include "daemon/tracking/apriltag_tracker.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::post {
-namespace check_test {
+namespace previz::post::check_test {
 
 // One triangle (0,0,0) (1,0,0) (0,1,0); `material` is a glTF material's body.
 std::string triangle(const std::string& material) {
@@ -59,7 +54,7 @@ class Check : public testing::Test {
   }
 
   void expect_said(const std::string& words) {
-    EXPECT_NE(said_.find(words), std::string::npos) << words << "\nis not in\n" << said_;
+    EXPECT_THAT(said_, HasSubstr(words)) << words << "\nis not in\n";
   }
 
   void expect_used(const std::string& words) { expect_in_list(words, false); }
@@ -83,7 +78,7 @@ TEST_F(Check, RemarksThatBothFoldersOfTakesAreOnOneDisk) {
   ASSERT_EQ(check("[recording]\nsecond_directory='more'\n"), 0) << said_;
   expect_said("recording.second_directory is now on the same disk as recording.directory");
   ASSERT_EQ(check("[recording]\nsecond_directory='/dev/shm/takes'\n"), 0) << said_;
-  EXPECT_EQ(said_.find("second_directory"), std::string::npos) << said_;
+  EXPECT_THAT(said_, Not(HasSubstr("second_directory")));
 }
 
 TEST_F(Check, RefusesAFolderOfTakesThatIsAFile) {
@@ -135,7 +130,7 @@ TEST_F(Check, RemarksOnMemoryTooSmallForThePreRoll) {
   expect_said("recording.preroll_s = 10: this needs about 1.04 GB of memory and there are 500 MB");
   expect_said("begins about 4.8 s before the button");
   ASSERT_EQ(check(with("preroll_s = 4\nqueue_mb = 1000\n")), 0) << said_;
-  EXPECT_EQ(said_.find("preroll_s"), std::string::npos) << said_;
+  EXPECT_THAT(said_, Not(HasSubstr("preroll_s")));
   ASSERT_EQ(check(with("queue_mb = 1e6\n")), 0) << said_;
   expect_said("recording.queue_mb = 1e+06: this computer has ");
 }
@@ -227,7 +222,7 @@ TEST_F(Check, SaysHowMuchMemoryFramesTakeThatAreAveraged) {
   expect_said("picture in the GPU's memory: about 1155 MiB");
   for (const char* quality : {"neighbours=0\n", "denoise=false\n"}) {
     ASSERT_EQ(check(lens + "[quality]\n" + quality), 0) << said_;
-    EXPECT_EQ(said_.find(words), std::string::npos) << said_;
+    EXPECT_THAT(said_, Not(HasSubstr(words)));
   }
   expect_said("picture in the GPU's memory: about 823 MiB");
 }
@@ -356,7 +351,7 @@ TEST_F(Check, TheExampleIsRightAsCopied) {
                         std::filesystem::copy_options::recursive);
   std::ostringstream out;
   EXPECT_EQ(check_set(directory_ / "my_set.toml", out), 0) << out.str();
-  EXPECT_EQ(out.str().find("[observer"), std::string::npos) << out.str();  // nothing is odd
+  EXPECT_THAT(out.str(), Not(HasSubstr("[observer")));  // nothing is odd
 }
 
 TEST_F(Check, RefusesWithEveryProblemOfTheSetFile) {
@@ -383,7 +378,7 @@ TEST_F(Check, RefusesWithEveryFileThatIsWrong) {
 TEST_F(Check, RefusesWhatIsNotThere) {
   std::ostringstream out;
   EXPECT_EQ(check_set(directory_ / "no.toml", out), 1);
-  EXPECT_NE(out.str().find("no.toml"), std::string::npos) << out.str();
+  EXPECT_THAT(out.str(), HasSubstr("no.toml"));
   EXPECT_EQ(check_set(directory_.path(), out), 1);  // a folder that is no session
 }
 
@@ -424,5 +419,4 @@ TEST_F(Check, LoadsTheRoom) {
             0);
 }
 
-}  // namespace check_test
-}  // namespace previz::post
+}  // namespace previz::post::check_test

@@ -2,12 +2,10 @@
 // same folder open.
 #include "daemon/post/frames_to_render.hpp"
 
-#include <gtest/gtest.h>
-
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::post {
-namespace frames_to_render_test {
+namespace previz::post::frames_to_render_test {
 
 std::set<std::uint64_t> frames_from(std::uint64_t first, std::uint64_t end) {
   std::set<std::uint64_t> frames;
@@ -84,5 +82,4 @@ TEST_F(FramesToRenderTest, AFrameThatCannotBeReadIsNobodys) {
   }
 }
 
-}  // namespace frames_to_render_test
-}  // namespace previz::post
+}  // namespace previz::post::frames_to_render_test

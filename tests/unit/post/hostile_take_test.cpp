@@ -1,15 +1,8 @@
 // A take comes from elsewhere: whatever lies in its folder, nobody else's file is read or written,
 // nobody waits for ever, and what is no file is named.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
-
-#include <filesystem>
-#include <fstream>
-#include <functional>
-#include <sstream>
 
 #include "daemon/output/salvage.hpp"
 #include "daemon/pipeline/take.hpp"
@@ -19,14 +12,11 @@
 #include "drivers/session/summary.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::post {
-namespace hostile_take_test {
+namespace previz::post::hostile_take_test {
 
 namespace fs = std::filesystem;
-using testing::AllOf;
-using testing::HasSubstr;
-using testing::Not;
 
 // What may stand in the place of a take's file.
 struct Stranger {
@@ -215,5 +205,4 @@ TEST(TakesCopy, RemovesWhatADeadCopyLeft) {
   EXPECT_TRUE(fs::exists(disk / "session/observer.mkv"));
 }
 
-}  // namespace hostile_take_test
-}  // namespace previz::post
+}  // namespace previz::post::hostile_take_test

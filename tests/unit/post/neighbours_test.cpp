@@ -1,12 +1,5 @@
 // `previzd render` of pictures that are averaged with their neighbours in time, on a small take:
 // whatever part of it is rendered, and by whom, the files are the same.
-#include <gtest/gtest.h>
-
-#include <fstream>
-#include <map>
-#include <sstream>
-#include <thread>
-
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/pipeline/render_stage.hpp"
@@ -18,9 +11,9 @@
 #include "drivers/plate.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::post {
-namespace neighbours_test {
+namespace previz::post::neighbours_test {
 
 using test::small_take_frames;
 using test::small_take_lost;
@@ -67,7 +60,7 @@ class RenderNeighbours : public testing::Test {
 TEST_F(RenderNeighbours, EveryPartOfATakeHasTheFilesOfTheWhole) {
   test::write_small_take(directory_.path());
   const RenderReport whole = render("whole");
-  EXPECT_NE(out_.find("denoised, over 2 frames on either side"), std::string::npos) << out_;
+  EXPECT_THAT(out_, HasSubstr("denoised, over 2 frames on either side"));
   ASSERT_EQ(whole.frames.size(), std::size_t{small_take_frames});
   const Sums expected = sums_of(whole);
   EXPECT_EQ(expected.size(), 2u * small_take_frames);
@@ -144,8 +137,8 @@ TEST_F(RenderNeighbours, AFrameThatCannotBeReadIsNobodys) {
     ASSERT_TRUE(of_another);
     EXPECT_TRUE(of_another->frames.empty());
     EXPECT_EQ(of_another->at_others, 0u) << out_;
-    EXPECT_NE(out_.find("the frame is skipped"), std::string::npos) << out_;
-    EXPECT_EQ(out_.find("left unfinished"), std::string::npos) << out_;
+    EXPECT_THAT(out_, HasSubstr("the frame is skipped"));
+    EXPECT_THAT(out_, Not(HasSubstr("left unfinished")));
   }
 }
 
@@ -154,7 +147,7 @@ TEST_F(RenderNeighbours, AFrameThatCannotBeReadIsNobodys) {
 TEST_F(RenderNeighbours, WithoutNeighboursAFrameStandsAlone) {
   test::write_small_take(directory_.path());
   render("alone", FrameRange{5, 5}, 0);
-  EXPECT_EQ(content_of("alone/render.json").find("\"neighbours\""), std::string::npos);
+  EXPECT_THAT(content_of("alone/render.json"), Not(HasSubstr("\"neighbours\"")));
   const pipeline::Take take = pipeline::open_take(directory_ / "session", {});
   const scene::Scene scene = scene::load_scene(take.set);
   pipeline::RenderStageOptions with_layers;
@@ -168,7 +161,7 @@ TEST_F(RenderNeighbours, WithoutNeighboursAFrameStandsAlone) {
   EXPECT_THROW(render("alone", FrameRange{6, 6}, 2), Error);
   EXPECT_EQ(render("alone", FrameRange{5, 6}, 0).found_finished, 1u);
   render("among", FrameRange{5, 5}, 2);
-  EXPECT_NE(content_of("among/render.json").find("\"neighbours\": 2"), std::string::npos);
+  EXPECT_THAT(content_of("among/render.json"), HasSubstr("\"neighbours\": 2"));
   EXPECT_THROW(render("among", FrameRange{6, 6}, 0), Error);
 }
 
@@ -182,8 +175,7 @@ TEST_F(RenderNeighbours, WhatDoesNotFitIntoMemoryIsRefusedBeforeAnyFrameIsRender
     FAIL() << "rendered";
   } catch (const Error& error) {
     const std::string words = error.what();
-    EXPECT_NE(words.find("quality.neighbours = 2: to average 5 frames of 48x36"), std::string::npos)
-        << words;
+    EXPECT_THAT(words, HasSubstr("quality.neighbours = 2: to average 5 frames of 48x36"));
   }
   EXPECT_EQ(content_of("out/frames.jsonl"), "");
   options.neighbours = 0;
@@ -199,9 +191,8 @@ TEST_F(RenderNeighbours, TheSetMayAskForUpToFour) {
     render("out");
     FAIL() << "five neighbours on either side";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("0 to 4"), std::string::npos) << error.what();
+    EXPECT_THAT(error.what(), HasSubstr("0 to 4"));
   }
 }
 
-}  // namespace neighbours_test
-}  // namespace previz::post
+}  // namespace previz::post::neighbours_test

@@ -2,17 +2,10 @@
 #include "daemon/post/render_directory.hpp"
 
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
-#include <cerrno>
 #include <csignal>
-#include <fstream>
-#include <set>
-#include <sstream>
-#include <thread>
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
@@ -24,9 +17,9 @@
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_shot.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::post {
-namespace render_directory_test {
+namespace previz::post::render_directory_test {
 
 using session::content_of, session::write_content;
 
@@ -225,10 +218,10 @@ TEST_F(RenderDirectoryTest, OtherSettingsAreRefusedByNameUnlessForced) {
     FAIL() << "no error";
   } catch (const Error& error) {
     const std::string message = error.what();
-    EXPECT_NE(message.find("render.json"), std::string::npos) << message;
-    EXPECT_NE(message.find("samples is 16 there and 64 now"), std::string::npos) << message;
-    EXPECT_NE(message.find("set differs"), std::string::npos) << message;
-    EXPECT_NE(message.find("--force"), std::string::npos) << message;
+    EXPECT_THAT(message, HasSubstr("render.json"));
+    EXPECT_THAT(message, HasSubstr("samples is 16 there and 64 now"));
+    EXPECT_THAT(message, HasSubstr("set differs"));
+    EXPECT_THAT(message, HasSubstr("--force"));
   }
   EXPECT_EQ(open(other, true).finished(0), nullptr);
   EXPECT_NO_THROW(open(other));
@@ -269,7 +262,7 @@ TEST_F(RenderDirectoryTest, WhatAnotherHasIsNamedWithWho) {
   EXPECT_EQ(first.claim(12), Claim::mine);
   RenderDirectory second = open();
   ASSERT_EQ(second.notes().size(), 1u);
-  EXPECT_NE(second.notes()[0].find("also at work here: previzd"), std::string::npos);
+  EXPECT_THAT(second.notes()[0], HasSubstr("also at work here: previzd"));
   EXPECT_EQ(second.claim(7), Claim::at_another);
   EXPECT_EQ(second.claim(8), Claim::mine);
   const auto held = second.at_others({7, 8, 9, 12});
@@ -327,7 +320,7 @@ TEST_F(RenderDirectoryTest, FramesOfAKilledProcessAreFreeAgain) {
   EXPECT_NE(again.finished(0), nullptr);
   EXPECT_NE(again.finished(3), nullptr);
   ASSERT_EQ(again.notes().size(), 2u);
-  EXPECT_NE(again.notes()[0].find(".0003.exr."), std::string::npos) << again.notes()[0];
+  EXPECT_THAT(again.notes()[0], HasSubstr(".0003.exr."));
 }
 
 TEST_F(RenderDirectoryTest, OtherSettingsAreRefusedWhileAnotherIsAtWorkEvenIfForced) {
@@ -338,7 +331,7 @@ TEST_F(RenderDirectoryTest, OtherSettingsAreRefusedWhileAnotherIsAtWorkEvenIfFor
   running.write(sample_shot(0), set_);
   const RenderDirectory forced = open(settings, true);  // would take from it what it has finished
   EXPECT_NE(forced.finished(0), nullptr);
-  EXPECT_NE(forced.notes().back().find("--force is ignored"), std::string::npos);
+  EXPECT_THAT(forced.notes().back(), HasSubstr("--force is ignored"));
 }
 
 TEST_F(RenderDirectoryTest, ForceOfAFewFramesKeepsTheLinesOfTheOthers) {
@@ -395,7 +388,7 @@ TEST(FolderLocks, WithoutLocksOfTheFileSystemEveryClaimSucceedsAndThatIsSaid) {
     errno = EOPNOTSUPP;
     return -1;
   });
-  EXPECT_NE(locks.missing().find("the file system has no locks"), std::string::npos);
+  EXPECT_THAT(locks.missing(), HasSubstr("the file system has no locks"));
   const FolderLocks::Transaction transaction(locks);
   locks.join();
   EXPECT_TRUE(locks.claim(3));
@@ -413,7 +406,7 @@ TEST_F(RenderDirectoryTest, VideoIsMadeOfThePicturesInOrder) {
   std::ostringstream out;
   const std::filesystem::path video = directory.write_video(frames, out);
   EXPECT_GT(std::filesystem::file_size(video), 0u);
-  EXPECT_NE(out.str().find("3 pictures"), std::string::npos);
+  EXPECT_THAT(out.str(), HasSubstr("3 pictures"));
 }
 
 TEST(FrameRange, ReadsWhatTheHelpSays) {
@@ -426,5 +419,4 @@ TEST(FrameRange, ReadsWhatTheHelpSays) {
     EXPECT_THROW(parse_frame_range(wrong), Error) << wrong;
 }
 
-}  // namespace render_directory_test
-}  // namespace previz::post
+}  // namespace previz::post::render_directory_test

@@ -2,16 +2,7 @@
 // there is (Mesa's CPU driver where there is no GPU).
 #include "daemon/post/render.hpp"
 
-#include <gtest/gtest.h>
-
-#include <atomic>
-#include <fstream>
-#include <functional>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
-#include <sstream>
-#include <thread>
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
@@ -21,10 +12,10 @@
 #include "drivers/plate.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::post {
-namespace render_test {
+namespace previz::post::render_test {
 
 using test::small_take_frame;
 using test::small_take_frames;
@@ -103,9 +94,9 @@ TEST_F(RenderSession, EveryFrameHasItsFilesAndItsRecord) {
     EXPECT_EQ(record.counters.dropped_negative, 0u);
     EXPECT_EQ(record.counters.stopped_in_layers, 0u);
   }
-  EXPECT_NE(report.frames[small_take_lost].reason.find("pose lost"), std::string::npos);
-  EXPECT_NE(report.frames[small_take_unlit].reason.find("light"), std::string::npos);
-  EXPECT_NE(out_.str().find("plate untouched"), std::string::npos);
+  EXPECT_THAT(report.frames[small_take_lost].reason, HasSubstr("pose lost"));
+  EXPECT_THAT(report.frames[small_take_unlit].reason, HasSubstr("light"));
+  EXPECT_THAT(out_.str(), HasSubstr("plate untouched"));
   EXPECT_EQ(report.frames.back().light_frames.size(), 3u);  // one of each exposure
 }
 
@@ -135,7 +126,7 @@ TEST_F(RenderSession, AnAdaptivePictureSaysSoAndIsNoOther) {
   std::vector<pipeline::Shot> shots;
   options.on_frame = [&](const pipeline::Shot& shot) { shots.push_back(shot); };
   render(options);
-  EXPECT_NE(out_.str().find("64 samples on average"), std::string::npos) << out_.str();
+  EXPECT_THAT(out_.str(), HasSubstr("64 samples on average"));
   EXPECT_GT(shots.at(0).samples, 64);  // where it was noisy
   EXPECT_EQ(shots.at(0).samples, shots.at(0).layers->samples);
   options.adaptive = false;
@@ -143,7 +134,7 @@ TEST_F(RenderSession, AnAdaptivePictureSaysSoAndIsNoOther) {
   options.samples = 16;
   options.adaptive = options.force = true;
   render(options);
-  EXPECT_NE(out_.str().find("16 samples, the same for every pixel"), std::string::npos);
+  EXPECT_THAT(out_.str(), HasSubstr("16 samples, the same for every pixel"));
 }
 
 TEST_F(RenderSession, ADenoisedPictureSaysSoAndItsOtherLayersAreAsRendered) {
@@ -160,7 +151,7 @@ TEST_F(RenderSession, ADenoisedPictureSaysSoAndItsOtherLayersAreAsRendered) {
   EXPECT_THROW(render(options), Error);  // what is there already was made otherwise
   options.force = true;
   render(options);
-  EXPECT_NE(out_.str().find("2 samples, denoised"), std::string::npos) << out_.str();
+  EXPECT_THAT(out_.str(), HasSubstr("2 samples, denoised"));
   EXPECT_NE(output::read_png(directory_ / "out/0001.png").samples, noisy.samples);
   EXPECT_NE(seen.at(1).composite, seen.at(0).composite);
   EXPECT_EQ(seen.at(1).mixed, seen.at(0).mixed);
@@ -291,8 +282,7 @@ TEST_F(RenderSession, ASmallerPictureIsAnotherOne) {
     render(options);
     FAIL() << "pictures of two sizes in one folder";
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("scale is 0.5 there and 1.0 now"), std::string::npos)
-        << error.what();
+    EXPECT_THAT(error.what(), HasSubstr("scale is 0.5 there and 1.0 now"));
   }
 }
 
@@ -444,7 +434,7 @@ TEST_F(RenderSession, LiveFillsTheLightFromTheFilmCamera) {
   const auto stopper = stop_when("a picture has light", is_lit, stop);
   const pipeline::MetricsSnapshot metrics = rig::run_live(options, reports_);
   EXPECT_GT(metrics.stages.at("lighting").frames, 0u);
-  EXPECT_NE(out_.str().find("filled by the rule \"observer\""), std::string::npos) << out_.str();
+  EXPECT_THAT(out_.str(), HasSubstr("filled by the rule \"observer\""));
 }
 
 TEST_F(RenderSession, LiveStopsWhenAsked) {
@@ -458,5 +448,4 @@ TEST_F(RenderSession, LiveStopsWhenAsked) {
   EXPECT_GT(rig::run_live(options, reports_).stages.at("display").frames, 0u);
 }
 
-}  // namespace render_test
-}  // namespace previz::post
+}  // namespace previz::post::render_test

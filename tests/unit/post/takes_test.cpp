@@ -1,14 +1,6 @@
 // Takes are listed, marked, checked, copied and deleted, and nothing else is.
 #include "daemon/post/takes.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-
 #include "daemon/output/take_folders.hpp"
 #include "daemon/output/take_list.hpp"
 #include "daemon/post/render_folder.hpp"
@@ -19,13 +11,11 @@
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::post {
-namespace takes_test {
+namespace previz::post::takes_test {
 
 namespace fs = std::filesystem;
-using testing::HasSubstr;
-using testing::Not;
 
 class Takes : public testing::Test {
  protected:
@@ -53,12 +43,7 @@ class Takes : public testing::Test {
 
   template <typename Call>
   static std::string refusal(const Call& call) {
-    try {
-      call();
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    return test::error_of([&] { call(); });
   }
 
   void replace_in_toml(const std::string& take, const std::string& from, const std::string& to) {
@@ -356,5 +341,4 @@ TEST_F(Takes, GoodOnesAreRenderedIntoAFolderEach) {
   EXPECT_FALSE(fs::exists(directory_ / "renders/12A_take001"));
 }
 
-}  // namespace takes_test
-}  // namespace previz::post
+}  // namespace previz::post::takes_test

@@ -1,15 +1,6 @@
 // What `previzd print` draws, rasterised as a printer would: ids, sizes and places in millimetres.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
-#include <glm/geometric.hpp>
-#include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <sstream>
 
 #include "daemon/calibrate/lens/board_finder.hpp"
 #include "daemon/print/boards.hpp"
@@ -22,10 +13,10 @@
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
-namespace previz::print {
-namespace print_test {
+namespace previz::print::print_test {
 
 using ::testing::HasSubstr;
 
@@ -247,12 +238,7 @@ TEST_F(Print, TheRulerIsAsLongAsItSays) {
 
 template <typename Action>
 std::string refused(const Action& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return test::error_of([&] { action(); });
 }
 
 TEST(PrintRefusals, SayWhatIsPossible) {
@@ -294,5 +280,4 @@ TEST(PrintReport, SaysWhatIsInTheFile) {
   EXPECT_THAT(session::read_file(tags.file), ::testing::StartsWith("%PDF-"));
 }
 
-}  // namespace print_test
-}  // namespace previz::print
+}  // namespace previz::print::print_test

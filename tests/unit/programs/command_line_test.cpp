@@ -1,12 +1,11 @@
 // What the command line leaves to the set file, and what it does not.
 #include "daemon/command_line.hpp"
 
-#include <gtest/gtest.h>
-
 #include <CLI/CLI.hpp>
 
-namespace previz {
-namespace command_line_test {
+#include "tests/support/test.hpp"
+
+namespace previz::command_line_test {
 
 post::RenderOptions render_options(const std::string& arguments) {
   CLI::App app;
@@ -94,5 +93,4 @@ TEST(CommandLine, TakesAreNamed) {
   EXPECT_TRUE(parsed("takes check one").takes.repaired.empty());
 }
 
-}  // namespace command_line_test
-}  // namespace previz
+}  // namespace previz::command_line_test

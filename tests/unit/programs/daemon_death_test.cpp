@@ -1,25 +1,20 @@
 // The whole daemon in the middle of a take: killed, and on a disk that runs full.
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <csignal>
-#include <fstream>
-#include <functional>
 #include <nlohmann/json.hpp>
-#include <string>
 
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz {
-namespace daemon_death_test {
+namespace previz::daemon_death_test {
 
 using session::content_of;
 
@@ -181,5 +176,4 @@ TEST_F(DaemonOnASmallDisk, FilledBySomebodyElseTheTakeIsReadableAndItGoesOn) {
   expect_that_it_goes_on();
 }
 
-}  // namespace daemon_death_test
-}  // namespace previz
+}  // namespace previz::daemon_death_test

@@ -1,22 +1,12 @@
 // The udev rules that `previzd devices --rules` prints, of devices as the kernel lists them.
 #include "daemon/device_rules.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <filesystem>
-#include <fstream>
-#include <sstream>
-#include <string>
-
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace device_rules_test {
+namespace previz::device_rules_test {
 
 namespace fs = std::filesystem;
-using testing::HasSubstr;
-using testing::Not;
 
 class DeviceRules : public testing::Test {
  protected:
@@ -81,5 +71,4 @@ TEST_F(DeviceRules, WithoutDevicesThereAreNone) {
   EXPECT_THAT(rules(), Not(HasSubstr("SUBSYSTEM")));
 }
 
-}  // namespace device_rules_test
-}  // namespace previz
+}  // namespace previz::device_rules_test

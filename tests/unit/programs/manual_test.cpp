@@ -1,13 +1,5 @@
 // The manual pages and the completions say what the programs do.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cstdio>
-#include <fstream>
-#include <memory>
-#include <sstream>
 
 #include "daemon/calibrate/lens/board.hpp"
 #include "daemon/command_line.hpp"
@@ -16,14 +8,11 @@
 #include "daemon/set/actions.hpp"
 #include "daemon/set/table.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::manual {
-namespace manual_test {
+namespace previz::manual::manual_test {
 
 using test::TemporaryDirectory;
-using testing::Contains;
-using testing::ElementsAre;
-using testing::HasSubstr;
 using testing::IsSupersetOf;
 
 TEST(ManualCommands, AreReadOffTheParser) {
@@ -179,5 +168,4 @@ TEST(BashCompletion, AsksPrevizctlForTheActions) {
   for (const char* action : set::action_names()) EXPECT_THAT(offers, Contains(action));
 }
 
-}  // namespace manual_test
-}  // namespace previz::manual
+}  // namespace previz::manual::manual_test

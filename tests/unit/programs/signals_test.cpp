@@ -1,16 +1,14 @@
 // SIGINT and SIGTERM become a stop request that the pipeline sees.
 #include "daemon/signals.hpp"
 
-#include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <atomic>
 #include <csignal>
 
 #include "daemon/pipeline/stages.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz {
-namespace signals_test {
+namespace previz::signals_test {
 
 TEST(StopOnSignal, EitherSignalStopsARunningPipeline) {
   for (const int signal : {SIGINT, SIGTERM}) {
@@ -49,5 +47,4 @@ TEST(StopOnSignalDeathTest, ASecondSignalEndsTheProcessAtOnce) {
       testing::ExitedWithCode(128 + SIGINT), "");
 }
 
-}  // namespace signals_test
-}  // namespace previz
+}  // namespace previz::signals_test

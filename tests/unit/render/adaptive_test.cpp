@@ -5,8 +5,7 @@
 #include "daemon/render/error_estimate.hpp"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace adaptive_test {
+namespace previz::test::adaptive_test {
 
 View small_set() {
   RandomScene options;
@@ -261,5 +260,4 @@ TEST(Adaptive, StoppingAtAnErrorLosesNoLight) {
   EXPECT_LT(std::abs(stopped.mean() - truth), 4 * standard_error);
 }
 
-}  // namespace adaptive_test
-}  // namespace previz::test
+}  // namespace previz::test::adaptive_test

@@ -1,16 +1,10 @@
 // The tables of directional albedo against an independent quadrature.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <glm/vec3.hpp>
-
 #include "daemon/render/albedo_table.hpp"
 #include "shaders/lib/render_shared.h"
+#include "tests/support/test.hpp"
 #include "tests/truth/cpu_albedo.hpp"
 
-namespace previz::render {
-namespace albedo_test {
+namespace previz::render::albedo_test {
 
 // Reads a table as the shader does, at a column and a row from 0 to 1.
 double interpolate(const AlbedoTable& tables, double across, double down, std::size_t table = 0) {
@@ -116,5 +110,4 @@ TEST(AlbedoTable, AMirrorLosesNothing) {
     EXPECT_NEAR(table[column], 1, 1e-3);
 }
 
-}  // namespace albedo_test
-}  // namespace previz::render
+}  // namespace previz::render::albedo_test

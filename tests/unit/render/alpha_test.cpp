@@ -4,8 +4,7 @@
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace alpha_test {
+namespace previz::test::alpha_test {
 
 constexpr double albedo = 0.6;
 constexpr float veil_alpha = 0.25f;
@@ -103,5 +102,4 @@ TEST(Alpha, RaysThroughTooManyVeilsAreCounted) {
   EXPECT_GE(result.counters.stopped_in_layers, 32u * 32u);  // and of the scattered rays, a few
 }
 
-}  // namespace alpha_test
-}  // namespace previz::test
+}  // namespace previz::test::alpha_test

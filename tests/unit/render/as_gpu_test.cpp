@@ -6,8 +6,7 @@
 #include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace as_gpu_test {
+namespace previz::test::as_gpu_test {
 
 constexpr int width = 48, height = 36;
 
@@ -122,5 +121,4 @@ TEST(AsGpu, AMissingBarrierIsHeard) {
   EXPECT_GT(render::validation_messages(*device), 0u);
 }
 
-}  // namespace as_gpu_test
-}  // namespace previz::test
+}  // namespace previz::test::as_gpu_test

@@ -7,8 +7,7 @@
 #include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace camera_test {
+namespace previz::test::camera_test {
 
 constexpr int width = 48, height = 36;
 constexpr double white = 4;  // of the sensor, whose response is linear with 16 bits
@@ -319,5 +318,4 @@ TEST(CameraRadiance, WithoutAPlateAllIsTraced) {
             render_view(view, 4, traced).layers.mixed);
 }
 
-}  // namespace camera_test
-}  // namespace previz::test
+}  // namespace previz::test::camera_test

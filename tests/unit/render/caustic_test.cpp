@@ -8,8 +8,7 @@
 #include "daemon/render/photon_schedule.hpp"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace caustic_test {
+namespace previz::test::caustic_test {
 
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.6;
@@ -403,5 +402,4 @@ TEST(PhotonCount, IsKeptWithinWhatAPassCanHold) {
   EXPECT_EQ(render::photon_count(10, 8192, 4320, 131072), 131072u);
 }
 
-}  // namespace caustic_test
-}  // namespace previz::test
+}  // namespace previz::test::caustic_test

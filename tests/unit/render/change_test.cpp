@@ -11,8 +11,7 @@
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace change_test {
+namespace previz::test::change_test {
 
 using render::least_frames, render::most_frames;
 
@@ -276,5 +275,4 @@ TEST(LocalHistory, ShowsNoGhostOfWhatHasJumped) {
   }
 }
 
-}  // namespace change_test
-}  // namespace previz::test
+}  // namespace previz::test::change_test

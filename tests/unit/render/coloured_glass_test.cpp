@@ -6,8 +6,7 @@
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace coloured_glass_test {
+namespace previz::test::coloured_glass_test {
 
 constexpr double thickness_m = 0.25, attenuation_distance_m = 0.5;
 const glm::dvec3 colour(0.2f, 0.5f, 1);
@@ -208,5 +207,4 @@ TEST(ColouredGlass, ColoursTheLightOfALampInside) {
   expect_floor_lit_through_slab(0.45);
 }
 
-}  // namespace coloured_glass_test
-}  // namespace previz::test
+}  // namespace previz::test::coloured_glass_test

@@ -3,8 +3,7 @@
 #include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace composite_test {
+namespace previz::test::composite_test {
 
 Plate show(const View& view, const Plate& plate, int samples) {
   SetRenderer renderer(view);
@@ -265,5 +264,4 @@ TEST(Lens, DefocusIsTheCircleOfConfusion) {
   expect_clean(result.counters);
 }
 
-}  // namespace composite_test
-}  // namespace previz::test
+}  // namespace previz::test::composite_test

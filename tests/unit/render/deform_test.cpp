@@ -11,8 +11,7 @@
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace deform_test {
+namespace previz::test::deform_test {
 
 constexpr int joints = 6;
 
@@ -420,5 +419,4 @@ TEST(Deforming, AKeptFrameIsInItsShapesAgain) {
   EXPECT_NE(idle.show_among(frames, true).samples, expected.samples);
 }
 
-}  // namespace deform_test
-}  // namespace previz::test
+}  // namespace previz::test::deform_test

@@ -7,8 +7,7 @@
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/figure.hpp"
 
-namespace previz::test {
-namespace deforming_history_test {
+namespace previz::test::deforming_history_test {
 
 constexpr int joints = 3;
 constexpr int many = 256;  // samples
@@ -105,5 +104,4 @@ TEST(MostMoved, BoundsHowFarAPointMoves) {
   }
 }
 
-}  // namespace deforming_history_test
-}  // namespace previz::test
+}  // namespace previz::test::deforming_history_test

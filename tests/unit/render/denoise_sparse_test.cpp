@@ -3,8 +3,7 @@
 
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace denoise_sparse_test {
+namespace previz::test::denoise_sparse_test {
 
 // Returns the denoised signal of side * side pixels. With `has_history` the variances have numbers
 // of samples in their fourth component; otherwise the pixels have a single sample. Light of photons
@@ -96,5 +95,4 @@ TEST(DenoiseSparse, KeepsAFocusOfPhotonsAndEvensOutFewOfThem) {
   EXPECT_LT(square / half, 0.1 * 0.9 * 0.01 / 10);
 }
 
-}  // namespace denoise_sparse_test
-}  // namespace previz::test
+}  // namespace previz::test::denoise_sparse_test

@@ -6,8 +6,7 @@
 #include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace denoise_test {
+namespace previz::test::denoise_test {
 
 constexpr int width = 96, height = 80;
 
@@ -558,5 +557,4 @@ TEST(Denoise, BringsARenderedPictureNearerToItsLimit) {
   }
 }
 
-}  // namespace denoise_test
-}  // namespace previz::test
+}  // namespace previz::test::denoise_test

@@ -1,13 +1,11 @@
 // What a device does not allow is said with both numbers, before a driver is asked for it.
 #include "daemon/render/device_limits.hpp"
 
-#include <gtest/gtest.h>
-
 #include "daemon/render/device.hpp"
 #include "tests/support/render_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace device_limits_test {
+namespace previz::test::device_limits_test {
 
 using render::DeviceLimits, render::past_limits, render::SpirvInfo;
 
@@ -86,11 +84,10 @@ TEST(DeviceLimits, OfThisDeviceRefuseABufferByName) {
     FAIL() << "it was created";
   } catch (const Error& error) {
     const std::string words = error.what();
-    EXPECT_NE(words.find(device.name()), std::string::npos) << words;
-    EXPECT_NE(words.find(std::to_string(allows.texels)), std::string::npos) << words;
+    EXPECT_THAT(words, HasSubstr(device.name()));
+    EXPECT_THAT(words, HasSubstr(std::to_string(allows.texels)));
   }
   EXPECT_EQ(render::validation_messages(device), 0u);
 }
 
-}  // namespace device_limits_test
-}  // namespace previz::test
+}  // namespace previz::test::device_limits_test

@@ -4,8 +4,7 @@
 #include "daemon/scene/placement.hpp"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace direct_light_test {
+namespace previz::test::direct_light_test {
 
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.6;
@@ -230,5 +229,4 @@ TEST(DirectLight, ATintIsNoNoisierThanAGain) {
   }
 }
 
-}  // namespace direct_light_test
-}  // namespace previz::test
+}  // namespace previz::test::direct_light_test

@@ -8,8 +8,7 @@
 #include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace dither_test {
+namespace previz::test::dither_test {
 
 TEST(BlueNoise, HasEveryThresholdOnceAndIsTheSameEachTime) {
   constexpr int side = 16;
@@ -104,5 +103,4 @@ TEST(Dithering, LeavesThePlateBitForBitWhereTheWorldsAreTheSame) {
     EXPECT_EQ(shown(view, bits, true).samples, even_plate(bits).samples);
 }
 
-}  // namespace dither_test
-}  // namespace previz::test
+}  // namespace previz::test::dither_test

@@ -5,8 +5,7 @@
 #include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace edge_test {
+namespace previz::test::edge_test {
 
 constexpr int width = 40, height = 30, scrambles = 16;
 // The sensor's white; its response is linear with 16 bits, so rounding leaves 1e-5 of it.
@@ -119,5 +118,4 @@ TEST(Edges, AreSeamlessOutOfFocus) {
   expect_seamless(view, set::Estimator::difference);
 }
 
-}  // namespace edge_test
-}  // namespace previz::test
+}  // namespace previz::test::edge_test

@@ -1,21 +1,10 @@
 // When a frame needs which feature of the renderer, and what `previzd check` can say of each.
 #include "daemon/render/feature.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <bit>
-#include <fstream>
-#include <iterator>
-#include <limits>
-#include <regex>
-#include <set>
-#include <string>
-
 #include "tests/support/scenes.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace feature_test {
+namespace previz::test::feature_test {
 
 class Features : public ::testing::Test {
  protected:
@@ -388,5 +377,4 @@ TEST_F(Features, ReadTheSet) {
   EXPECT_TRUE(needs("camera's light"));
 }
 
-}  // namespace feature_test
-}  // namespace previz::test
+}  // namespace previz::test::feature_test

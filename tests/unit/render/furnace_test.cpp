@@ -4,8 +4,7 @@
 
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace furnace_test {
+namespace previz::test::furnace_test {
 
 constexpr double pi = std::numbers::pi;
 
@@ -232,5 +231,4 @@ TEST(Furnace, TwoFacingPlanesSumTheirInterreflections) {
   EXPECT_NEAR(mean_mixed(result.layers), 1 / (1 - 0.48), tolerance(result.layers) + 1e-4);
 }
 
-}  // namespace furnace_test
-}  // namespace previz::test
+}  // namespace previz::test::furnace_test

@@ -8,8 +8,7 @@
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace history_test {
+namespace previz::test::history_test {
 
 constexpr int width = averaged_width, height = averaged_height;
 
@@ -410,5 +409,4 @@ TEST(History, OfTheLightIsComparedByWhatArrives) {
   EXPECT_GT(render::change_of_lamps(one, {key}), 1);
 }
 
-}  // namespace history_test
-}  // namespace previz::test
+}  // namespace previz::test::history_test

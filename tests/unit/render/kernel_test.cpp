@@ -10,8 +10,7 @@
 #include "shaders/prepare_shadow.spv.h"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace kernel_test {
+namespace previz::test::kernel_test {
 
 using render::Buffer;
 using render::Buffers;
@@ -162,5 +161,4 @@ TEST(Programs, AreCompiledAnewForAReopenedDevice) {
   EXPECT_EQ(device.validation_messages(), 0u);
 }
 
-}  // namespace kernel_test
-}  // namespace previz::test
+}  // namespace previz::test::kernel_test

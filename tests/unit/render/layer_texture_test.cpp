@@ -6,8 +6,7 @@
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace layer_texture_test {
+namespace previz::test::layer_texture_test {
 
 using scene::Material;
 
@@ -224,5 +223,4 @@ TEST(TextureMappings, ReadEachTextureByItsOwn) {
   EXPECT_NE(picture(by_other), picture(as_turned));
 }
 
-}  // namespace layer_texture_test
-}  // namespace previz::test
+}  // namespace previz::test::layer_texture_test

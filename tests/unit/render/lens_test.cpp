@@ -6,8 +6,7 @@
 #include "drivers/calibration/pinhole.hpp"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace lens_test {
+namespace previz::test::lens_test {
 
 // The corners of the picture are 0.82 off the axis.
 PinholeIntrinsics lens_of(double k1, double k4) {
@@ -73,5 +72,4 @@ TEST(LensRays, AreRefusedOfHostileNumbers) {
     }
 }
 
-}  // namespace lens_test
-}  // namespace previz::test
+}  // namespace previz::test::lens_test

@@ -1,20 +1,15 @@
 // From how wide a solid angle light comes, which decides where directions towards objects are worth
 // their work, and how samples are shared between the sky and the lamps.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdio>
 #include <glm/ext/matrix_transform.hpp>
-#include <numbers>
 
 #include "daemon/render/bounds.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/gpu_lights.hpp"
 #include "daemon/render/scene_lights.hpp"
 #include "tests/support/render_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace light_spread_test {
+namespace previz::test::light_spread_test {
 
 // Texels that `lit` picks by their direction, the others as bright as `rest`.
 lighting::EnvironmentMap map_of(int size, const auto& lit, float rest = 0) {
@@ -329,5 +324,4 @@ TEST(DifferenceRoulette, NeverRaisesAPathAboveTenTimesItsLight) {
   EXPECT_GT(most, 0);
 }
 
-}  // namespace light_spread_test
-}  // namespace previz::test
+}  // namespace previz::test::light_spread_test

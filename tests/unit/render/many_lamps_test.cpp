@@ -1,15 +1,11 @@
 // A thousand lamps of which few reach a point: what their light samples find, and how noisily.
-#include <gmock/gmock.h>
-
 #include <glm/ext/matrix_transform.hpp>
-#include <glm/geometric.hpp>
-#include <numbers>
 
 #include "daemon/render/emission_weights.hpp"
 #include "tests/support/render_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace many_lamps_test {
+namespace previz::test::many_lamps_test {
 
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.6;
@@ -427,5 +423,4 @@ TEST(ManyLamps, AreSeenAsEachByItself) {
   EXPECT_GT(brightest, 5);
 }
 
-}  // namespace many_lamps_test
-}  // namespace previz::test
+}  // namespace previz::test::many_lamps_test

@@ -7,8 +7,7 @@
 
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace material_test {
+namespace previz::test::material_test {
 
 constexpr double pi = std::numbers::pi;
 
@@ -311,5 +310,4 @@ TEST(ColouredGloss, TakesColoursAboveOne) {
   EXPECT_NEAR(seen.b, 0, 1e-5);
 }
 
-}  // namespace material_test
-}  // namespace previz::test
+}  // namespace previz::test::material_test

@@ -5,8 +5,7 @@
 #include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 
-namespace previz::test {
-namespace mirror_history_test {
+namespace previz::test::mirror_history_test {
 
 constexpr int many = 128;  // samples, whose noise is a third of that of a dozen
 
@@ -105,5 +104,4 @@ TEST_P(MirrorHistory, ShowsNoGhostOfWhatHasJumped) {
   }
 }
 
-}  // namespace mirror_history_test
-}  // namespace previz::test
+}  // namespace previz::test::mirror_history_test

@@ -12,8 +12,7 @@
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace neighbours_test {
+namespace previz::test::neighbours_test {
 
 TEST(Neighbours, AreVisitedOnceInHopsOfAtMostTwoFrames) {
   for (int before = 0; before <= 7; ++before)
@@ -388,5 +387,4 @@ TEST_P(NeighboursAfter, ShowNoGhost) {
   EXPECT_LT(rms_between(among, truth), 1.3 * rms_between(alone, truth));
 }
 
-}  // namespace neighbours_test
-}  // namespace previz::test
+}  // namespace previz::test::neighbours_test

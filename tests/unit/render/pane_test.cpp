@@ -3,8 +3,7 @@
 
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace pane_test {
+namespace previz::test::pane_test {
 
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.6;
@@ -208,5 +207,4 @@ TEST(Pane, LetsPhotonsThroughByItsTint) {
   }
 }
 
-}  // namespace pane_test
-}  // namespace previz::test
+}  // namespace previz::test::pane_test

@@ -4,8 +4,7 @@
 #include "daemon/render/device.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace pass_clock_test {
+namespace previz::test::pass_clock_test {
 
 constexpr int width = 32, height = 24, bounces = 2;
 
@@ -68,5 +67,4 @@ TEST(PassClock, TimesNothingUnlessItIsAsked) {
   EXPECT_EQ(times.waited_ms, 0);
 }
 
-}  // namespace pass_clock_test
-}  // namespace previz::test
+}  // namespace previz::test::pass_clock_test

@@ -6,8 +6,7 @@
 #include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace resize_test {
+namespace previz::test::resize_test {
 
 // Returns the calibration of the same lens with fewer pixels.
 ObserverCalibration smaller(ObserverCalibration calibration, int width, int height) {
@@ -72,5 +71,4 @@ TEST_P(ResizeOf, MakesNothingAnewAndChangesNoBit) {
   }
 }
 
-}  // namespace resize_test
-}  // namespace previz::test
+}  // namespace previz::test::resize_test

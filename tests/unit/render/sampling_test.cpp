@@ -3,8 +3,7 @@
 // brings all or nothing.
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace sampling_test {
+namespace previz::test::sampling_test {
 
 constexpr int side = 64;
 
@@ -97,5 +96,4 @@ TEST(Sampling, StaysRightOnAverage) {
   EXPECT_NEAR(sum / (side * side), expected, 4 * error + 0.01 * expected);
 }
 
-}  // namespace sampling_test
-}  // namespace previz::test
+}  // namespace previz::test::sampling_test

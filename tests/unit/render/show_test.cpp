@@ -4,8 +4,7 @@
 #include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
-namespace previz::test {
-namespace show_test {
+namespace previz::test::show_test {
 
 // What the device must come to, in double precision.
 Plate reference(const render::Layers& layers, const Plate& plate, int bits, double exposure) {
@@ -213,5 +212,4 @@ TEST(Show, DoesNotDependOnTilesAndBands) {
   EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
 }
 
-}  // namespace show_test
-}  // namespace previz::test
+}  // namespace previz::test::show_test

@@ -4,8 +4,7 @@
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 
-namespace previz::test {
-namespace sources_test {
+namespace previz::test::sources_test {
 
 constexpr double degree = 0.017453292519943295;
 
@@ -139,5 +138,4 @@ TEST_F(SourceLight, GoesOutBetweenFramesWithTheSamePipelines) {
   EXPECT_GT(mean(rendered(lit, 2).mixed).g, 0);
 }
 
-}  // namespace sources_test
-}  // namespace previz::test
+}  // namespace previz::test::sources_test

@@ -1,11 +1,6 @@
 // What a SPIR-V module says about itself, and what is left of it when features are switched off.
 #include "daemon/render/spirv.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-
 #include "daemon/render/feature.hpp"
 #include "daemon/render/kernel.hpp"
 #include "shaders/accumulate.spv.h"
@@ -15,9 +10,9 @@
 #include "shaders/refit_nodes.spv.h"
 #include "shaders/shade.spv.h"
 #include "tests/support/render_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace spirv_test {
+namespace previz::test::spirv_test {
 
 using render::describe_spirv;
 using render::specialise_spirv;
@@ -110,5 +105,4 @@ TEST(Spirv, NoPixelDependsOnAFeatureThatIsOnlyCompiledIn) {
   EXPECT_EQ(masked.mask, whole.mask);
 }
 
-}  // namespace spirv_test
-}  // namespace previz::test
+}  // namespace previz::test::spirv_test

@@ -1,16 +1,10 @@
 // Textures that are looked up over the footprint of a sample: the levels of the pyramid, what a
 // footprint covers, and that pictures converge to those of textures looked up at points.
-#include <gmock/gmock.h>
-
-#include <algorithm>
-#include <numbers>
-#include <random>
-
 #include "daemon/render/mip_levels.hpp"
 #include "tests/support/render_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace texture_filter_test {
+namespace previz::test::texture_filter_test {
 
 set::Estimation filtered(int depth = 1) {
   set::Estimation estimation = up_to_depth(depth);
@@ -194,5 +188,4 @@ TEST(FilteredTextures, LightWhatIsAroundThemAlike) {
   EXPECT_NEAR(with.mean, without.mean, 4 * std::hypot(with.error, without.error));
 }
 
-}  // namespace texture_filter_test
-}  // namespace previz::test
+}  // namespace previz::test::texture_filter_test

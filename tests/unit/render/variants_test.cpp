@@ -1,12 +1,10 @@
 // Objects that get other materials while they are shown: what is uploaded, built and encoded for
 // that, and that the picture is that of a scene which was made so.
-#include <gtest/gtest.h>
-
 #include "daemon/render/feature.hpp"
 #include "tests/support/render_fixture.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace variants_test {
+namespace previz::test::variants_test {
 
 // A box above a table, in three looks: grey, mirror, lamp.
 struct Stage {
@@ -143,5 +141,4 @@ TEST(Variants, AreAskedForTheirFeatures) {
   }
 }
 
-}  // namespace variants_test
-}  // namespace previz::test
+}  // namespace previz::test::variants_test

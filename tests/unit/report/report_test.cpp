@@ -1,18 +1,14 @@
 // What becomes of a report: its priority in the journal, its place on the display, its repetitions.
 #include "daemon/report/report.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdarg>
-#include <cstdlib>
-#include <map>
-#include <sstream>
-#include <string_view>
 
 #include "daemon/report/log.hpp"
 #include "daemon/report/reports.hpp"
+#include "tests/support/test.hpp"
 
 namespace {
 

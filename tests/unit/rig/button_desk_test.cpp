@@ -1,14 +1,10 @@
 // The desk of buttons with a device of the test's own, without a rig.
 #include "daemon/rig/button_desk.hpp"
 
-#include <gtest/gtest.h>
-
-#include <sstream>
-
 #include "tests/support/hand.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace button_desk_test {
+namespace previz::rig::button_desk_test {
 
 // Reports one trouble, and that it is lost.
 class BrokenPad final : public Buttons {
@@ -141,5 +137,4 @@ TEST_F(ButtonDeskTest, MoreEventsThanOneTurnReadsAllCome) {
   EXPECT_EQ(records, 3u * ButtonDesk::most_events_a_turn);
 }
 
-}  // namespace button_desk_test
-}  // namespace previz::rig
+}  // namespace previz::rig::button_desk_test

@@ -1,12 +1,7 @@
 // From what a set says to the rig's cameras.
 #include "daemon/rig/cameras.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
 #include <nlohmann/json.hpp>
-#include <sstream>
-#include <thread>
 
 #include "daemon/rig/camera_source.hpp"
 #include "drivers/camera_drivers.hpp"
@@ -14,13 +9,12 @@
 #include "tests/support/other_camera.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::rig {
-namespace cameras_test {
+namespace previz::rig::cameras_test {
 
 using std::chrono::milliseconds;
-using testing::HasSubstr;
 
 class RigCameras : public testing::Test {
  protected:
@@ -186,5 +180,4 @@ TEST_F(RigCameras, WhatADeviceCountsIsInTheMetrics) {
   EXPECT_EQ(json["devices"]["observer"]["lost"], 2);
 }
 
-}  // namespace cameras_test
-}  // namespace previz::rig
+}  // namespace previz::rig::cameras_test

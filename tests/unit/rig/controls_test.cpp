@@ -1,13 +1,11 @@
 // Every action of the table, by what it sets.
 #include "daemon/rig/controls.hpp"
 
-#include <gtest/gtest.h>
-
 #include <glm/gtc/matrix_transform.hpp>
-#include <set>
 
-namespace previz::rig {
-namespace controls_test {
+#include "tests/support/test.hpp"
+
+namespace previz::rig::controls_test {
 
 set::Set stage() {
   set::Set set;
@@ -417,5 +415,4 @@ TEST(Controls, EstimatorAndViewGoAround) {
   EXPECT_EQ(desk("debug_view").said, "view: composite");
 }
 
-}  // namespace controls_test
-}  // namespace previz::rig
+}  // namespace previz::rig::controls_test

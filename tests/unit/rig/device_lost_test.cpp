@@ -1,24 +1,14 @@
 // The GPU goes away in the middle of a take (lose_device_layer.cpp): reopening it, pictures
 // come back, and the take has every frame.
-#include <gtest/gtest.h>
-
-#include <atomic>
-#include <condition_variable>
-#include <cstdlib>
-#include <fstream>
-#include <mutex>
-#include <optional>
-#include <sstream>
-
 #include "daemon/rig/live.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace device_lost_test {
+namespace previz::rig::device_lost_test {
 
 using pipeline::Shot;
 
@@ -124,7 +114,7 @@ TEST_F(RigWithoutItsGpu, ShowsPlatesAndRecordsUntilItIsBackAndTakesNoCpu) {
   });
   EXPECT_EQ(metrics.counts.at("device lost"), 1u) << log_.text();
   EXPECT_EQ(metrics.counts.at("device reopened"), 1u) << log_.text();
-  EXPECT_NE(log_.text().find("waiting for a GPU"), std::string::npos) << log_.text();
+  EXPECT_THAT(log_.text(), HasSubstr("waiting for a GPU"));
   EXPECT_EQ(test::accounted_for(metrics), metrics.stages.at("observer").frames);
   session::Session take = session::open_session(directory_ / "takes/1_take001");
   const auto stream = session::open_stream(take, "observer");
@@ -167,8 +157,7 @@ TEST_F(RigWithCpuInstead, DrawsOnTheCpuBecauseTheSetSaysSo) {
     while (std::filesystem::exists(lose_)) display_.until_rendered(1);
     display_.until_rendered(3);
   });
-  EXPECT_NE(log_.text().find("rendering again, on llvmpipe (CPU)"), std::string::npos)
-      << log_.text();
+  EXPECT_THAT(log_.text(), HasSubstr("rendering again, on llvmpipe (CPU)"));
 }
 
 // What the rig had is remembered: after a crash, and when the GPU's module comes later than the
@@ -180,11 +169,11 @@ TEST_F(RigWithoutItsGpu, StartsWithoutItAndWaitsForItIfItHadOneBefore) {
   hide_gpu();
   run([&] {
     display_.until_plates(5);
-    EXPECT_EQ(log_.text().find("live on llvmpipe (CPU)"), std::string::npos) << log_.text();
+    EXPECT_THAT(log_.text(), Not(HasSubstr("live on llvmpipe (CPU)")));
     give_gpu_back();
     display_.until_rendered(2);
   });
-  EXPECT_NE(log_.text().find("live on no graphics card yet"), std::string::npos) << log_.text();
+  EXPECT_THAT(log_.text(), HasSubstr("live on no graphics card yet"));
 }
 
 // A service may not open a card whose module came after it: it is started again, but in no take.
@@ -217,7 +206,7 @@ TEST_F(RigWithoutItsGpu, StartsOnTheCpuIfItNeverHadOne) {
   const Variable state("STATE_DIRECTORY", directory_.path());
   hide_gpu();
   run([&] { display_.until_rendered(1); });
-  EXPECT_NE(log_.text().find("live on llvmpipe (CPU)"), std::string::npos) << log_.text();
+  EXPECT_THAT(log_.text(), HasSubstr("live on llvmpipe (CPU)"));
   EXPECT_FALSE(std::filesystem::exists(directory_ / "graphics-device"));
 }
 
@@ -269,7 +258,7 @@ TEST(RigDeviceLost, PicturesComeBackAndTheTakeLacksNothing) {
       test::run_crewed(std::move(options), directory.path(), nobody, crew, out);
   EXPECT_EQ(metrics.counts.at("device lost"), 2u) << out.str();
   EXPECT_EQ(metrics.counts.at("device reopened"), 2u);
-  EXPECT_NE(out.str().find("ErrorDeviceLost"), std::string::npos) << out.str();
+  EXPECT_THAT(out.str(), HasSubstr("ErrorDeviceLost"));
 
   // Captured = rendered + dropped by cause, the frames that were lost with the device too.
   EXPECT_EQ(test::accounted_for(metrics), metrics.stages.at("observer").frames);
@@ -290,8 +279,7 @@ TEST(RigDeviceLost, PicturesComeBackAndTheTakeLacksNothing) {
   EXPECT_EQ(shown->read(0)->format, PixelFormat::rgb8);
 }
 
-}  // namespace device_lost_test
-}  // namespace previz::rig
+}  // namespace previz::rig::device_lost_test
 
 // The layer must be known before the first instance is made.
 int main(int argc, char** argv) {

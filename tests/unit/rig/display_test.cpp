@@ -1,14 +1,4 @@
 // What the crew sees, from end to end: a replayed take on a headless display that is read back.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <condition_variable>
-#include <deque>
-#include <memory>
-#include <mutex>
-#include <sstream>
-#include <thread>
-
 #include "daemon/output/osd_painter.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/report/reports.hpp"
@@ -22,10 +12,10 @@
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::rig {
-namespace display_test {
+namespace previz::rig::display_test {
 
 using output::OsdPage;
 using output::OsdText;
@@ -268,5 +258,4 @@ TEST_F(RigDisplay, WithoutAScreenTheRigGoesOnAndSaysSoOnce) {
   EXPECT_GT(metrics_.stages.at("screen").dropped.at("no display"), 0u);
 }
 
-}  // namespace display_test
-}  // namespace previz::rig
+}  // namespace previz::rig::display_test

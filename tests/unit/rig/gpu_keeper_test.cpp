@@ -1,16 +1,10 @@
 // Losses of a graphics device that is made up, without a rig.
 #include "daemon/rig/gpu_keeper.hpp"
 
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <sstream>
-#include <vector>
-
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace gpu_keeper_test {
+namespace previz::rig::gpu_keeper_test {
 
 class GpuKeeperTest : public testing::Test {
  protected:
@@ -124,5 +118,4 @@ TEST_F(GpuKeeperTest, AStopEndsTheAttempts) {
   EXPECT_TRUE(reports_.troubles().at(0).lasts);
 }
 
-}  // namespace gpu_keeper_test
-}  // namespace previz::rig
+}  // namespace previz::rig::gpu_keeper_test

@@ -1,13 +1,7 @@
 // What fails beside the recorder ends neither the rig nor a take.
 #include <fcntl.h>
-#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <systemd/sd-bus.h>
-
-#include <atomic>
-#include <fstream>
-#include <future>
-#include <stdexcept>
 
 #include "daemon/control/bus.hpp"
 #include "daemon/rig/live.hpp"
@@ -18,9 +12,9 @@
 #include "tests/support/live_rig.hpp"
 #include "tests/support/other_camera.hpp"
 #include "tests/support/private_bus.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace isolation_test {
+namespace previz::rig::isolation_test {
 
 using test::RigLive;
 
@@ -401,8 +395,7 @@ TEST_F(RigLive, ReviewsThatAreToggledFollowEachOther) {
     press("review");
     until([](const Shown& s) { return s.look.state.mode == Mode::review && s.shot.samples == 2; });
   });
-  EXPECT_EQ(log_.text().find("reading interrupted"), std::string::npos) << log_.text();
+  EXPECT_THAT(log_.text(), Not(HasSubstr("reading interrupted")));
 }
 
-}  // namespace isolation_test
-}  // namespace previz::rig
+}  // namespace previz::rig::isolation_test

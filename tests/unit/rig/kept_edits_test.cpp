@@ -1,19 +1,13 @@
 // What buttons have changed, written into a set file's text: read again, it is what was shown.
 #include "daemon/rig/kept_edits.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <fstream>
 #include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
-#include <random>
 
 #include "daemon/set/load.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace kept_edits_test {
+namespace previz::rig::kept_edits_test {
 
 constexpr const char* stage = R"(# A set with everything that can be changed.
 [[object]]
@@ -160,5 +154,4 @@ TEST_F(KeptEdits, ALampIsAsItWasShown) {
     near(*shown.lights.at(lamp.name), lamp.gain_mixed, lamp.tint);
 }
 
-}  // namespace kept_edits_test
-}  // namespace previz::rig
+}  // namespace previz::rig::kept_edits_test

@@ -5,23 +5,15 @@
 // anew. It is recorded by
 //   build/release/tests/unit/test_rig --gtest_also_run_disabled_tests
 //   --gtest_filter=KeptTakeRecording.*
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <cstdlib>
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "daemon/post/render.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/live_rig.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace kept_take_test {
+namespace previz::rig::kept_take_test {
 
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
@@ -245,5 +237,4 @@ TEST_F(KeptTakeRecording, DISABLED_IsDoneOnceAVersion) {
   std::ofstream(folder / "expected.json") << expected.dump() << "\n";
 }
 
-}  // namespace kept_take_test
-}  // namespace previz::rig
+}  // namespace previz::rig::kept_take_test

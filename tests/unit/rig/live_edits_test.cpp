@@ -1,15 +1,10 @@
 // Takes in review, and what buttons change in them and in the live picture, from end to end.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <fstream>
-
 #include "daemon/set/load.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/live_rig.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace live_edits_test {
+namespace previz::rig::live_edits_test {
 
 using test::RigLive;
 
@@ -223,5 +218,4 @@ TEST_F(RigLive, ARefinementShowsWhatWasMovedInStandby) {
   });
 }
 
-}  // namespace live_edits_test
-}  // namespace previz::rig
+}  // namespace previz::rig::live_edits_test

@@ -1,21 +1,13 @@
 // The light beside the live pictures, and what is odd about a picture, without a rig.
 #include "daemon/rig/live_light.hpp"
 
-#include <gtest/gtest.h>
-
-#include <atomic>
-#include <chrono>
-#include <functional>
-#include <sstream>
-#include <thread>
-
 #include "daemon/rig/live_output.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::rig {
-namespace live_light_test {
+namespace previz::rig::live_light_test {
 
 class LiveLightTest : public testing::Test {
  protected:
@@ -84,7 +76,7 @@ TEST_F(LiveLightTest, AFrameThatCannotBeUsedIsReportedShownAndCounted) {
   LiveLight light(parts(), camera(), ObserverCalibration{});
   EXPECT_EQ(run(light, {grey(8, 1), grey(8, 2)}), nullptr);
   EXPECT_EQ(log_.str().find("light: light frame 1 is skipped"), 0u) << log_.str();
-  EXPECT_EQ(log_.str().find("light frame 2"), std::string::npos) << "said twice";
+  EXPECT_THAT(log_.str(), Not(HasSubstr("light frame 2"))) << "said twice";
   EXPECT_EQ(metrics_.snapshot(1).stages.at("lighting").dropped.at("not usable"), 2u);
   ASSERT_EQ(reports_.troubles().size(), 1u);
   EXPECT_EQ(reports_.troubles()[0].source, "light");
@@ -150,5 +142,4 @@ TEST(CountPicture, WhatIsOddIsCountedAndReportedOnce) {
   EXPECT_EQ(metrics.snapshot(1).counts.at("plate untouched: no pose fits tags  and "), 2u);
 }
 
-}  // namespace live_light_test
-}  // namespace previz::rig
+}  // namespace previz::rig::live_light_test

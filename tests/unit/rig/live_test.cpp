@@ -2,16 +2,7 @@
 // waits for, and afterwards what was shown, said and recorded.
 #include "daemon/rig/live.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/resource.h>
-
-#include <algorithm>
-#include <condition_variable>
-#include <fstream>
-#include <mutex>
-#include <set>
-#include <sstream>
-#include <thread>
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
@@ -19,10 +10,10 @@
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/live_rig.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::rig {
-namespace live_test {
+namespace previz::rig::live_test {
 
 using pipeline::Shot;
 using test::RigLive;
@@ -309,7 +300,7 @@ TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
     press("previous_set");
     until([](const Shown& s) { return s.shot.samples == 4; });
   });
-  EXPECT_NE(log_.text().find("set.toml:2:"), std::string::npos) << log_.text();
+  EXPECT_THAT(log_.text(), HasSubstr("set.toml:2:"));
 }
 
 // A set that can be read and cannot be started is not started again and again.
@@ -318,7 +309,7 @@ TEST_F(RigLive, ASetThatCannotStartIsTriedOnce) {
   const std::string good = session::read_file(directory_ / "set.toml");
   const auto other = [&](const std::string& from, const std::string& to) {
     std::string text = good;
-    EXPECT_NE(text.find(from), std::string::npos) << good;
+    EXPECT_THAT(text, HasSubstr(from)) << good;
     return text.replace(text.find(from), from.size(), to);
   };
   run([&] {
@@ -416,5 +407,4 @@ TEST_F(RigLive, WhatDrawsOnTheProcessorYieldsToTheRecording) {
   EXPECT_EQ(yielding, drawing);
 }
 
-}  // namespace live_test
-}  // namespace previz::rig
+}  // namespace previz::rig::live_test

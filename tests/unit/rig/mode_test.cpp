@@ -1,16 +1,10 @@
 // Every event in every state the rig can be in, also while the camera is lost.
 #include "daemon/rig/mode.hpp"
 
-#include <gtest/gtest.h>
-
-#include <set>
-#include <tuple>
-#include <vector>
-
 #include "daemon/set/names.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace mode_test {
+namespace previz::rig::mode_test {
 
 using enum Mode;
 
@@ -156,5 +150,4 @@ TEST(ModeTable, EveryModeCanBeWishedFor) {
     EXPECT_EQ(step(anything, wish_for(mode)).state.mode, mode) << name;
 }
 
-}  // namespace mode_test
-}  // namespace previz::rig
+}  // namespace previz::rig::mode_test

@@ -1,16 +1,6 @@
 // What moves in a take, from end to end: a lamp on a stick with a tag, and an object that is
 // animated; found in pictures whose poses the test knows, shown, recorded, and rendered again.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <condition_variable>
-#include <fstream>
 #include <glm/gtc/matrix_transform.hpp>
-#include <map>
-#include <mutex>
-#include <numbers>
-#include <optional>
-#include <sstream>
 
 #include "daemon/post/render.hpp"
 #include "daemon/rig/live.hpp"
@@ -20,10 +10,10 @@
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
-namespace previz {
-namespace moving_test {
+namespace previz::moving_test {
 
 using pipeline::Shot;
 using Json = test::GltfWriter::Json;
@@ -206,10 +196,9 @@ TEST_F(MovingTake, ALampOnAStickLightsFromWhereItIsHeld) {
     expect_lit_by(glm::dvec3(stick.world_from_carrier * glm::dvec4(0, 0, lamp_over_tag_m, 1)),
                   shot);
   }
-  EXPECT_NE(out_.str().find("carrier \"stick\" is not found (none of its tags in the picture); it "
-                            "stays where it was"),
-            std::string::npos)
-      << out_.str();
+  EXPECT_THAT(out_.str(),
+              HasSubstr("carrier \"stick\" is not found (none of its tags in the picture); it "
+                        "stays where it was"));
 }
 
 // A range that begins where the stick is out of the picture gives what the whole take gives.
@@ -293,5 +282,4 @@ TEST_F(MovingTake, IsRenderedAsItWasShown) {
   EXPECT_GT(last_s, first_s);
 }
 
-}  // namespace moving_test
-}  // namespace previz
+}  // namespace previz::moving_test

@@ -1,12 +1,9 @@
 // The overlay's words for every state of the rig, as data.
 #include "daemon/rig/osd.hpp"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-#include <algorithm>
-
-namespace previz::rig {
-namespace osd_test {
+namespace previz::rig::osd_test {
 
 using output::OsdPage;
 using output::OsdText;
@@ -193,5 +190,4 @@ TEST(OsdWords, ATrackingThatIsHeld) {
   EXPECT_EQ(page.notices, (Texts{{"tracking: no tag in the picture", OsdTone::warning}}));
 }
 
-}  // namespace osd_test
-}  // namespace previz::rig
+}  // namespace previz::rig::osd_test

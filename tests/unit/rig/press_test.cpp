@@ -1,10 +1,9 @@
 // Presses from edges alone: every time is written down here, none is waited for.
 #include "daemon/rig/press.hpp"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace press_test {
+namespace previz::rig::press_test {
 
 using set::PressKind;
 using enum set::PressKind;
@@ -97,5 +96,4 @@ TEST(Presses, EdgesThatDoNotPairAreHarmless) {
             (Recognised{{40, short_press}}));
 }
 
-}  // namespace press_test
-}  // namespace previz::rig
+}  // namespace previz::rig::press_test

@@ -1,20 +1,16 @@
 // Which set runs, from files alone, without a rig.
 #include "daemon/rig/set_keeper.hpp"
 
-#include <gtest/gtest.h>
 #include <sys/stat.h>
-
-#include <fstream>
-#include <sstream>
 
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 
-namespace previz::rig {
-namespace set_keeper_test {
+namespace previz::rig::set_keeper_test {
 
 // What is begun ends sooner or later.
 std::optional<std::string> ended(SetKeeper& sets) {
@@ -297,5 +293,4 @@ TEST(SetFileWatch, WaitsUntilAFileIsWritten) {
   EXPECT_TRUE(watch.is_changed(start));
 }
 
-}  // namespace set_keeper_test
-}  // namespace previz::rig
+}  // namespace previz::rig::set_keeper_test

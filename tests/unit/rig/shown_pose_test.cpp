@@ -1,23 +1,14 @@
 // A hand over the tags while the rig runs: the picture stays as it is, the take and a refinement
 // know nothing of it.
-#include <gtest/gtest.h>
-
-#include <condition_variable>
-#include <fstream>
-#include <functional>
-#include <map>
-#include <mutex>
-#include <sstream>
-
 #include "drivers/session/session.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
-namespace previz::rig {
-namespace shown_pose_test {
+namespace previz::rig::shown_pose_test {
 
 using pipeline::Shot;
 
@@ -192,5 +183,4 @@ TEST_F(ShownPose, OffShowsPosesAsTheyAreFound) {
   }
 }
 
-}  // namespace shown_pose_test
-}  // namespace previz::rig
+}  // namespace previz::rig::shown_pose_test

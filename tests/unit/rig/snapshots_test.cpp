@@ -1,22 +1,12 @@
 // Snapshots number themselves, and leave takes their space; where the live picture goes.
 #include "daemon/rig/snapshots.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <mutex>
-#include <set>
-#include <thread>
-#include <vector>
-
 #include "daemon/rig/live_files.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace snapshots_test {
+namespace previz::rig::snapshots_test {
 
 namespace fs = std::filesystem;
 
@@ -82,5 +72,4 @@ TEST(LiveFiles, OfAServiceAreInItsRuntimeDirectory) {
   unsetenv("RUNTIME_DIRECTORY");
 }
 
-}  // namespace snapshots_test
-}  // namespace previz::rig
+}  // namespace previz::rig::snapshots_test

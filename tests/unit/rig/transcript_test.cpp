@@ -3,18 +3,7 @@
 // display. Afterwards the take has the same story.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <gtest/gtest.h>
 #include <systemd/sd-bus.h>
-
-#include <algorithm>
-#include <condition_variable>
-#include <deque>
-#include <map>
-#include <mutex>
-#include <span>
-#include <sstream>
-#include <string_view>
-#include <thread>
 
 #include "daemon/control/bus.hpp"
 #include "daemon/rig/live.hpp"
@@ -26,9 +15,9 @@
 #include "tests/support/private_bus.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace transcript_test {
+namespace previz::rig::transcript_test {
 
 using output::OsdPage;
 using output::OsdText;
@@ -332,5 +321,4 @@ TEST_F(RigTranscript, EveryActionIsSignalledShownAndRecorded) {
   }
 }
 
-}  // namespace transcript_test
-}  // namespace previz::rig
+}  // namespace previz::rig::transcript_test

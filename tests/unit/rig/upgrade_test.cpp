@@ -1,12 +1,6 @@
 // An upgrade while a take is being recorded: the rig goes on until the take has ended, and then
 // ends by itself, so that the service starts the new version.
-#include <gtest/gtest.h>
 #include <unistd.h>
-
-#include <atomic>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "daemon/rig/live.hpp"
 #include "daemon/rig/service.hpp"
@@ -15,9 +9,9 @@
 #include "tests/support/private_bus.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace upgrade_test {
+namespace previz::rig::upgrade_test {
 
 TEST(Upgrade, WaitsForTheEndOfTheTake) {
   const test::PrivateBus bus;
@@ -70,7 +64,7 @@ TEST(Upgrade, WaitsForTheEndOfTheTake) {
   run_live(options, reports);
   ended = true;
   EXPECT_FALSE(stop.stop_requested()) << "the rig was stopped by the test";
-  EXPECT_NE(out.str().find("another version was installed"), std::string::npos) << out.str();
+  EXPECT_THAT(out.str(), HasSubstr("another version was installed"));
   EXPECT_TRUE(session::open_session(directory / "takes/1_take002").missing.empty());
 }
 
@@ -85,7 +79,7 @@ TEST(Upgrade, IsSeenByTheFileOfTheProgram) {
 
 // What of /proc/devices a service may use is settled as it starts; proc(5) has the format.
 TEST(Upgrade, AKindOfDevicesThatIsNewIsSeenByTheKernelsList) {
-  EXPECT_NE(Service::device_kinds().find(" mem\n"), std::string::npos) << Service::device_kinds();
+  EXPECT_THAT(Service::device_kinds(), HasSubstr(" mem\n"));
   const test::TemporaryDirectory directory;
   const std::string file = directory / "devices";
   const std::string kinds = "Character devices:\n  1 mem\n226 drm\n";
@@ -96,5 +90,4 @@ TEST(Upgrade, AKindOfDevicesThatIsNewIsSeenByTheKernelsList) {
   EXPECT_EQ(Service::device_kinds((directory / "none").c_str()), "");
 }
 
-}  // namespace upgrade_test
-}  // namespace previz::rig
+}  // namespace previz::rig::upgrade_test

@@ -1,18 +1,8 @@
 // What systemd hears of the rig: its watchdog is fed by threads that are live, not by frames.
-#include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
-
-#include <algorithm>
-#include <array>
-#include <atomic>
-#include <condition_variable>
-#include <deque>
-#include <fstream>
-#include <mutex>
-#include <thread>
 
 #include "daemon/rig/live.hpp"
 #include "daemon/rig/service.hpp"
@@ -21,9 +11,9 @@
 #include "tests/support/live_rig.hpp"
 #include "tests/support/notify_socket.hpp"
 #include "tests/support/other_camera.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::rig {
-namespace watchdog_test {
+namespace previz::rig::watchdog_test {
 
 using test::NotifySocket;
 using test::RigLive;
@@ -186,5 +176,4 @@ TEST_F(RigLive, AStopThatComesWithASetThatWasReadOpensNoDevicesForIt) {
   systemd.until("STOPPING=1");
 }
 
-}  // namespace watchdog_test
-}  // namespace previz::rig
+}  // namespace previz::rig::watchdog_test

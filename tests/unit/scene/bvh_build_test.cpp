@@ -1,19 +1,12 @@
 // What the builder writes: every triangle, in boxes that hold it, in a tree of good cost.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
-#include <map>
-
 #include "daemon/scene/bvh.hpp"
 #include "daemon/scene/bvh_binary.hpp"
 #include "shaders/lib/shared.h"
 #include "tests/bench/tracers/shapes.hpp"
 #include "tests/support/bvh_decode.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::scene {
-namespace bvh_build_test {
+namespace previz::scene::bvh_build_test {
 
 using test::DecodedRecord;
 
@@ -308,5 +301,4 @@ TEST(BvhTop, BoundsOfATurnedBoxHoldItsCorners) {
   EXPECT_NEAR(box.high.z, 31, 1e-5);
 }
 
-}  // namespace bvh_build_test
-}  // namespace previz::scene
+}  // namespace previz::scene::bvh_build_test

@@ -1,17 +1,13 @@
 // The traversal in the shader against Embree, ray by ray, and against brute force, world by world.
-#include <gtest/gtest.h>
-
-#include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
-#include <random>
 
 #include "tests/bench/tracers/embree_tracer.hpp"
 #include "tests/bench/tracers/gpu_tracer.hpp"
 #include "tests/bench/tracers/shapes.hpp"
 #include "tests/support/bvh_precision.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace bvh_trace_test {
+namespace previz::test::bvh_trace_test {
 
 using bench::Ray;
 using bench::TracedHit;
@@ -375,5 +371,4 @@ TEST_F(BvhTrace, EmptySlotsDoNotMatterHoweverFarTheRay) {
   expect_agreement(device(), bench::scene_of(mesh), rays, scene::world_both, 0.001);
 }
 
-}  // namespace bvh_trace_test
-}  // namespace previz::test
+}  // namespace previz::test::bvh_trace_test

@@ -6,8 +6,7 @@
 #include "daemon/scene/animation.hpp"
 #include "tests/support/gltf_test.hpp"
 
-namespace previz::test {
-namespace gltf_animation_test {
+namespace previz::test::gltf_animation_test {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -217,5 +216,4 @@ TEST_F(GltfAnimations, AreRefusedWhereTheyMakeNoSense) {
   EXPECT_THAT(error(), HasSubstr("has a matrix"));
 }
 
-}  // namespace gltf_animation_test
-}  // namespace previz::test
+}  // namespace previz::test::gltf_animation_test

@@ -2,8 +2,7 @@
 #include "daemon/scene/gltf_accessor.hpp"
 #include "tests/support/gltf_test.hpp"
 
-namespace previz::test {
-namespace gltf_components_test {
+namespace previz::test::gltf_components_test {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -111,5 +110,4 @@ TEST_F(VertexColors, AreReadOfEveryTypeThatGltfHasForThem) {
   EXPECT_THROW(read(floats, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC2, false), Error);
 }
 
-}  // namespace gltf_components_test
-}  // namespace previz::test
+}  // namespace previz::test::gltf_components_test

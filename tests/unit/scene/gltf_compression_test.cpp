@@ -10,8 +10,7 @@
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/gltf_test.hpp"
 
-namespace previz::test {
-namespace gltf_compression_test {
+namespace previz::test::gltf_compression_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -264,5 +263,4 @@ TEST_F(GltfCompression, OfDracoCannotAskForMuch) {
   EXPECT_THAT(error(), HasSubstr("100 bytes cannot hold 1073741824 triangles"));
 }
 
-}  // namespace gltf_compression_test
-}  // namespace previz::test
+}  // namespace previz::test::gltf_compression_test

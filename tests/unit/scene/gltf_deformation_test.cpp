@@ -8,8 +8,7 @@
 #include "daemon/scene/placement.hpp"
 #include "tests/support/gltf_test.hpp"
 
-namespace previz::test {
-namespace gltf_deformation_test {
+namespace previz::test::gltf_deformation_test {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -313,5 +312,4 @@ TEST(DeformingPairs, PastTheirNumberAreRefused) {
   EXPECT_THROW(deforming_pairs(mesh), Error);
 }
 
-}  // namespace gltf_deformation_test
-}  // namespace previz::test
+}  // namespace previz::test::gltf_deformation_test

@@ -3,8 +3,7 @@
 #include "daemon/scene/load.hpp"
 #include "tests/support/gltf_test.hpp"
 
-namespace previz::test {
-namespace gltf_file_test {
+namespace previz::test::gltf_file_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -209,5 +208,4 @@ TEST_F(GltfFiles, RefusesBinaryFilesThatAreCutShort) {
   EXPECT_THAT(error_of(longer), HasSubstr("runs past the end of the file"));
 }
 
-}  // namespace gltf_file_test
-}  // namespace previz::test
+}  // namespace previz::test::gltf_file_test

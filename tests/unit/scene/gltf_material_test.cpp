@@ -6,8 +6,7 @@
 #include "daemon/scene/load_log.hpp"
 #include "tests/support/gltf_test.hpp"
 
-namespace previz::test {
-namespace gltf_material_test {
+namespace previz::test::gltf_material_test {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -511,5 +510,4 @@ TEST(TextureBudget, CountsTheLevelsOfTexturesThatAreFiltered) {
   EXPECT_THROW(budget.add_texture(8192, 4096, "here"), Error);
 }
 
-}  // namespace gltf_material_test
-}  // namespace previz::test
+}  // namespace previz::test::gltf_material_test

@@ -3,8 +3,7 @@
 
 #include "tests/support/gltf_test.hpp"
 
-namespace previz::test {
-namespace gltf_mesh_test {
+namespace previz::test::gltf_mesh_test {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -289,5 +288,4 @@ TEST_F(GltfMesh, ReadsVertexColours) {
               ::testing::ElementsAre(HasSubstr("1 vertex colour is outside of 0 to 1")));
 }
 
-}  // namespace gltf_mesh_test
-}  // namespace previz::test
+}  // namespace previz::test::gltf_mesh_test

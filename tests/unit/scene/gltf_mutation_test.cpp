@@ -1,15 +1,8 @@
 // Thousands of damaged copies of one glTF file, the same ones on every run. Each loads or is
 // refused with a previz::Error; what loads keeps scene.hpp's promises, and neither costs much.
-#include <gtest/gtest.h>
 #include <sys/resource.h>
 
-#include <algorithm>
-#include <cmath>
 #include <ctime>
-#include <fstream>
-#include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
-#include <random>
 
 #include "daemon/render/feature.hpp"
 #include "daemon/scene/bvh_refit.hpp"
@@ -20,9 +13,9 @@
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/gltf_sample.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace gltf_mutation_test {
+namespace previz::test::gltf_mutation_test {
 
 using Json = GltfWriter::Json;
 
@@ -288,5 +281,4 @@ TEST_F(GltfMutations, OfEveryTruncation) {
   EXPECT_EQ(loaded_, 0);
 }
 
-}  // namespace gltf_mutation_test
-}  // namespace previz::test
+}  // namespace previz::test::gltf_mutation_test

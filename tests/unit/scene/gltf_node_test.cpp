@@ -6,8 +6,7 @@
 #include "daemon/scene/placement.hpp"
 #include "tests/support/gltf_test.hpp"
 
-namespace previz::test {
-namespace gltf_node_test {
+namespace previz::test::gltf_node_test {
 
 using ::testing::Contains;
 using ::testing::ElementsAre;
@@ -254,5 +253,4 @@ TEST_F(GltfNodes, PutsLightsIntoTheWorld) {
   EXPECT_THAT(error(), HasSubstr("node 0 \"lamp\": no light 4"));
 }
 
-}  // namespace gltf_node_test
-}  // namespace previz::test
+}  // namespace previz::test::gltf_node_test

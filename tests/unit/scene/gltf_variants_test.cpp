@@ -2,8 +2,7 @@
 // files.
 #include "tests/support/gltf_test.hpp"
 
-namespace previz::test {
-namespace gltf_variants_test {
+namespace previz::test::gltf_variants_test {
 
 using ::testing::AllOf;
 using ::testing::AnyOf;
@@ -145,5 +144,4 @@ TEST_F(GltfVariants, DamagedOnesAreRefused) {
   }
 }
 
-}  // namespace gltf_variants_test
-}  // namespace previz::test
+}  // namespace previz::test::gltf_variants_test

@@ -1,19 +1,13 @@
 // The scenes of the ground truth sets as set.json states them. The sets lie outside the repository.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <fstream>
-#include <map>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "daemon/render/feature.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::scene {
-namespace groundtruth_test {
+namespace previz::scene::groundtruth_test {
 
 using Json = nlohmann::json;
 namespace fs = std::filesystem;
@@ -130,5 +124,4 @@ TEST_P(Statues, ShareTheirMeshes) {
 
 INSTANTIATE_TEST_SUITE_P(Set, Statues, ::testing::Values("statues"));
 
-}  // namespace groundtruth_test
-}  // namespace previz::scene
+}  // namespace previz::scene::groundtruth_test

@@ -13,8 +13,7 @@
 #include "daemon/render/feature.hpp"
 #include "tests/support/gltf_test.hpp"
 
-namespace previz::test {
-namespace material_extensions_test {
+namespace previz::test::material_extensions_test {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -182,5 +181,4 @@ TEST_F(ReadMaterialExtensions, ClampTheirFactorsWithANote) {
     }
 }
 
-}  // namespace material_extensions_test
-}  // namespace previz::test
+}  // namespace previz::test::material_extensions_test

@@ -1,12 +1,11 @@
 // A scene with things moved and relit: what moves, what goes along, and what stays bit for bit.
 #include "daemon/scene/placement.hpp"
 
-#include <gtest/gtest.h>
-
 #include <glm/gtc/matrix_transform.hpp>
 
-namespace previz::scene {
-namespace placement_test {
+#include "tests/support/test.hpp"
+
+namespace previz::scene::placement_test {
 
 // Two objects of the set, the second with a lamp of its own, and one lamp of the set.
 struct Stage {
@@ -186,9 +185,8 @@ TEST(Placement, NamesTheSetHasNotAreTold) {
   state.lights["moon"] = {};
   const Placement placement = place(stage.scene, stage.set, state);
   ASSERT_EQ(placement.unknown.size(), 2u);
-  EXPECT_NE(placement.unknown[0].find("\"ghost\""), std::string::npos);
-  EXPECT_NE(placement.unknown[1].find("\"moon\""), std::string::npos);
+  EXPECT_THAT(placement.unknown[0], HasSubstr("\"ghost\""));
+  EXPECT_THAT(placement.unknown[1], HasSubstr("\"moon\""));
 }
 
-}  // namespace placement_test
-}  // namespace previz::scene
+}  // namespace previz::scene::placement_test

@@ -1,15 +1,8 @@
-#include <gtest/gtest.h>
-
-#include <glm/geometric.hpp>
-#include <map>
-#include <numbers>
-#include <set>
-#include <tuple>
 
 #include "tests/support/scenes.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::test {
-namespace shapes_test {
+namespace previz::test::shapes_test {
 
 using Point = std::tuple<float, float, float>;
 
@@ -121,5 +114,4 @@ TEST(SceneShapes, RandomObjectsStandOnTheTableAndDoNotTouch) {
   }
 }
 
-}  // namespace shapes_test
-}  // namespace previz::test
+}  // namespace previz::test::shapes_test

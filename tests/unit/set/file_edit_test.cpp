@@ -1,12 +1,10 @@
 // Values that are changed in a set file's text, and what stays as it was.
 #include "daemon/set/file_edit.hpp"
 
-#include <gtest/gtest.h>
-
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::set {
-namespace file_edit_test {
+namespace previz::set::file_edit_test {
 
 constexpr const char* file = R"(# The attic, früh am Morgen
 [set]
@@ -122,5 +120,4 @@ TEST(FileEdit, RefusesWhatItCannotDo) {
   EXPECT_THROW(edit.text(), Error);
 }
 
-}  // namespace file_edit_test
-}  // namespace previz::set
+}  // namespace previz::set::file_edit_test

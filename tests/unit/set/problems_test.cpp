@@ -1,19 +1,12 @@
 // Every kind of mistake in a set file: reported once, at its line and column, with the key and a
 // way out.
-#include <gtest/gtest.h>
-
-#include <fstream>
-#include <sstream>
-#include <string>
-#include <vector>
-
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::set {
-namespace problems_test {
+namespace previz::set::problems_test {
 
 std::vector<std::string> problems_of(const std::string& text, const std::filesystem::path& file) {
   std::vector<std::string> lines;
@@ -45,7 +38,7 @@ TEST_P(SetMistake, IsToldOnceWithLineAndKey) {
   const auto problems = problems_of(GetParam().text, file);
   ASSERT_EQ(problems.size(), 1u) << testing::PrintToString(problems);
   EXPECT_TRUE(problems[0].starts_with(file.string() + ':' + GetParam().start)) << problems[0];
-  EXPECT_NE(problems[0].find(GetParam().fragment), std::string::npos) << problems[0];
+  EXPECT_THAT(problems[0], HasSubstr(GetParam().fragment));
 }
 
 // The rest of tables in which a test makes only one mistake.
@@ -381,7 +374,7 @@ TEST(SetProblems, OfAnOverlayNameItsFileAndItsLines) {
   EXPECT_EQ(problems("[quality]\nsamples = 4", "[quality]\nsamples = 5\n"), "none");
   const std::string two = problems("[quality]\nsamples = 0\n", "\n[quality]\nfps = -1\n");
   EXPECT_TRUE(two.starts_with("stage.toml:2:11: quality.samples: 0 is not")) << two;
-  EXPECT_NE(two.find("\nlive.toml:3:7: quality.fps: -1 is not"), std::string::npos) << two;
+  EXPECT_THAT(two, HasSubstr("\nlive.toml:3:7: quality.fps: -1 is not"));
   EXPECT_TRUE(problems("", "[quality]\nfsp = 1\n").starts_with("live.toml:2:1: quality.fsp: "));
   EXPECT_TRUE(problems("", "[quality\n").starts_with("live.toml:1:9: not valid TOML"));
   const std::string other = problems("", "[[tag]]\nid = 1\n");
@@ -397,5 +390,4 @@ TEST(SetProblems, NameAFileThatCannotBeRead) {
   }
 }
 
-}  // namespace problems_test
-}  // namespace previz::set
+}  // namespace previz::set::problems_test

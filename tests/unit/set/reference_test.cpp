@@ -1,19 +1,12 @@
 // config/reference.toml and the example: generated, complete, and true.
-#include <gtest/gtest.h>
-#include <array>
-
-#include <cmath>
-#include <fstream>
-#include <sstream>
-
-#include "daemon/set/load.hpp"
 #include "daemon/set/reference.hpp"
+#include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/set/table.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::set {
-namespace reference_test {
+namespace previz::set::reference_test {
 
 const std::filesystem::path config = std::filesystem::path(PREVIZ_SOURCE_DIR) / "config";
 
@@ -120,9 +113,9 @@ TEST(SetReference, ExamplesAreOfTheRightKind) {
   } catch (const Error& error) {
     std::istringstream problems(error.what());
     for (std::string line; std::getline(problems, line);) {
-      EXPECT_EQ(line.find("is not allowed"), std::string::npos) << line;
-      EXPECT_EQ(line.find("unknown"), std::string::npos) << line;
-      EXPECT_EQ(line.find("not valid TOML"), std::string::npos) << line;
+      EXPECT_THAT(line, Not(HasSubstr("is not allowed")));
+      EXPECT_THAT(line, Not(HasSubstr("unknown")));
+      EXPECT_THAT(line, Not(HasSubstr("not valid TOML")));
     }
   }
 }
@@ -165,8 +158,7 @@ TEST(SetExample, IsALiveSet) {
 // Its commented alternative: a recorded take in the cameras' place.
 TEST(SetExample, CanReplayATake) {
   std::string text = contents(example_file);
-  ASSERT_NE(text.find("# driver = \"replay\"\n# device = \"takes/12A_take003\"\n"),
-            std::string::npos);
+  ASSERT_THAT(text, HasSubstr("# driver = \"replay\"\n# device = \"takes/12A_take003\"\n"));
   const auto replayed = [&](const char* first, const char* behind) {
     const std::size_t begin = text.find(first), end = text.find(behind);
     ASSERT_LT(begin, end);
@@ -185,5 +177,4 @@ TEST(SetDemo, HoldsARate) {
   EXPECT_GT(load_set(config / "demo/demo.toml").quality.fps, 0);
 }
 
-}  // namespace reference_test
-}  // namespace previz::set
+}  // namespace previz::set::reference_test

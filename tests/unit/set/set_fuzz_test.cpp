@@ -1,18 +1,12 @@
 // Thousands of damaged set files: each is either a set or a list of problems that all name the
 // file.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <random>
-#include <sstream>
-
 #include "daemon/set/load.hpp"
 #include "daemon/set/pose.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::set {
-namespace set_fuzz_test {
+namespace previz::set::set_fuzz_test {
 
 const std::string file = "folder/stage.toml";
 
@@ -210,5 +204,4 @@ TEST(SetFuzz, DeepNestingIsAProblem) {
   EXPECT_THROW(parse_set(text, file), Error);
 }
 
-}  // namespace set_fuzz_test
-}  // namespace previz::set
+}  // namespace previz::set::set_fuzz_test

@@ -1,19 +1,12 @@
 // What a correct set file means: units, poses, corners, paths.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <fstream>
-#include <glm/geometric.hpp>
-#include <numbers>
-
 #include "daemon/set/load.hpp"
 #include "daemon/set/pose.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::set {
-namespace values_test {
+namespace previz::set::values_test {
 
 // Products of a few double operations on values of order 1.
 constexpr double rounding = 1e-14;
@@ -372,5 +365,4 @@ TEST(SetValues, RealLampsAreTakenOutOfTheCapturedLight) {
   EXPECT_EQ(set.captured_lamps[1].position, glm::dvec3(1, 2, 3));
 }
 
-}  // namespace values_test
-}  // namespace previz::set
+}  // namespace previz::set::values_test

@@ -1,19 +1,7 @@
 // tests/COVERAGE.md names only what there is: cases of the test programs, and files of the tests.
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <map>
-#include <regex>
-#include <set>
-#include <string>
-#include <string_view>
-#include <vector>
-
-namespace previz {
-namespace coverage_test {
+namespace previz::coverage_test {
 
 namespace fs = std::filesystem;
 
@@ -121,5 +109,4 @@ TEST(Coverage, EveryFileThatIsCitedExists) {
   EXPECT_GT(looked_up, 5);
 }
 
-}  // namespace coverage_test
-}  // namespace previz
+}  // namespace previz::coverage_test

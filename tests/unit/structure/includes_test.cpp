@@ -1,19 +1,9 @@
 // The order of the rooms: a file includes only its own room and rooms below it. The floors are
 // those of the CMakeLists.txt, which build the rooms from the ground up. Within a room no two files
 // need each other.
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-#include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <map>
-#include <regex>
-#include <set>
-#include <string>
-#include <vector>
-
-namespace previz {
-namespace includes_test {
+namespace previz::includes_test {
 
 namespace fs = std::filesystem;
 
@@ -171,5 +161,4 @@ TEST(Includes, NoFileNeedsOneThatNeedsIt) {
   for (const auto& [file, included] : by_stem) EXPECT_EQ(circle.from(file), "") << file;
 }
 
-}  // namespace includes_test
-}  // namespace previz
+}  // namespace previz::includes_test

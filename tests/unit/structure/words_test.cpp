@@ -1,19 +1,10 @@
 // What a person reads keeps to one list of words: messages, the comments of configuration,
 // README.md.
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <cctype>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <regex>
-#include <string>
-#include <string_view>
-#include <vector>
 
-namespace previz {
-namespace words_test {
+#include "tests/support/test.hpp"
+
+namespace previz::words_test {
 
 namespace fs = std::filesystem;
 
@@ -146,5 +137,4 @@ TEST(Words, AreThoseOfTheList) {
   EXPECT_EQ(wrong, "");
 }
 
-}  // namespace words_test
-}  // namespace previz
+}  // namespace previz::words_test

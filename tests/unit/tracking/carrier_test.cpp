@@ -1,16 +1,14 @@
 // Carriers: things with tags that are moved by hand, on pictures whose poses the test knows.
-#include <gtest/gtest.h>
-
 #include <glm/gtc/matrix_transform.hpp>
 #include <opencv2/core.hpp>
 
 #include "daemon/tracking/carrier_pose.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/pose_error.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
-namespace previz::tracking {
-namespace carrier_test {
+namespace previz::tracking::carrier_test {
 
 using Matrix6 = cv::Matx<double, 6, 6>;
 
@@ -118,7 +116,7 @@ TEST(Carriers, TagsAreInTheSetOnce) {
     make_apriltag_tracker(held.settings, held.scene.lens);
     FAIL();
   } catch (const Error& error) {
-    EXPECT_NE(std::string(error.what()).find("tag 1 of \"stick\""), std::string::npos);
+    EXPECT_THAT(error.what(), HasSubstr("tag 1 of \"stick\""));
   }
 }
 
@@ -136,5 +134,4 @@ TEST(Carriers, ALeverTurnsAngleIntoPlace) {
   for (int i = 0; i < 36; ++i) EXPECT_NEAR(pose.covariance[i], expected.val[i], 1e-20) << i;
 }
 
-}  // namespace carrier_test
-}  // namespace previz::tracking
+}  // namespace previz::tracking::carrier_test

@@ -1,19 +1,14 @@
 // Corner refinement against exact, box-filtered pictures: bias, scatter and stated covariance.
 #include "daemon/tracking/corners.hpp"
 
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <cstdio>
-#include <glm/geometric.hpp>
 #include <opencv2/core.hpp>
 
 #include "daemon/tracking/edge.hpp"
 #include "daemon/tracking/photometry.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
-namespace previz::tracking {
-namespace corners_test {
+namespace previz::tracking::corners_test {
 
 using test::TagScene;
 
@@ -222,5 +217,4 @@ TEST(TrackingEdge, CoverageDerivatives) {
   }
 }
 
-}  // namespace corners_test
-}  // namespace previz::tracking
+}  // namespace previz::tracking::corners_test

@@ -1,12 +1,9 @@
 // The least-squares solver on problems whose minimum is known.
-#include <gtest/gtest.h>
-
-#include <cmath>
-
 #include "daemon/tracking/least_squares.hpp"
 
-namespace previz::tracking {
-namespace least_squares_test {
+#include "tests/support/test.hpp"
+
+namespace previz::tracking::least_squares_test {
 
 using Pair = cv::Vec2d;
 using PairEquations = NormalEquations<2>;
@@ -124,5 +121,4 @@ TEST(LeastSquares, IsStuckWhereNoStepLessensTheCost) {
   EXPECT_EQ(minimum.steps, 0);
 }
 
-}  // namespace least_squares_test
-}  // namespace previz::tracking
+}  // namespace previz::tracking::least_squares_test

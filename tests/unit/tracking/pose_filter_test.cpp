@@ -2,19 +2,13 @@
 // the tags are covered for a moment.
 #include "daemon/tracking/pose_filter.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <opencv2/core.hpp>
-#include <random>
 
 #include "tests/support/pose_error.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
-namespace previz::tracking {
-namespace pose_filter_test {
+namespace previz::tracking::pose_filter_test {
 
 constexpr double sigma_rad = 1e-4, sigma_m = 1e-4;
 
@@ -295,5 +289,4 @@ TEST(PoseFilter, PosesWithoutACovariance) {
   }
 }
 
-}  // namespace pose_filter_test
-}  // namespace previz::tracking
+}  // namespace previz::tracking::pose_filter_test

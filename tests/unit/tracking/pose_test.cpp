@@ -1,20 +1,13 @@
 // The joint pose on corners made by the test: exact recovery, covariance, moved tags, two poses.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <glm/gtc/quaternion.hpp>
-#include <glm/matrix.hpp>
 #include <opencv2/core.hpp>
-#include <random>
 
 #include "daemon/tracking/joint_pose.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
-namespace previz::tracking {
-namespace pose_test {
+namespace previz::tracking::pose_test {
 
 using test::TagScene;
 
@@ -170,5 +163,4 @@ TEST(TrackingPose, ImpossibleCornersAreRefused) {
   for (const FittedPose& fit : solve_joint_pose({tag}, lens, {})) EXPECT_GT(fit.rms_px, 2);
 }
 
-}  // namespace pose_test
-}  // namespace previz::tracking
+}  // namespace previz::tracking::pose_test

@@ -1,11 +1,9 @@
 // Trackers that take no pictures: the poses of a recorded track, by the times of frames.
-#include <gtest/gtest.h>
-
 #include "daemon/tracking/trackers.hpp"
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::tracking {
-namespace recorded_test {
+namespace previz::tracking::recorded_test {
 
 constexpr std::int64_t interval_ns = 40'000'000;
 
@@ -44,8 +42,8 @@ TEST(RecordedTracker, GivesThePosesOfTheTrackWithoutAPicture) {
   const Track lost = track_at(*tracker, 2 * interval_ns);
   EXPECT_EQ(lost.status, TrackStatus::lost);
   EXPECT_FALSE(lost.pose);
-  EXPECT_NE(lost.reason.find("lost when it was recorded"), std::string::npos) << lost.reason;
-  EXPECT_NE(track_at(*tracker, 3 * interval_ns).reason.find("has no line"), std::string::npos);
+  EXPECT_THAT(lost.reason, HasSubstr("lost when it was recorded"));
+  EXPECT_THAT(track_at(*tracker, 3 * interval_ns).reason, HasSubstr("has no line"));
 }
 
 // A lap of two frames: the fourth frame has the time of the second.
@@ -68,5 +66,4 @@ TEST(MakeTracker, SaysWhereRecordedPosesAreMissing) {
   }
 }
 
-}  // namespace recorded_test
-}  // namespace previz::tracking
+}  // namespace previz::tracking::recorded_test

@@ -1,17 +1,11 @@
 // Live pictures are searched in parts: the plan of the parts, and what is found in them beside what
 // the whole picture shows.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
-#include <set>
-
 #include "daemon/tracking/search_plan.hpp"
 #include "daemon/tracking/tag_detector.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
-namespace previz::tracking {
-namespace search_test {
+namespace previz::tracking::search_test {
 
 bool holds(const Region& region, double x, double y, double half, int width, int height) {
   // Beside the picture's own border a region must reach 8 px beyond the tag.
@@ -248,5 +242,4 @@ TEST(SearchInParts, NoiseHoldsNoTags) {
   }
 }
 
-}  // namespace search_test
-}  // namespace previz::tracking
+}  // namespace previz::tracking::search_test

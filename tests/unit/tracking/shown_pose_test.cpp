@@ -1,16 +1,12 @@
 // Pictures of a table with tags, some of them covered for a while, through the tracker and the
 // filter of what is shown.
-#include <gtest/gtest.h>
-
-#include <algorithm>
 #include <opencv2/core.hpp>
-#include <vector>
 
 #include "daemon/tracking/pose_filter.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
-namespace previz::tracking {
-namespace shown_pose_test {
+namespace previz::tracking::shown_pose_test {
 
 struct Film {
   TagScene scene = small_table();
@@ -103,5 +99,4 @@ TEST(ShownPose, PartialSetsOfTagsDoNotMakeItJump) {
   EXPECT_LT(shown_jump, 0.4 * raw_jump);
 }
 
-}  // namespace shown_pose_test
-}  // namespace previz::tracking
+}  // namespace previz::tracking::shown_pose_test

@@ -1,16 +1,11 @@
 // The whole tracker on pictures made by the test: poses, formats, loss. Extremes: tests/extremes.
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
-#include <glm/matrix.hpp>
 
 #include "drivers/error.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
-namespace previz::tracking {
-namespace tracker_test {
+namespace previz::tracking::tracker_test {
 
 TEST(Tracker, FindsTheCameraFromAllTags) {
   const TagScene scene = table();
@@ -71,13 +66,13 @@ TEST(Tracker, RefusesWhatCannotBe) {
   };
   set::Tracking settings = settings_for(scene);
   settings.family = "tag99";
-  EXPECT_NE(refusal(settings, scene.lens).find("tag36h11"), std::string::npos);
+  EXPECT_THAT(refusal(settings, scene.lens), HasSubstr("tag36h11"));
   settings = settings_for(scene);
   settings.tags[1].id = 0;
-  EXPECT_NE(refusal(settings, scene.lens).find("twice"), std::string::npos);
+  EXPECT_THAT(refusal(settings, scene.lens), HasSubstr("twice"));
   settings = settings_for(scene);
   settings.tags[1].size_m = 0;
-  EXPECT_NE(refusal(settings, scene.lens).find("size"), std::string::npos);
+  EXPECT_THAT(refusal(settings, scene.lens), HasSubstr("size"));
 }
 
 TEST(Tracker, SaysWhyItIsLost) {
@@ -92,13 +87,13 @@ TEST(Tracker, SaysWhyItIsLost) {
   };
   TagScene empty = scene;
   empty.tags.clear();
-  EXPECT_NE(reason(empty).find("no tag"), std::string::npos);
+  EXPECT_THAT(reason(empty), HasSubstr("no tag"));
   TagScene strange = scene;
   strange.tags = {flat_tag(77, 0.08, {0, 0, 0})};
-  EXPECT_NE(reason(strange).find("not in the set file: tag 77"), std::string::npos);
+  EXPECT_THAT(reason(strange), HasSubstr("not in the set file: tag 77"));
   TagScene larger = scene;
   larger.lens = test::plain_lens(500, 360, 450);
-  EXPECT_NE(reason(larger).find("500x360"), std::string::npos);
+  EXPECT_THAT(reason(larger), HasSubstr("500x360"));
   Frame truncated = picture(scene, random);
   truncated.bytes.resize(100);
   EXPECT_EQ(tracker->track(truncated).status, TrackStatus::lost);
@@ -132,8 +127,7 @@ TEST(Tracker, ReportsAMovedTag) {
   const Track track = tracker->track(picture(moved, random));
   ASSERT_EQ(track.status, TrackStatus::tracked) << track.reason;
   EXPECT_EQ(track.pose->tags, (std::vector<int>{0, 2, 3}));
-  EXPECT_NE(track.reason.find("tag 1: not where the set file says"), std::string::npos)
-      << track.reason;
+  EXPECT_THAT(track.reason, HasSubstr("tag 1: not where the set file says"));
   EXPECT_LT(distance(track.pose->world_from_camera, scene.world_from_camera), 0.003);
 }
 
@@ -146,7 +140,7 @@ TEST(Tracker, TwoTagsAtOddsAreNotGuessedAbout) {
   const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
   const Track track = tracker->track(picture(moved, random));
   EXPECT_EQ(track.status, TrackStatus::lost);
-  EXPECT_NE(track.reason.find("disagree"), std::string::npos) << track.reason;
+  EXPECT_THAT(track.reason, HasSubstr("disagree"));
 }
 
 // Normalised errors of whole pictures: mean of n chi-squares of 6 degrees, standard error
@@ -235,5 +229,4 @@ TEST(Tracker, NoiseHoldsNoTags) {
   }
 }
 
-}  // namespace tracker_test
-}  // namespace previz::tracking
+}  // namespace previz::tracking::tracker_test

@@ -1,16 +1,9 @@
 // The search for settings, on simulated costs and errors.
 #include "daemon/trade/answer.hpp"
 
-#include <gtest/gtest.h>
+#include "tests/support/test.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <optional>
-#include <string>
-#include <vector>
-
-namespace previz::trade {
-namespace answer_test {
+namespace previz::trade::answer_test {
 
 TEST(TradeAnswer, StepsAreThoseThatNoOtherBeats) {
   const std::vector<TradeStep> best = best_steps({{{1, 1, true}, 0.030, 0.08},
@@ -151,9 +144,8 @@ TEST(TradeAnswer, SaysTheRateThatIsShownWhereNoneHolds) {
   Simulated simulated;
   const auto answers = answer({25, 0.1}, {}, {}, {}, simulated.probe(1000));
   EXPECT_FALSE(answers[0].is_met);
-  EXPECT_NE(answers[0].words.find("more than this machine can do beside tracking and lighting"),
-            std::string::npos)
-      << answers[0].words;
+  EXPECT_THAT(answers[0].words,
+              HasSubstr("more than this machine can do beside tracking and lighting"));
 }
 
 TEST(TradeAnswer, SaysWhyARehearsalShowedNothing) {
@@ -199,5 +191,4 @@ TEST(TradeAnswer, DoesNotTryWhatWasWorseAlone) {
   EXPECT_TRUE(asked(4));
 }
 
-}  // namespace answer_test
-}  // namespace previz::trade
+}  // namespace previz::trade::answer_test

@@ -1,16 +1,12 @@
 // What `previzd trade` makes of its table of axes.
 #include "daemon/trade/axes.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-
 #include "daemon/render/feature.hpp"
 #include "drivers/error.hpp"
 #include "shaders/lib/render_shared.h"
+#include "tests/support/test.hpp"
 
-namespace previz::trade {
-namespace axes_test {
+namespace previz::trade::axes_test {
 
 TradePlan plan_of(const TradeSettings& own, const std::vector<std::string>& wanted = {}) {
   return plan_trade(own, trade_axes(own, ~gpu::FEATURE_TEXTURES), wanted);
@@ -108,5 +104,4 @@ TEST(TradeAxes, OnlyThoseWantedAreSwept) {
   EXPECT_THROW(plan_of({}, {"estimators"}), Error);
 }
 
-}  // namespace axes_test
-}  // namespace previz::trade
+}  // namespace previz::trade::axes_test

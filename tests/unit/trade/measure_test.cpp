@@ -1,13 +1,9 @@
 // The figures of `previzd trade` on made-up pictures, where they are known in closed form.
-#include <gtest/gtest.h>
-
-#include <cmath>
-#include <random>
-
 #include "daemon/trade/measure.hpp"
 
-namespace previz::trade {
-namespace measure_test {
+#include "tests/support/test.hpp"
+
+namespace previz::trade::measure_test {
 
 // Left half uncovered, right half covered; every channel the same.
 TradePicture made_up(float uncovered_added, float covered_shown, int width = 16, int height = 16) {
@@ -172,5 +168,4 @@ TEST(TradeReference, SquaredErrorIsWithoutTheReferencesNoise) {
   EXPECT_NEAR(by_half.value, 2.5e-4, 3 * by_half.deviation);
 }
 
-}  // namespace measure_test
-}  // namespace previz::trade
+}  // namespace previz::trade::measure_test

@@ -1,17 +1,12 @@
 // The table and the page of `previzd trade`, of a made-up sweep.
 #include "daemon/trade/page.hpp"
 
-#include <gtest/gtest.h>
-
-#include <regex>
-#include <sstream>
-
 #include "daemon/trade/chart.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::trade {
-namespace page_test {
+namespace previz::trade::page_test {
 
 Plate grey(int width, int height) {
   return {width, height, 8, std::vector<std::uint16_t>(3 * std::size_t(width) * height, 128)};
@@ -68,7 +63,7 @@ TEST(TradeCsv, HasALineForEveryVariantAndNumberOfSamples) {
 TEST(TradePage, NeedsNothingBesidesItself) {
   const std::string html = trade_page(made_report());
   for (const char* outside : {"http:", "https:", "<script", "<link", "@import", "url("})
-    EXPECT_EQ(html.find(outside), std::string::npos) << outside;
+    EXPECT_THAT(html, Not(HasSubstr(outside))) << outside;
   const std::regex reference("(src|href)=\"([^\"]{0,22})");
   int pictures = 0;
   for (auto it = std::sregex_iterator(html.begin(), html.end(), reference);
@@ -84,7 +79,7 @@ TEST(TradePage, TellsTheFrontInWords) {
   // (1, 1) is on the front, nearer than the one before it by just a tenth: not worth a line.
   EXPECT_EQ(front_of(report).size(), 3u);
   EXPECT_EQ(listed_front_of(report), (std::vector<TradeFrontPoint>{{1, 0}, {0, 1}}));
-  EXPECT_NE(trade_page(report).find("set's own picture by: 1, 13 %"), std::string::npos);
+  EXPECT_THAT(trade_page(report), HasSubstr("set's own picture by: 1, 13 %"));
 }
 
 // 103 x 73 pixels are 156.6 times 8 x 6: a ratio, and no minutes and seconds.
@@ -92,15 +87,14 @@ TEST(TradePage, SaysHowMuchLongerTheFullSizeTakes) {
   TradeReport report = made_report();
   report.full_width = 103;
   report.full_height = 73;
-  EXPECT_NE(trade_page(report).find("would take about 157 times as long"), std::string::npos);
+  EXPECT_THAT(trade_page(report), HasSubstr("would take about 157 times as long"));
   report.full_width = 12;
   report.full_height = 7;
-  EXPECT_NE(trade_page(report).find("would take about 1.8 times as long"), std::string::npos);
+  EXPECT_THAT(trade_page(report), HasSubstr("would take about 1.8 times as long"));
 }
 
 TEST(TradePage, WhatPeopleNamedCannotBreakIt) {
-  EXPECT_NE(trade_page(made_report()).find("desk &lt;1&gt; &amp; &quot;2&quot;"),
-            std::string::npos);
+  EXPECT_THAT(trade_page(made_report()), HasSubstr("desk &lt;1&gt; &amp; &quot;2&quot;"));
 }
 
 TEST(TradeChart, NumbersReadWell) {
@@ -136,5 +130,4 @@ TEST(TradeChart, EveryDotIsInside) {
   }
 }
 
-}  // namespace page_test
-}  // namespace previz::trade
+}  // namespace previz::trade::page_test

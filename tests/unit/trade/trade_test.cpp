@@ -1,20 +1,14 @@
 // `previzd trade` from end to end on a small take, on whatever Vulkan device there is.
 #include "daemon/trade/trade.hpp"
 
-#include <gtest/gtest.h>
-
-#include <algorithm>
-#include <fstream>
-#include <sstream>
-
 #include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
 
-namespace previz::trade {
-namespace trade_test {
+namespace previz::trade::trade_test {
 
 class Trade : public testing::Test {
  protected:
@@ -34,12 +28,12 @@ class Trade : public testing::Test {
       run_trade(refused, out_);
       ADD_FAILURE() << "not refused: " << words;
     } catch (const Error& error) {
-      EXPECT_NE(std::string(error.what()).find(words), std::string::npos) << error.what();
+      EXPECT_THAT(error.what(), HasSubstr(words));
     }
   }
   void rewrite_set(const std::string& from, const std::string& to) {
     std::string text = session::read_file(directory_ / "set.toml");
-    ASSERT_NE(text.find(from), std::string::npos);
+    ASSERT_THAT(text, HasSubstr(from));
     text.replace(text.find(from), from.size(), to);
     std::ofstream(directory_ / "set.toml") << text;
   }
@@ -58,8 +52,8 @@ TEST_F(Trade, SweepsAndWritesTableAndPage) {
   for (const TradePlan::Axis& axis : report.plan.axes) entries += axis.entries.size();
   const std::string csv = session::read_file(report.csv);
   EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(csv, '\n')), 2 + 2 * entries);
-  EXPECT_NE(session::read_file(report.page).find("What time buys on"), std::string::npos);
-  EXPECT_NE(out_.str().find("round 3 of 3, estimator difference ("), std::string::npos);
+  EXPECT_THAT(session::read_file(report.page), HasSubstr("What time buys on"));
+  EXPECT_THAT(out_.str(), HasSubstr("round 3 of 3, estimator difference ("));
 
   for (const TradeMethod& method : report.methods) {
     ASSERT_EQ(method.points.size(), 2u);
@@ -135,7 +129,7 @@ TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
       EXPECT_EQ(set.quality.denoise, answer.making.denoise);
     }
   }
-  EXPECT_NE(session::read_file(report.page).find("What you get"), std::string::npos);
+  EXPECT_THAT(session::read_file(report.page), HasSubstr("What you get"));
 }
 
 TEST_F(Trade, TakesASessionOrTheNewestTakeOfALiveSet) {
@@ -205,9 +199,9 @@ TEST_F(Trade, AStopLeavesWhatIsKnown) {
   const TradeReport report = run_trade(stopped, out_);
   EXPECT_TRUE(report.interrupted);
   const std::string page = session::read_file(report.page);
-  EXPECT_NE(page.find("It was stopped before it had ended"), std::string::npos);
-  EXPECT_NE(page.find("There was no time to measure: "), std::string::npos);
-  EXPECT_NE(page.find("<b>converged</b>"), std::string::npos);
+  EXPECT_THAT(page, HasSubstr("It was stopped before it had ended"));
+  EXPECT_THAT(page, HasSubstr("There was no time to measure: "));
+  EXPECT_THAT(page, HasSubstr("<b>converged</b>"));
   EXPECT_TRUE(report.answers.empty());
 }
 
@@ -225,15 +219,15 @@ TEST_F(Trade, TakesTheTimeThatItIsGiven) {
   ASSERT_EQ(report.answers.size(), 3u);
   for (const TradeAnswer& answer : report.answers) {
     EXPECT_FALSE(answer.is_whole) << answer.use;
-    EXPECT_NE(answer.words.find("no time to try all settings"), std::string::npos);
+    EXPECT_THAT(answer.words, HasSubstr("no time to try all settings"));
     EXPECT_EQ(answer.file.empty(), !answer.is_met);
   }
   const std::string csv = session::read_file(report.csv);
-  EXPECT_NE(csv.find("estimator,"), std::string::npos);
+  EXPECT_THAT(csv, HasSubstr("estimator,"));
   const auto count = std::ranges::count(csv, '\n');
   // The heads, the reference, and the set's own settings on each axis.
   EXPECT_EQ(count, 2 + 2 * std::ptrdiff_t(report.plan.axes.size())) << csv;
-  EXPECT_NE(out_.str().find(", within "), std::string::npos);
+  EXPECT_THAT(out_.str(), HasSubstr(", within "));
 }
 
 // The second trade of the same frame and set measures only what the first did not: no method, and
@@ -245,8 +239,8 @@ TEST_F(Trade, GoesOnFromItsLastTable) {
   const TradeReport first = run_trade(once, out_);
   out_.str("");
   const TradeReport second = run_trade(once, out_);
-  EXPECT_NE(out_.str().find("continuing the last table"), std::string::npos);
-  EXPECT_EQ(out_.str().find("round 1 of 1"), std::string::npos) << out_.str();
+  EXPECT_THAT(out_.str(), HasSubstr("continuing the last table"));
+  EXPECT_THAT(out_.str(), Not(HasSubstr("round 1 of 1")));
   EXPECT_EQ(second.reference_samples, first.reference_samples);
   for (std::size_t m = 0; m < first.methods.size(); ++m)
     for (std::size_t i = 0; i < first.methods[m].points.size(); ++i) {
@@ -260,14 +254,14 @@ TEST_F(Trade, GoesOnFromItsLastTable) {
   out_.str("");
   const TradeReport third = run_trade(once, out_);
   EXPECT_EQ(third.reference_samples, 2 * first.reference_samples);
-  EXPECT_EQ(out_.str().find("round 1 of 2"), std::string::npos) << out_.str();
-  EXPECT_NE(out_.str().find("round 2 of 2"), std::string::npos) << out_.str();
+  EXPECT_THAT(out_.str(), Not(HasSubstr("round 1 of 2")));
+  EXPECT_THAT(out_.str(), HasSubstr("round 2 of 2"));
 
   rewrite_set("[quality]", "[estimator]\nmax_depth = 3\n\n[quality]");
   out_.str("");
   run_trade(once, out_);
-  EXPECT_NE(out_.str().find("measuring everything again"), std::string::npos) << out_.str();
-  EXPECT_NE(out_.str().find("round 1 of 2"), std::string::npos);
+  EXPECT_THAT(out_.str(), HasSubstr("measuring everything again"));
+  EXPECT_THAT(out_.str(), HasSubstr("round 1 of 2"));
 }
 
 TEST_F(Trade, ADamagedMemoryIsSaidAndNotUsed) {
@@ -279,13 +273,11 @@ TEST_F(Trade, ADamagedMemoryIsSaidAndNotUsed) {
   std::filesystem::resize_file(reference, std::filesystem::file_size(reference) / 2);
   out_.str("");
   run_trade(once, out_);
-  EXPECT_NE(out_.str().find("it ends early; measuring everything again"), std::string::npos)
-      << out_.str();
+  EXPECT_THAT(out_.str(), HasSubstr("it ends early; measuring everything again"));
   std::ofstream(directory_ / "out" / "trade.json") << "{]";
   out_.str("");
   EXPECT_NO_THROW(run_trade(once, out_));
-  EXPECT_NE(out_.str().find("measuring everything again"), std::string::npos) << out_.str();
+  EXPECT_THAT(out_.str(), HasSubstr("measuring everything again"));
 }
 
-}  // namespace trade_test
-}  // namespace previz::trade
+}  // namespace previz::trade::trade_test
