@@ -1,6 +1,5 @@
 // Time to an error beside Blender Cycles' shadow catcher, each against its own converged picture,
 // and how far each converged picture is from the truth. tests/bench/cycles/run calls it.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
@@ -13,6 +12,7 @@
 #include "tests/bench/equal_error/reference.hpp"
 #include "tests/bench/equal_error/time_to_error.hpp"
 #include "tests/bench/measure.hpp"
+#include "tests/bench/program.hpp"
 
 namespace previz::bench {
 namespace {
@@ -251,12 +251,8 @@ int main(int argc, char** argv) {
   app.add_option("--cycles-reference", options.cycles_reference_samples, "Samples of Cycles'");
   app.add_option("--samples", options.samples, "Up to these; Cycles up to four times as many");
   app.add_option("--error", options.errors, "Shares, as 0.1");
-  CLI11_PARSE(app, argc, argv);
-  try {
+  return previz::bench::run_program(app, argc, argv, [&] {
     const auto device = previz::render::open_device();
     for (const auto& set : options.sets) previz::bench::Comparison(device, options, set).run();
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_cycles: %s\n", error.what());
-    return 2;
-  }
+  });
 }

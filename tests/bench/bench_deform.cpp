@@ -1,6 +1,5 @@
 // What it costs that a figure walks: the time of a frame before which a figure with a skin took
 // another shape, over that of a frame before which nothing changed (P13). Both alternate.
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <vector>
@@ -8,6 +7,7 @@
 #include "daemon/render/renderer.hpp"
 #include "drivers/error.hpp"
 #include "tests/bench/frames_after_change.hpp"
+#include "tests/bench/program.hpp"
 #include "tests/bench/tracers/shapes.hpp"
 #include "tests/support/figure.hpp"
 
@@ -57,12 +57,5 @@ int main(int argc, char** argv) {
   app.add_option("--rounds", options.rounds)->check(CLI::Range(1, 1000));
   app.add_option("--width", options.width)->check(CLI::Range(8, 8192));
   app.add_option("--height", options.height)->check(CLI::Range(8, 8192));
-  CLI11_PARSE(app, argc, argv);
-  try {
-    previz::bench::run(options);
-  } catch (const previz::Error& error) {
-    std::fprintf(stderr, "%s\n", error.what());
-    return 1;
-  }
-  return 0;
+  return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run(options); });
 }

@@ -1,7 +1,6 @@
 // Measures how much CPU time the forms of the difference estimator need to reach the same error of
 // the difference image, complete and with one technique left out (tests/truth/README.md,
 // "Equal-error time"). Methods take turns within a round; rounds have random numbers of their own.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -16,6 +15,7 @@
 #include "tests/bench/equal_error/reference.hpp"
 #include "tests/bench/equal_error/time_to_error.hpp"
 #include "tests/bench/measure.hpp"
+#include "tests/bench/program.hpp"
 
 namespace previz::bench {
 namespace {
@@ -204,11 +204,5 @@ int main(int argc, char** argv) {
           CLI::CheckedTransformer(std::map<std::string, LightMode>{{"image", LightMode::image},
                                                                    {"sources", LightMode::sources},
                                                                    {"hybrid", LightMode::hybrid}}));
-  CLI11_PARSE(app, argc, argv);
-  try {
-    previz::bench::run(options);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_equal_error: %s\n", error.what());
-    return 2;
-  }
+  return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run(options); });
 }

@@ -1,6 +1,5 @@
 // Time of a frame of one sample a pixel over resolution, for several numbers of triangles: the
-// paper's figure 4. Writes a table (CSV) and a chart (SVG).
-#include <CLI/CLI.hpp>
+// paper's figure 4. Prints a table, and writes it as CSV where that is asked for.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -12,7 +11,7 @@
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/bench/measure.hpp"
-#include "tests/bench/plot.hpp"
+#include "tests/bench/program.hpp"
 #include "tests/bench/tracers/shapes.hpp"
 
 namespace previz::bench {
@@ -22,8 +21,7 @@ struct Options {
   std::vector<std::size_t> triangles{4'000, 98'000, 582'000, 1'000'000};
   int rounds = 3;
   int depth = 4;
-  std::string clock = "wall";
-  std::string out = ".";
+  std::string csv;
 };
 
 struct Resolution {
@@ -35,11 +33,6 @@ constexpr Resolution resolutions[] = {{320, 240},  {640, 480},  {800, 600},
 struct Times {
   double wall_ms = 0, cpu_ms = 0;
 };
-
-std::string name_of(std::size_t triangles) {
-  return triangles < 1'000'000 ? std::to_string((triangles + 500) / 1000) + " K triangles"
-                               : std::to_string((triangles + 500'000) / 1'000'000) + " M triangles";
-}
 
 lighting::EnvironmentMap sky() {
   lighting::EnvironmentMap map{32, {}};
@@ -72,27 +65,17 @@ Times measure(render::Renderer& renderer, const render::FrameInput& frame, int r
 
 void run(const Options& options) {
   const auto device = render::open_device();
-  const std::string device_name = render::device_name(*device);
-  std::printf("%s, %d bounces, 1 sample a pixel\n\n", device_name.c_str(), options.depth);
+  std::printf("%s, %d bounces, 1 sample a pixel\n\n", render::device_name(*device).c_str(),
+              options.depth);
   std::printf(
       "| triangles | resolution | ms a frame | CPU ms a frame |\n| --- | --- | --- | --- |\n");
-  std::ofstream csv(options.out + "/frame.csv");
+  std::ofstream csv(options.csv);
   csv << "triangles,width,height,wall_ms,cpu_ms\n";
-  Chart chart{"1 sample a pixel, " + device_name,
-              "resolution",
-              options.clock == "cpu" ? "CPU ms a frame (sum over cores)" : "ms a frame",
-              {},
-              {}};
-  for (const Resolution& r : resolutions)
-    chart.x_ticks.emplace_back(1e-6 * r.width * r.height,
-                               std::to_string(r.width) + "x" + std::to_string(r.height));
   set::Estimation estimation;
   estimation.max_depth = options.depth;
   for (const std::size_t triangles : options.triangles) {
     const scene::Scene scene = field_with_a_virtual_sphere(triangles);
     const std::size_t count = scene.meshes[0].triangles.size() + scene.meshes[1].triangles.size();
-    Curve& curve = chart.curves.emplace_back();
-    curve.name = name_of(count);
     for (const Resolution& r : resolutions) {
       render::Renderer renderer(device, estimation, camera_of(r.width, r.height));
       renderer.set_scene(scene);
@@ -108,13 +91,10 @@ void run(const Options& options) {
       std::fflush(stdout);
       csv << count << ',' << r.width << ',' << r.height << ',' << times.wall_ms << ','
           << times.cpu_ms << '\n';
-      curve.points.emplace_back(1e-6 * r.width * r.height,
-                                options.clock == "cpu" ? times.cpu_ms : times.wall_ms);
     }
   }
   csv.close();
-  if (!csv) throw Error("bench: " + options.out + "/frame.csv cannot be written");
-  write_svg(chart, options.out + "/frame.svg");
+  if (!csv && !options.csv.empty()) throw Error(options.csv + ": cannot be written");
 }
 
 }  // namespace
@@ -126,15 +106,6 @@ int main(int argc, char** argv) {
   app.add_option("--triangles", options.triangles, "Triangles of the real scene, about");
   app.add_option("--rounds", options.rounds, "Frames measured; the median counts");
   app.add_option("--depth", options.depth, "Path vertices after the camera");
-  app.add_option("--clock", options.clock, "What the chart shows; the table has both")
-      ->check(CLI::IsMember({"wall", "cpu"}));
-  app.add_option("--out", options.out, "Folder for frame.csv and frame.svg")
-      ->check(CLI::ExistingDirectory);
-  CLI11_PARSE(app, argc, argv);
-  try {
-    previz::bench::run(options);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_frame: %s\n", error.what());
-    return 1;
-  }
+  app.add_option("--csv", options.csv, "File for the table");
+  return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run(options); });
 }

@@ -1,7 +1,6 @@
 // How many samples, and how much time, light sources save: the error of the difference image with
 // the light around a truth set as an image, sampled as in the paper (by the BSDF alone) and by
 // importance, and with its sources as lamps. Each kind of light against its own reference.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -13,6 +12,7 @@
 #include "tests/bench/equal_error/reference.hpp"
 #include "tests/bench/equal_error/time_to_error.hpp"
 #include "tests/bench/measure.hpp"
+#include "tests/bench/program.hpp"
 #include "tests/truth/compare.hpp"
 
 namespace previz::bench {
@@ -155,12 +155,5 @@ int main(int argc, char** argv) {
   app.add_option("--paper-samples", options.paper_samples);
   app.add_option("--reference", options.reference_samples);
   app.add_flag("!--no-photons", options.photons, "without caustics");
-  CLI11_PARSE(app, argc, argv);
-  try {
-    previz::bench::run_light(options);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_light: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run_light(options); });
 }

@@ -1,6 +1,5 @@
 // Measures what a live frame costs, pass by pass: the camera of a truth set moves on, every frame
 // gets few samples, is averaged with those before it, denoised and dithered.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -11,6 +10,7 @@
 #include "drivers/plate.hpp"
 #include "tests/bench/equal_error/view.hpp"
 #include "tests/bench/measure.hpp"
+#include "tests/bench/program.hpp"
 
 namespace previz::bench {
 namespace {
@@ -107,11 +107,5 @@ int main(int argc, char** argv) {
   app.add_option("--frames", options.frames, "measured")->check(CLI::Range(1, 1000));
   app.add_option("--device", options.device, "part of its name");
   app.add_flag("!--no-history", options.history, "every frame stands alone");
-  CLI11_PARSE(app, argc, argv);
-  try {
-    previz::bench::run(options);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_live: %s\n", error.what());
-    return 1;
-  }
+  return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run(options); });
 }

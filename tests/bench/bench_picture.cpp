@@ -1,6 +1,5 @@
 // What a frame costs beside its samples: from the camera's picture to the renderer, and from its
 // sums to the picture that is shown.
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <functional>
@@ -11,6 +10,7 @@
 #include "daemon/render/renderer.hpp"
 #include "drivers/plate.hpp"
 #include "tests/bench/measure.hpp"
+#include "tests/bench/program.hpp"
 #include "tests/bench/tracers/shapes.hpp"
 
 namespace previz::bench {
@@ -88,11 +88,5 @@ int main(int argc, char** argv) {
   CLI::App app("Milliseconds of a frame beside its samples");
   app.add_option("--width", options.width, "Pixels");
   app.add_option("--height", options.height, "Pixels");
-  CLI11_PARSE(app, argc, argv);
-  try {
-    previz::bench::run(options);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_picture: %s\n", error.what());
-    return 1;
-  }
+  return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run(options); });
 }

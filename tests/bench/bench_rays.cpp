@@ -1,6 +1,5 @@
 // Rays per second of our traversal beside Embree's single-ray calls: same mesh, same rays, in turns
 // in one run, in CPU time of all threads, so that "a core" means a core whatever else runs here.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "tests/bench/measure.hpp"
+#include "tests/bench/program.hpp"
 #include "tests/bench/tracers/embree_tracer.hpp"
 #include "tests/bench/tracers/gpu_tracer.hpp"
 #include "tests/bench/tracers/shapes.hpp"
@@ -185,14 +185,10 @@ int main(int argc, char** argv) {
   app.add_option("--size", options.size, "Primary rays in x and y, a multiple of 16");
   app.add_option("--rounds", options.rounds, "Rounds in turns");
   app.add_flag("--instanced", options.instanced, "One instance a sphere instead of one mesh");
-  CLI11_PARSE(app, argc, argv);
-  try {
+  return previz::bench::run_program(app, argc, argv, [&] {
     previz::render::Device device({});
     std::printf("%s\n", device.name().c_str());
     for (const std::size_t triangles : options.triangles)
       previz::bench::run(device, triangles, options);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_rays: %s\n", error.what());
-    return 1;
-  }
+  });
 }

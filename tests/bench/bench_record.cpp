@@ -2,7 +2,6 @@
 // a disk, and each that is not kept by its cause. Prints a row of a table.
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -18,6 +17,7 @@
 #include "drivers/session/session.hpp"
 #include "tests/bench/camera_pictures.hpp"
 #include "tests/bench/measure.hpp"
+#include "tests/bench/program.hpp"
 
 namespace previz::bench {
 namespace {
@@ -201,11 +201,5 @@ int main(int argc, char** argv) {
   app.add_option("--rate", options.rate_hz, "Pictures a second");
   app.add_option("--seconds", options.seconds, "Length of the take");
   app.add_option("--reserve-mb", options.reserve_mb, "A take ends before less than this is free");
-  CLI11_PARSE(app, argc, argv);
-  try {
-    previz::bench::run(options);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_record: %s\n", error.what());
-    return 1;
-  }
+  return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run(options); });
 }

@@ -4,7 +4,6 @@
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -21,6 +20,7 @@
 #include "daemon/tracking/pose_starts.hpp"
 #include "drivers/error.hpp"
 #include "tests/bench/measure.hpp"
+#include "tests/bench/program.hpp"
 #include "tests/truth/tracking_measure.hpp"
 #include "tests/truth/tracking_photographs.hpp"
 
@@ -199,13 +199,8 @@ int main(int argc, char** argv) {
   app.add_option("--video", video, "of the wall with tags 3 and 4")->check(CLI::ExistingFile);
   app.add_option("--times", times, "plays the frames of a set so often, forth and back")
       ->check(CLI::Range(1, 100));
-  CLI11_PARSE(app, argc, argv);
-  try {
+  return previz::bench::run_program(app, argc, argv, [&] {
     for (const std::string& set : sets) previz::bench::run(previz::bench::enlarged(set, times));
     if (!video.empty()) previz::bench::run(previz::bench::of_wall(video));
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "bench_tracking: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -1,8 +1,8 @@
 #!/bin/sh
 # All benchmarks of a build: run.sh BUILD_DIR OUT_DIR [SETDIR...]. Writes rays.md, instances.md,
-# frame.md, frame.csv and frame.svg, picture.md, move.md, and where ground truth sets are given live.md,
+# frame.md, frame.csv, picture.md, move.md, deform.md, and where ground truth sets are given live.md,
 # equal_error.md and tracking.md.
-# CLOCK=cpu (default where the device is lavapipe: wall elsewhere) or wall. Beside Cycles: cycles/run.
+# Beside Cycles: cycles/run.
 set -eu
 if [ $# -lt 2 ]; then
   echo "usage: $0 BUILD_DIR OUT_DIR [SETDIR...]" >&2
@@ -15,8 +15,7 @@ mkdir -p "$out"
 
 "$bench/bench_rays" | tee "$out/rays.md"
 "$bench/bench_rays" --instanced --triangles 98000 1000000 | tee "$out/instances.md"
-if head -n 1 "$out/rays.md" | grep -q llvmpipe; then default=cpu; else default=wall; fi
-"$bench/bench_frame" --clock "${CLOCK:-$default}" --out "$out" | tee "$out/frame.md"
+"$bench/bench_frame" --csv "$out/frame.csv" | tee "$out/frame.md"
 "$bench/bench_picture" | tee "$out/picture.md"
 "$bench/bench_move" | tee "$out/move.md"
 "$bench/bench_deform" | tee "$out/deform.md"

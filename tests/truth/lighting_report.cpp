@@ -1,12 +1,12 @@
 // lighting_report SETDIR...: captured light against the true environment of ground truth sets, and
 // both as pictures to look at.
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <map>
 
 #include "daemon/output/png.hpp"
 #include "drivers/error.hpp"
+#include "tests/bench/program.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/truth/lighting_measure.hpp"
 
@@ -78,8 +78,7 @@ int main(int argc, char** argv) {
   app.add_option("--resolution", settings.resolution, "texels a side; 0: from the camera");
   app.add_flag("--single", single, "the last frame only instead of all exposures");
   app.add_option("--out", out, "directory for latitude-longitude pictures of both maps");
-  CLI11_PARSE(app, argc, argv);
-  try {
+  return previz::bench::run_program(app, argc, argv, [&] {
     if (!out.empty()) std::filesystem::create_directories(out);
     for (const std::string& directory : sets) {
       const truth::TruthSet set = truth::load_truth_set(directory);
@@ -91,9 +90,5 @@ int main(int argc, char** argv) {
       write_pictures(out, set.name + "_captured", measure.captured.environment);
       write_pictures(out, set.name + "_true", measure.truth);
     }
-  } catch (const Error& error) {
-    std::fprintf(stderr, "lighting_report: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -1,6 +1,5 @@
 // tracking_report SETDIR...: the tracker's figures on ground truth sets, a line a frame and a
 // total.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -9,6 +8,7 @@
 #include <utility>
 
 #include "drivers/error.hpp"
+#include "tests/bench/program.hpp"
 #include "tests/truth/tracking_measure.hpp"
 #include "tests/truth/tracking_photographs.hpp"
 
@@ -128,8 +128,7 @@ int main(int argc, char** argv) {
   std::string photographs;
   app.add_option("--photographs", photographs, "folder with apriltag/ and video/")
       ->check(CLI::ExistingDirectory);
-  CLI11_PARSE(app, argc, argv);
-  try {
+  return previz::bench::run_program(app, argc, argv, [&] {
     for (const std::string& directory : sets) {
       const truth::TruthSet set = truth::load_truth_set(directory);
       set::Tracking settings = truth::tracking_settings(set);
@@ -137,9 +136,5 @@ int main(int argc, char** argv) {
       report(set, settings, in_parts ? tracking::Search::parts : tracking::Search::whole);
     }
     if (!photographs.empty()) report_photographs(photographs, decimate);
-  } catch (const Error& error) {
-    std::fprintf(stderr, "tracking_report: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -1,6 +1,5 @@
 // Renders truth frames with the reference CPU tracer and compares: whether the truth and our
 // material models are the same, without the renderer under test.
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdio>
 #include <iostream>
@@ -8,6 +7,7 @@
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/scene/load.hpp"
 #include "drivers/error.hpp"
+#include "tests/bench/program.hpp"
 #include "tests/truth/compare.hpp"
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/cpu_tracer.hpp"
@@ -131,12 +131,6 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({1, 2, 4, 8}));
   app.add_option("--spp", samples, "samples per (reduced) pixel, in two halves [256]")
       ->check(CLI::Range(2, 1000000));
-  CLI11_PARSE(app, argc, argv);
-  try {
-    previz::truth::run(directory, frame, reduction, samples);
-    return 0;
-  } catch (const std::exception& e) {
-    std::cerr << "truth reference: " << e.what() << std::endl;
-    return 2;
-  }
+  return previz::bench::run_program(
+      app, argc, argv, [&] { previz::truth::run(directory, frame, reduction, samples); });
 }
