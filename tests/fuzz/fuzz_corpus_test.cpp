@@ -6,6 +6,7 @@ extern "C" {
 #include <libavutil/log.h>
 }
 
+#include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
@@ -24,34 +25,7 @@ std::vector<std::filesystem::path> inputs_of(const Target& target) {
 }
 
 bool accepted(const Target& target, const std::string& input) {
-  return accepts(target, {reinterpret_cast<const std::uint8_t*>(input.data()), input.size()});
-}
-
-// Changes a few bytes, or the numbers that they may be.
-std::string changed(std::string input, std::mt19937& random) {
-  static constexpr std::array<std::uint32_t, 6> words = {0,          1,          0x7fffffff,
-                                                         0x80000000, 0xffffffff, 0x7fc00000};
-  for (std::size_t times = 1 + random() % 3; times > 0 && !input.empty(); --times) {
-    const std::size_t at = random() % input.size();
-    switch (random() % 5) {
-      case 0:
-        input[at] = static_cast<char>(random());
-        break;
-      case 1:
-        input[at] = static_cast<char>(input[at] ^ 1 << random() % 8);
-        break;
-      case 2:
-        std::memcpy(&input[at], &words[random() % words.size()],
-                    std::min<std::size_t>(4, input.size() - at));
-        break;
-      case 3:
-        input.erase(at, 1 + random() % 8);
-        break;
-      default:
-        input.insert(at, input, random() % input.size(), 1 + random() % 8);
-    }
-  }
-  return input;
+  return accepts(target, bytes_of(input));
 }
 
 class FuzzCorpus : public testing::TestWithParam<Target> {
@@ -78,7 +52,7 @@ TEST_P(FuzzCorpus, BreaksNoReaderCutOrChanged) {
     for (std::size_t cut = 0; cut < 32; ++cut)
       accepted(GetParam(), whole.substr(0, whole.size() * cut / 32));
     std::mt19937 random(1);
-    for (int times = 0; times < 64; ++times) accepted(GetParam(), changed(whole, random));
+    for (int times = 0; times < 64; ++times) accepted(GetParam(), mutate_bytes(whole, random));
   }
 }
 

@@ -33,6 +33,10 @@ std::optional<std::string> mutate_matroska(Bytes bytes, std::mt19937& random);
 // The bytes of the target import_video: JSON, or Matroska behind its two bytes.
 std::optional<std::string> mutate_import_video(Bytes bytes, std::mt19937& random);
 
+// Changes one to three places of any bytes: one of them, the four from there on to a number that is
+// extreme, or some are dropped or repeated.
+std::string mutate_bytes(std::string bytes, std::mt19937& random);
+
 // Returns a number from 0 to count - 1. The count must be 1 at least.
 inline std::size_t below(std::mt19937& random, std::size_t count) {
   return static_cast<std::size_t>(random()) % count;

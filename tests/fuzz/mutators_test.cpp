@@ -1,5 +1,5 @@
 // Thousands of changes of structure, the same ones on every run: what comes out is still of its
-// format and other than what went in, and every kind of change is among them.
+// format and other than what went in.
 #include <toml++/toml.h>
 
 #include <nlohmann/json.hpp>
@@ -17,10 +17,6 @@ constexpr std::uint32_t many = 2000;
 std::string kept(const char* target, const char* file) {
   return session::content_of(std::filesystem::path(PREVIZ_SOURCE_DIR) / "tests/fuzz/corpus" /
                              target / file);
-}
-
-Bytes bytes_of(const std::string& text) {
-  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
 // As libFuzzer's entry asks: by the target, and with one seed for each change.
@@ -73,114 +69,27 @@ Json tree_of_json(const std::string& text) {
   return Json::parse(text, nullptr, false);
 }
 
-std::size_t depth_of(const Json& tree) {
-  std::size_t depth = 0;
-  if (tree.is_structured())
-    for (const Json& child : tree) depth = std::max(depth, 1 + depth_of(child));
-  return depth;
-}
-
-struct Leaves {
-  std::map<std::string, std::string> at;  // by path
-  std::multiset<std::string> values;
-};
-
-Leaves leaves_of(const Json& tree) {
-  Leaves leaves;
-  const Json flat = tree.flatten();
-  for (const auto& [path, value] : flat.items()) {
-    leaves.at[path] = value.dump(-1, ' ', false, Json::error_handler_t::replace);
-    leaves.values.insert(leaves.at[path]);
-  }
-  return leaves;
-}
-
-// How many of the changes show that something of the kind was done. One may show several.
-struct Kinds {
-  std::map<std::string, int> seen;
-
-  void add(const Json& before, const Leaves& old_leaves, const Json& after) {
-    const Leaves leaves = leaves_of(after);
-    const auto& [at, values] = leaves;
-    const bool is_part = std::ranges::all_of(at, [&](const auto& leaf) {
-      const auto old = old_leaves.at.find(leaf.first);
-      return old != old_leaves.at.end() && old->second == leaf.second;
-    });
-    const bool has_all = std::ranges::includes(values, old_leaves.values);
-    seen["dropped"] += is_part && at.size() < old_leaves.at.size();
-    seen["repeated"] += has_all && values.size() > old_leaves.values.size();
-    seen["swapped"] += values == old_leaves.values && paths(at) == paths(old_leaves.at);
-    seen["renamed"] += values == old_leaves.values && paths(at) != paths(old_leaves.at);
-    seen["nested"] += has_all && depth_of(after) > depth_of(before);
-    if (at.size() == old_leaves.at.size() && paths(at) == paths(old_leaves.at))
-      for (const auto& [path, value] : at) add_value(old_leaves.at.at(path), value);
-  }
-
-  // A value in the place of another.
-  void add_value(const std::string& before, const std::string& after) {
-    if (before == after) return;
-    seen["of another type"] += (before[0] == '"') != (after[0] == '"');
-    seen["huge"] += after == "9223372036854775807";
-    seen["beyond a double"] += after == "9007199254740993";
-    seen["negative"] += after == "-1";
-    seen["denormal"] += Json::parse(after).is_number_float() && Json::parse(after) == -1e-320;
-    seen["without text"] += after == "\"\"";
-    seen["long text"] += after.size() > 4000;
-    seen["path upwards"] += after.find("../..") != std::string::npos;
-  }
-
-  static std::set<std::string> paths(const std::map<std::string, std::string>& at) {
-    std::set<std::string> paths;
-    for (const auto& leaf : at) paths.insert(leaf.first);
-    return paths;
-  }
-
-  void expect_all() const {
-    EXPECT_EQ(seen.size(), 13u);
-    for (const auto& [kind, times] : seen) EXPECT_GT(times, 0) << kind;
-  }
-};
-
 // The writers write what their parsers take, whatever the tree is, so all are of the format.
-void expect_trees(const char* target, const std::string& input,
-                  Json (*tree_of)(const std::string&)) {
-  const Json before = tree_of(input);
-  const Leaves leaves = leaves_of(before);
-  Kinds kinds;
-  for (const std::string& output : mutations(target, input)) {
-    const Json after = tree_of(output);
-    ASSERT_FALSE(after.is_discarded()) << output;
-    if (!after.empty()) kinds.add(before, leaves, after);
-  }
-  kinds.expect_all();
+void expect_trees(const char* target, const char* file, Json (*tree_of)(const std::string&)) {
+  for (const std::string& output : mutations(target, kept(target, file)))
+    ASSERT_FALSE(tree_of(output).is_discarded()) << output;
 }
 
 TEST(Mutators, ChangeToml) {
-  expect_trees("session_toml", kept("session_toml", "take.toml"), tree_of_toml);
-  expect_trees("set", kept("set", "demo.toml"), tree_of_toml);
+  expect_trees("session_toml", "take.toml", tree_of_toml);
+  expect_trees("set", "demo.toml", tree_of_toml);
 }
 
 TEST(Mutators, ChangeTomlToNumbersThatJsonLacks) {
   const std::vector<std::string> all = mutations("session_toml", "a = 1.5\nb = [2, 3]\n");
   for (const char* text : {"a = inf", "a = -inf", "a = nan"})
-    EXPECT_TRUE(std::ranges::any_of(all, [&](const std::string& output) {
-      return output.find(text) != std::string::npos;
-    })) << text;
+    EXPECT_THAT(all, Contains(HasSubstr(text)));
 }
 
 TEST(Mutators, ChangeJson) {
-  expect_trees("frames_json", kept("frames_json", "list"), tree_of_json);
-  expect_trees("import_video", kept("import_video", "both"), tree_of_json);
-  expect_trees("gltf", kept("gltf", "pane.gltf"), tree_of_json);
-}
-
-// ---- lines
-
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream stream(text);
-  for (std::string line; std::getline(stream, line);) lines.push_back(line);
-  return lines;
+  expect_trees("frames_json", "list", tree_of_json);
+  expect_trees("import_video", "both", tree_of_json);
+  expect_trees("gltf", "pane.gltf", tree_of_json);
 }
 
 TEST(Mutators, ChangeLinesOfJson) {
@@ -188,22 +97,13 @@ TEST(Mutators, ChangeLinesOfJson) {
        {std::pair{"frame_lines", "observer.jsonl"}, std::pair{"track_lines", "track.jsonl"},
         std::pair{"button_lines", "events.jsonl"}}) {
     SCOPED_TRACE(target);
-    const std::vector<std::string> before = lines_of(kept(target, file));
-    const std::multiset<std::string> sorted(before.begin(), before.end());
-    std::map<std::string, int> seen;
+    std::set<std::ptrdiff_t> counts;
     for (const std::string& output : mutations(target, kept(target, file))) {
-      const std::vector<std::string> after = lines_of(output);
-      const std::multiset<std::string> after_sorted(after.begin(), after.end());
-      for (const std::string& line : after) ASSERT_TRUE(Json::accept(line)) << line;
-      seen["dropped"] +=
-          after.size() < before.size() && std::ranges::includes(sorted, after_sorted);
-      seen["repeated"] += after.size() > before.size() &&
-                          std::ranges::includes(after_sorted, sorted) &&
-                          std::set(after.begin(), after.end()).size() == before.size();
-      seen["swapped"] += after != before && after_sorted == sorted;
-      seen["changed"] += after.size() == before.size() && after_sorted != sorted;
+      std::istringstream lines(output);
+      for (std::string line; std::getline(lines, line);) ASSERT_TRUE(Json::accept(line)) << line;
+      counts.insert(std::ranges::count(output, '\n'));
     }
-    for (const auto& [kind, times] : seen) EXPECT_GT(times, 0) << kind;
+    EXPECT_GE(counts.size(), 3u);  // lines are dropped and repeated
   }
 }
 
@@ -234,21 +134,16 @@ std::vector<std::string> chunks_of(const std::string& file) {
 
 TEST(Mutators, ChangeBinaryGltfWithTheRightLengths) {
   const std::string input = kept("gltf", "draco.glb");
-  const std::vector<std::string> before = chunks_of(input);
-  ASSERT_EQ(before.size(), 2u);
-  std::map<std::string, int> seen;
+  ASSERT_EQ(chunks_of(input).size(), 2u);
+  std::set<std::size_t> counts;
   for (const std::string& output : mutations("gltf", input)) {
     const std::vector<std::string> after = chunks_of(output);
     ASSERT_FALSE(after.empty());
     ASSERT_EQ(after[0].substr(0, 4), "JSON");
     ASSERT_TRUE(Json::accept(after[0].substr(4)));
-    seen["JSON changed"] += after[0] != before[0];
-    seen["buffer dropped"] += after.size() == 1;
-    seen["buffer repeated"] += after.size() == 3 && after[1] == after[2];
-    seen["buffer changed"] += after.size() == 2 && after[1] != before[1];
+    counts.insert(after.size());
   }
-  EXPECT_EQ(seen.size(), 4u);
-  for (const auto& [kind, times] : seen) EXPECT_GT(times, 0) << kind;
+  EXPECT_THAT(counts, ElementsAre(1, 2, 3));  // the buffer is dropped and repeated
 }
 
 // Indices in range, and the first two beyond it.
@@ -269,9 +164,6 @@ TEST(Mutators, ExchangeIndicesOfGltf) {
 // ---- Matroska
 
 struct Walk {
-  std::multiset<std::string> elements;  // ids and values of those that hold no others
-  std::vector<std::string> order;       // the same, as they follow each other
-  std::size_t depth = 0;
   bool is_readable = true;  // all the bytes are elements
   bool is_right = true;     // and the sizes end where what holds them ends
 };
@@ -295,8 +187,7 @@ std::size_t width_of(std::string_view bytes) {
   return static_cast<std::size_t>(std::countl_zero(static_cast<unsigned char>(bytes[0]))) + 1;
 }
 
-void walk(std::string_view bytes, std::size_t depth, Walk& walked) {
-  walked.depth = std::max(walked.depth, depth);
+void walk(std::string_view bytes, Walk& walked) {
   while (!bytes.empty()) {
     const std::size_t id_width = width_of(bytes);
     const std::uint64_t id = take(bytes, id_width);
@@ -309,52 +200,37 @@ void walk(std::string_view bytes, std::size_t depth, Walk& walked) {
     walked.is_right = walked.is_right && size <= bytes.size();
     const std::string_view body = bytes.substr(0, size);
     bytes.remove_prefix(body.size());
-    if (std::ranges::find(holding, id) != holding.end()) {
-      walk(body, depth + 1, walked);
-      continue;
-    }
-    walked.order.push_back(std::to_string(id) + ' ' + std::string(body));
-    walked.elements.insert(walked.order.back());
+    if (std::ranges::find(holding, id) != holding.end()) walk(body, walked);
   }
 }
 
 Walk walk(const std::string& file) {
   Walk walked;
-  walk(file, 0, walked);
+  walk(file, walked);
   return walked;
 }
 
 TEST(Mutators, ChangeMatroska) {
   const std::string input = kept("matroska", "observer.mkv");
-  const Walk before = walk(input);
-  ASSERT_TRUE(before.is_right);
-  std::map<std::string, int> seen;
+  ASSERT_TRUE(walk(input).is_right);
+  std::uint32_t readable = 0, right = 0;
+  std::set<std::string> sizes;
   for (const std::string& output : mutations("matroska", input)) {
     const Walk after = walk(output);
-    seen["readable"] += after.is_readable;
-    seen["with right sizes"] += after.is_right;
-    const bool has_all = std::ranges::includes(after.elements, before.elements);
-    const bool is_part = std::ranges::includes(before.elements, after.elements);
-    seen["dropped"] += after.is_right && is_part && !has_all;
-    seen["repeated"] += after.is_right && has_all && !is_part;
-    seen["swapped"] += after.is_right && has_all && is_part && after.order != before.order;
-    seen["nested"] += after.is_right && has_all && after.depth > before.depth;
-    seen["of another value"] +=
-        after.is_right && after.order.size() == before.order.size() && !is_part;
-    const std::string eight = "\x01\xff\xff\xff\xff\xff\xff";
-    seen["of unknown size"] += output.find(eight + '\xff') != std::string::npos;
-    seen["of the largest size"] += output.find(eight + '\xfe') != std::string::npos;
-    seen["of a wrong size"] += has_all && is_part && !after.is_right;
+    readable += after.is_readable ? 1 : 0;
+    right += after.is_right ? 1 : 0;
+    for (const char* last : {"\xff", "\xfe"})  // an unknown size, and the largest
+      if (output.find(std::string("\x01\xff\xff\xff\xff\xff\xff") + last) != std::string::npos)
+        sizes.insert(last);
   }
-  EXPECT_EQ(seen.size(), 10u);
-  for (const auto& [kind, times] : seen) EXPECT_GT(times, 0) << kind;
+  EXPECT_EQ(sizes.size(), 2u);
   // A change makes a size wrong in 1/16 * 5/8 of cases, and those of all that hold what is changed
   // in 1/32: below 0.071, and below 0.2 for three changes. Bytes that are no element are left where
   // a size is one off (1/16 * 2/8) and where those wrong ones cut an element (half of 1/32, since
   // as many changes keep the length): 0.032, and 0.064 for the two changes that there are on
   // average, of which a part looks like elements by chance.
-  EXPECT_GT(seen["with right sizes"], many * 80 / 100);
-  EXPECT_GT(seen["readable"], many * 95 / 100);
+  EXPECT_GT(right, many * 80 / 100);
+  EXPECT_GT(readable, many * 95 / 100);
 }
 
 TEST(Mutators, ChangeAVideoBehindItsMark) {

@@ -48,10 +48,6 @@ void expect(bool holds, const char* promise) {
   std::abort();
 }
 
-std::string text_of(Bytes bytes) {
-  return {bytes.begin(), bytes.end()};
-}
-
 const std::filesystem::path& work_folder() {
   static const test::TemporaryDirectory directory;
   return directory.path();

@@ -13,6 +13,15 @@
 namespace previz::fuzz {
 
 using Bytes = std::span<const std::uint8_t>;
+
+inline Bytes bytes_of(std::string_view text) {
+  return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+inline std::string text_of(Bytes bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
 // Returns the bytes with their structure changed, or null if they do not have the structure.
 using Mutator = std::optional<std::string> (*)(Bytes, std::mt19937&);
 
@@ -44,7 +53,6 @@ std::span<const Target> video_targets();
 
 // Reports a promise that was broken, and aborts.
 void expect(bool holds, const char* promise);
-std::string text_of(Bytes bytes);
 // Returns a folder of this process in the folder for temporary files.
 const std::filesystem::path& work_folder();
 // Writes the bytes to a file in the folder, over what it was, and returns its path.

@@ -1,4 +1,3 @@
-
 #include "drivers/replay/replay_camera.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/session_fixture.hpp"

@@ -1,4 +1,3 @@
-
 #include "drivers/session/nominal_rate.hpp"
 #include "drivers/session/session_toml.hpp"
 #include "drivers/session/timecode.hpp"

@@ -1,4 +1,3 @@
-
 #include "drivers/session/session_toml.hpp"
 #include "drivers/calibration/pose.hpp"
 #include "drivers/error.hpp"

@@ -1,4 +1,3 @@
-
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/picture_header.hpp"
 #include "drivers/error.hpp"

@@ -10,7 +10,6 @@
 namespace previz::lighting::picture_formats_test {
 
 using std::numbers::pi;
-using ::testing::HasSubstr;
 
 using Rgbe = std::array<int, 4>;
 using Sky = previz::test::Sky;

@@ -13,9 +13,6 @@
 
 namespace previz::lighting::picture_repair_test {
 
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float not_a_number = std::numeric_limits<float>::quiet_NaN();
 

@@ -18,8 +18,6 @@
 
 namespace previz::print::print_test {
 
-using ::testing::HasSubstr;
-
 // A raster of so many dots an inch, as an office printer's half: a pixel is 0.17 mm.
 constexpr double dots_per_inch = 150;
 constexpr double px_per_mm = dots_per_inch / 25.4;

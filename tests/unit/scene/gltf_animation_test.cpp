@@ -1,15 +1,11 @@
 // glTF animations: what keys mean between them (by hand), what is taken up, what is refused.
-#include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
-#include <numbers>
 
 #include "daemon/scene/animation.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::gltf_animation_test {
 
-using ::testing::Contains;
-using ::testing::HasSubstr;
 using Json = GltfWriter::Json;
 using namespace scene;
 

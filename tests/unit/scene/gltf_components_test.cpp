@@ -4,11 +4,6 @@
 
 namespace previz::test::gltf_components_test {
 
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-
 constexpr int byte = 5120, ubyte = 5121, short_ = 5122, ushort_ = 5123, uint_ = 5125;
 
 class GltfComponents : public GltfTest {

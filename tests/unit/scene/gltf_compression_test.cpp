@@ -1,10 +1,6 @@
 // Compressed glTF meshes against the same meshes uncompressed, and what is refused of them.
 #include <meshoptimizer.h>
 
-#include <algorithm>
-#include <array>
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <glm/vec4.hpp>
 
 #include "tests/support/gltf_compressed.hpp"
@@ -12,9 +8,6 @@
 
 namespace previz::test::gltf_compression_test {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using Json = GltfWriter::Json;
 

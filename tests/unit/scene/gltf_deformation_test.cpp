@@ -1,6 +1,5 @@
 // Skins and morph targets as glTF files have them: what a mesh is at rest, how an animation shapes
 // it, what is refused.
-#include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "daemon/scene/bvh_refit.hpp"
@@ -10,10 +9,6 @@
 
 namespace previz::test::gltf_deformation_test {
 
-using ::testing::Contains;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
-using ::testing::Not;
 using Json = GltfWriter::Json;
 using namespace scene;
 

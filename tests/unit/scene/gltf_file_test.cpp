@@ -1,12 +1,8 @@
-#include <fstream>
-
 #include "daemon/scene/load.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::gltf_file_test {
 
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using Json = GltfWriter::Json;
 
 class GltfFiles : public GltfTest {

@@ -1,17 +1,8 @@
-#include <cmath>
-#include <fstream>
-#include <limits>
-#include <numbers>
-
 #include "daemon/scene/load_log.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::gltf_material_test {
 
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using Json = GltfWriter::Json;
 
 class GltfMaterials : public GltfTest {

@@ -1,14 +1,7 @@
-#include <glm/geometric.hpp>
-#include <limits>
-
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::gltf_mesh_test {
 
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using Json = GltfWriter::Json;
 
 using GltfMesh = GltfTest;

@@ -10,105 +10,19 @@
 #include "daemon/scene/placement.hpp"
 #include "daemon/scene/scene.hpp"
 #include "drivers/error.hpp"
+#include "tests/fuzz/mutators.hpp"
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/gltf_sample.hpp"
+#include "tests/support/session_fixture.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::test::gltf_mutation_test {
 
-using Json = GltfWriter::Json;
-
-class Mutator {
- public:
-  explicit Mutator(std::uint32_t seed) : engine_(seed) {}
-
-  std::size_t below(std::size_t count) { return engine_() % count; }
-
-  std::string bytes(std::string file) {
-    for (std::size_t i = 0, times = 1 + below(4); i < times && file.size() > 8; ++i) {
-      const std::size_t at = below(file.size());
-      switch (below(10)) {
-        default:
-          file[at] = static_cast<char>(file[at] ^ (1 << below(8)));
-          break;
-        case 1:
-          file[at] = static_cast<char>(below(256));
-          break;
-        case 2: {
-          const std::uint32_t words[] = {0, 1, 0x7fffffff, 0x80000000, 0xffffffff, 0x7fc00000};
-          if (at + 4 <= file.size()) std::memcpy(&file[at], &words[below(6)], 4);
-          break;
-        }
-        case 3:
-          file.resize(at);
-          break;
-        case 4:
-          file.erase(at, 1 + below(16));
-          break;
-        case 5:
-          file.insert(at, file, below(file.size()), 1 + below(16));
-          break;
-      }
-    }
-    return file;
-  }
-
-  // One value anywhere in the tree becomes another.
-  void json(Json& root) {
-    Json* at = &root;
-    while (at->is_structured() && !at->empty() && (at == &root || below(5) > 0)) {
-      auto child = at->begin();
-      std::advance(child, static_cast<long>(below(at->size())));
-      if (below(12) == 0) {
-        at->erase(child);
-        return;
-      }
-      at = &*child;
-    }
-    *at = value();
-  }
-
- private:
-  Json value() {
-    const Json values[] = {nullptr,
-                           true,
-                           -1,
-                           0,
-                           1,
-                           2,
-                           5,
-                           5121,
-                           5123,
-                           5125,
-                           5126,
-                           255,
-                           65536,
-                           1 << 20,
-                           1 << 30,
-                           2147483647,
-                           4294967296,
-                           -2147483648LL,
-                           18446744073709551615ull,
-                           0.5,
-                           -1.5,
-                           1e-300,
-                           1e300,
-                           "",
-                           "VEC3",
-                           "SCALAR",
-                           "x",
-                           Json::array(),
-                           Json::object(),
-                           {0, 0, 0},
-                           {0, 1, 2, 3},
-                           {{0}},
-                           {{"index", 0}}};
-    return values[below(std::size(values))];
-  }
-
-  std::mt19937_64 engine_;
-};
+std::string bytes_of(const GltfWriter& gltf, const std::filesystem::path& file) {
+  gltf.save(file);
+  return session::content_of(file);
+}
 
 void expect_sound(const scene::Scene& scene) {
   for (const scene::Mesh& mesh : scene.meshes) {
@@ -177,6 +91,11 @@ class GltfMutations : public ::testing::Test {
     load(file, "go");
   }
 
+  void load_bytes(const std::string& bytes) {
+    std::ofstream(directory_ / "mutant", std::ios::binary) << bytes;
+    load(directory_ / "mutant");
+  }
+
   void load(const std::filesystem::path& file, const std::string& animation) {
     set::Set set;
     set.objects.resize(1);
@@ -212,39 +131,33 @@ class GltfMutations : public ::testing::Test {
     EXPECT_LT(peak_kib() - peak_before_kib_, 1 << 20);
   }
 
-  test::TemporaryDirectory directory_;
+  TemporaryDirectory directory_;
   const long peak_before_kib_ = peak_kib();
   int loaded_ = 0, refused_ = 0;
   double slowest_s_ = 0;
 };
 
 TEST_F(GltfMutations, OfBytesOfABinaryFile) {
-  const std::filesystem::path file = directory_ / "mutant";
-  test::gltf_sample().save(directory_ / "sample.glb");
-  std::ifstream stream(directory_ / "sample.glb", std::ios::binary);
-  const std::string whole{std::istreambuf_iterator<char>(stream), {}};
+  const std::string whole = bytes_of(gltf_sample(), directory_ / "sample.glb");
   load(directory_ / "sample.glb");
   ASSERT_EQ(loaded_, 2);
   for (std::uint32_t seed = 0; seed < 1500; ++seed) {
     SCOPED_TRACE(seed);
-    std::ofstream(file, std::ios::binary) << Mutator(seed).bytes(whole);
-    load(file);
+    std::mt19937 random(seed);
+    load_bytes(fuzz::mutate_bytes(whole, random));
   }
   EXPECT_GT(loaded_, 40);
   EXPECT_GT(refused_, 400);
 }
 
 TEST_F(GltfMutations, OfValuesOfTheJson) {
-  const GltfWriter gltf = test::gltf_sample();
-  for (std::uint32_t seed = 0; seed < 1000; ++seed) {
-    SCOPED_TRACE(seed);
-    Mutator mutator(seed);
-    GltfWriter mutant = gltf;
-    for (std::size_t i = 0, times = 1 + mutator.below(3); i < times; ++i) mutator.json(mutant.json);
-    if (!mutant.json.is_object()) continue;
-    const std::filesystem::path file = directory_ / (seed % 2 == 0 ? "mutant.gltf" : "mutant.glb");
-    mutant.save(file);
-    load(file);
+  for (const char* name : {"sample.gltf", "sample.glb"}) {
+    const std::string whole = bytes_of(gltf_sample(), directory_ / name);
+    for (std::uint32_t seed = 0; seed < 500; ++seed) {
+      SCOPED_TRACE(seed);
+      std::mt19937 random(seed);
+      load_bytes(fuzz::mutate_gltf(fuzz::bytes_of(whole), random).value());
+    }
   }
   EXPECT_GT(loaded_, 160);
   EXPECT_GT(refused_, 200);
@@ -252,18 +165,15 @@ TEST_F(GltfMutations, OfValuesOfTheJson) {
 
 // What is damaged here is mostly the compressed data, which the decoders must refuse themselves.
 TEST_F(GltfMutations, OfCompressedMeshes) {
-  const std::filesystem::path file = directory_ / "mutant.glb";
-  for (const GltfWriter& gltf : {test::meshopt_grid(), test::draco_grid()}) {
-    gltf.save(directory_ / "whole.glb");
-    std::ifstream stream(directory_ / "whole.glb", std::ios::binary);
-    const std::string whole{std::istreambuf_iterator<char>(stream), {}};
+  for (const GltfWriter& gltf : {meshopt_grid(), draco_grid()}) {
+    const std::string whole = bytes_of(gltf, directory_ / "whole.glb");
     const std::size_t data = whole.find("BIN\0", 0, 4) + 4;
     for (std::uint32_t seed = 0; seed < 1000; ++seed) {
       SCOPED_TRACE(seed);
-      std::string mutant = Mutator(seed).bytes(whole.substr(data));
+      std::mt19937 random(seed);
+      std::string mutant = fuzz::mutate_bytes(whole.substr(data), random);
       mutant.resize(whole.size() - data);
-      std::ofstream(file, std::ios::binary) << whole.substr(0, data) + mutant;
-      load(file, "");
+      load_bytes(whole.substr(0, data) + mutant);
     }
   }
   EXPECT_GT(loaded_, 40);
@@ -271,13 +181,8 @@ TEST_F(GltfMutations, OfCompressedMeshes) {
 }
 
 TEST_F(GltfMutations, OfEveryTruncation) {
-  test::gltf_sample().save(directory_ / "sample.glb");
-  std::ifstream stream(directory_ / "sample.glb", std::ios::binary);
-  const std::string whole{std::istreambuf_iterator<char>(stream), {}};
-  for (std::size_t size = 0; size < whole.size(); size += 7) {
-    std::ofstream(directory_ / "short", std::ios::binary) << whole.substr(0, size);
-    load(directory_ / "short");
-  }
+  const std::string whole = bytes_of(gltf_sample(), directory_ / "sample.glb");
+  for (std::size_t size = 0; size < whole.size(); size += 7) load_bytes(whole.substr(0, size));
   EXPECT_EQ(loaded_, 0);
 }
 

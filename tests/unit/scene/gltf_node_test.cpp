@@ -1,17 +1,8 @@
-#include <cmath>
-#include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
-#include <numbers>
-
 #include "daemon/scene/placement.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::gltf_node_test {
 
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using Json = GltfWriter::Json;
 
 using GltfNodes = GltfTest;

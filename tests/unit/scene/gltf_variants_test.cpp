@@ -4,12 +4,7 @@
 
 namespace previz::test::gltf_variants_test {
 
-using ::testing::AllOf;
 using ::testing::AnyOf;
-using ::testing::Contains;
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using Json = GltfWriter::Json;
 
 class GltfVariants : public GltfTest {

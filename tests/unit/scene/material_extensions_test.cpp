@@ -2,22 +2,13 @@
 // shaders and the renderer take from it.
 #include "daemon/scene/material_extensions.hpp"
 
-#include <algorithm>
 #include <bit>
-#include <limits>
-#include <map>
-#include <set>
-#include <string>
-#include <vector>
 
 #include "daemon/render/feature.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::material_extensions_test {
 
-using ::testing::ElementsAre;
-using ::testing::HasSubstr;
-using ::testing::IsEmpty;
 using Json = GltfWriter::Json;
 using scene::Material;
 

@@ -1,4 +1,3 @@
-
 #include "tests/support/scenes.hpp"
 #include "tests/support/test.hpp"
 
