@@ -70,6 +70,7 @@ void run(const Options& options) {
   std::printf(
       "| triangles | resolution | ms a frame | CPU ms a frame |\n| --- | --- | --- | --- |\n");
   std::ofstream csv(options.csv);
+  if (!csv && !options.csv.empty()) throw Error(options.csv + ": cannot be written");
   csv << "triangles,width,height,wall_ms,cpu_ms\n";
   set::Estimation estimation;
   estimation.max_depth = options.depth;
@@ -93,8 +94,6 @@ void run(const Options& options) {
           << times.cpu_ms << '\n';
     }
   }
-  csv.close();
-  if (!csv && !options.csv.empty()) throw Error(options.csv + ": cannot be written");
 }
 
 }  // namespace
