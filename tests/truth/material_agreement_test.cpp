@@ -8,8 +8,7 @@ namespace previz::test::material_agreement_test {
 
 // Patches of normals up to half a radian off.
 scene::Texture bumps() {
-  scene::Texture texture;
-  texture.width = texture.height = 8;
+  scene::Texture texture = texture_of(8, 8);
   for (int i = 0; i < 64; ++i) {
     const double angle = 2.4 * i;
     const glm::dvec3 n =
@@ -20,8 +19,7 @@ scene::Texture bumps() {
 }
 
 scene::Texture holes() {
-  scene::Texture texture;
-  texture.width = texture.height = 4;
+  scene::Texture texture = texture_of(4, 4);
   texture.nearest = true;
   for (int i = 0; i < 16; ++i)
     texture.texels.emplace_back(glm::vec3(1), (i + i / 4) % 2 == 0 ? 1.0f : 0.0f);
@@ -30,19 +28,14 @@ scene::Texture holes() {
 
 // Returns a function that puts a mesh of a material somewhere into the scene.
 auto adder_to(scene::Scene& scene) {
-  return [&scene](scene::Mesh mesh, const scene::Material& material, const glm::dvec3& at,
-                  std::uint32_t presence) {
-    glm::dmat4 placed(1.0);
-    placed[3] = glm::dvec4(at, 1);
-    add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material), placed,
-                 presence);
-  };
+  return [&scene](const scene::Mesh& mesh, const scene::Material& material, const glm::dvec3& place,
+                  std::uint32_t presence) { add(scene, mesh, material, at(place), presence); };
 }
 
 // Rough glass, solid and as a pane, white rough metal, normal maps on plastic and metal, a veil and
 // a glowing fence with holes; on a table in both worlds, under an environment with a bright side.
 View rough_materials() {
-  View view;
+  View view = empty_view({0.6, -2, 1.2}, {0, 0, 0.15}, pinhole(64, 48, 0.8));
   scene::Scene& scene = view.scene;
   const auto add = adder_to(scene);
   scene::Material ball = glass(1.5f);
@@ -70,10 +63,7 @@ View rough_materials() {
   fence.base_color_texture = add_texture(scene, holes());
   add(box_mesh({0.4, 0.002, 0.3}), veil, {0.6, -0.7, 0.2}, scene::world_mixed);
   add(box_mesh({0.3, 0.002, 0.3}), fence, {-0.7, -0.4, 0.2}, scene::world_both);
-  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
-  for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
-  view.calibration = pinhole(64, 48, 0.8);
-  view.world_from_camera = look_at({0.6, -2, 1.2}, {0, 0, 0.15});
+  view.environment = one_sided_sky();
   return view;
 }
 
@@ -81,41 +71,26 @@ View rough_materials() {
 // a matt share, one bent round a lamp, and a mirror and a solid ball that show them; lamps of every
 // extent, one of them a mesh, in front of the panes and behind.
 View panes() {
-  View view;
+  View view = empty_view({0.6, -2, 1.2}, {0, 0, 0.15}, pinhole(48, 32, 0.8));
   scene::Scene& scene = view.scene;
   const auto add = adder_to(scene);
-  const auto pane = [](const glm::vec3& tint) {
-    scene::Material material = glass(1.5f);
-    material.thin_walled = true;
-    material.base_color = tint;
-    return material;
-  };
   scene::Material dusty = pane({0.9f, 0.8f, 0.7f});
   dusty.transmission = 0.6f;
   dusty.specular = 0;
   add(rectangle_mesh({3, 3}), diffuse({0.6f, 0.5f, 0.4f}), {0, 0, 0}, scene::world_both);
-  add(rectangle_mesh({0.9, 0.9}), pane(glm::vec3(1)), {-0.5, 0, 0.5}, scene::world_both);
+  add(rectangle_mesh({0.9, 0.9}), pane(), {-0.5, 0, 0.5}, scene::world_both);
   add(rectangle_mesh({0.7, 0.7}), pane({0.9f, 0.5f, 0.1f}), {0.5, 0.1, 0.4}, scene::world_mixed);
   add(box_mesh({0.5, 0.05, 0.4}), dusty, {0, 0.6, 0.25}, scene::world_real);
   add(uv_sphere_mesh(0.15, 32, 16), pane({0.5f, 0.9f, 0.9f}), {0.1, -0.6, 0.3}, scene::world_mixed);
   add(uv_sphere_mesh(0.15, 32, 16), metal(glm::vec3(0.9f), 0.3f), {-0.5, -0.4, 0.15},
       scene::world_mixed);
   add(rectangle_mesh({0.3, 0.3}), emitter({4, 3, 2}), {-0.4, 0.3, 0.9}, scene::world_both);
-  set::Light ball = lamp(set::LightType::sphere, glm::dvec3(8, 6, 4));
-  ball.position = {0.1, -0.6, 0.3};
-  ball.radius_m = 0.08;
-  scene.lights.push_back(ball);
-  set::Light panel = lamp(set::LightType::rectangle, glm::dvec3(3, 4, 5));
-  panel.position = {0.6, 0.2, 1};
-  panel.direction = {0, 0, -1};
-  panel.width_m = panel.height_m = 0.4;
+  scene.lights.push_back(sphere_lamp({0.1, -0.6, 0.3}, 0.08, glm::dvec3(8, 6, 4)));
+  set::Light panel = panel_lamp({0.6, 0.2, 1}, {0.4, 0.4}, glm::dvec3(3, 4, 5));
   panel.gain_mixed = 0.6;
   panel.tint = {1, 0.7, 0.5};
   scene.lights.push_back(panel);
-  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
-  for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
-  view.calibration = pinhole(48, 32, 0.8);
-  view.world_from_camera = look_at({0.6, -2, 1.2}, {0, 0, 0.15});
+  view.environment = one_sided_sky();
   return view;
 }
 
@@ -134,7 +109,7 @@ TEST(RoughMaterials, AgreeWithTheCpuTracer) {
 // A coloured ball with a matt cube and a glowing one inside, a rough coloured box, and a coloured
 // block in both worlds that a lamp with a size stands in; lacquer on metal and, rough, on paint.
 View glass_and_lacquer() {
-  View view;
+  View view = empty_view({0.4, -2, 1.1}, {0, 0, 0.2}, pinhole(48, 32, 0.7));
   scene::Scene& scene = view.scene;
   const auto add = adder_to(scene);
   scene::Material jelly = glass(1.3f);
@@ -162,12 +137,8 @@ View glass_and_lacquer() {
   toy.clearcoat_roughness = 0.3f;
   add(uv_sphere_mesh(0.2, 48, 24), car, {0.75, 0.1, 0.22}, scene::world_mixed);
   add(box_mesh({0.25, 0.25, 0.25}), toy, {-0.75, 0.2, 0.14}, scene::world_both);
-  scene.lights.push_back(lamp(set::LightType::sphere, glm::dvec3(8, 7, 6)));
-  scene.lights.back().position = {0.1, 0.4, 0.3};
-  scene.lights.back().radius_m = 0.08;
+  scene.lights = {sphere_lamp({0.1, 0.4, 0.3}, 0.08, {8, 7, 6})};
   view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
-  view.calibration = pinhole(48, 32, 0.7);
-  view.world_from_camera = look_at({0.4, -2, 1.1}, {0, 0, 0.2});
   return view;
 }
 
@@ -182,7 +153,7 @@ TEST(GlassAndLacquer, HaveTheSameDifferenceByBothEstimators) {
 // Sheen above paint, a mirror, solid and rough glass, a pane and below lacquer; brushed metal and
 // brushed plastic with bumps, also where no texture coordinates say which way; coloured gloss.
 View cloth_and_brushed_metal() {
-  View view;
+  View view = empty_view({0.4, -2, 1.0}, {0, 0, 0.15}, pinhole(48, 32, 0.8));
   scene::Scene& scene = view.scene;
   const auto add = adder_to(scene);
   const auto under_sheen = [](scene::Material material, const glm::vec3& color, float roughness) {
@@ -213,11 +184,8 @@ View cloth_and_brushed_metal() {
   frosted.roughness = 0.5f;
   add(box_mesh({0.25, 0.25, 0.25}), under_sheen(frosted, white, 0.4f), {0.7, -0.4, 0.13},
       scene::world_mixed);
-  scene::Material pane = glass(1.5f);
-  pane.thin_walled = true;
-  pane.base_color = {0.9f, 0.8f, 0.7f};
-  add(box_mesh({0.5, 0.004, 0.4}), under_sheen(pane, {0.8f, 0.8f, 0.8f}, 0.6f), {0.3, 0.7, 0.2},
-      scene::world_real);
+  add(box_mesh({0.5, 0.004, 0.4}), under_sheen(pane({0.9f, 0.8f, 0.7f}), {0.8f, 0.8f, 0.8f}, 0.6f),
+      {0.3, 0.7, 0.2}, scene::world_real);
   scene::Material seat = under_sheen(plastic({0.6f, 0.1f, 0.1f}, 0.5f), {0.9f, 0.9f, 0.6f}, 0.7f);
   seat.clearcoat = 0.6f;
   seat.clearcoat_roughness = 0.4f;
@@ -225,13 +193,8 @@ View cloth_and_brushed_metal() {
   scene::Material gloss = plastic({0.05f, 0.05f, 0.05f}, 0.3f, 2.0f);
   gloss.specular_color = {1.5f, 0.3f, 0.1f};
   add(uv_sphere_mesh(0.12, 48, 24), gloss, {0.2, 0.3, 0.12}, scene::world_mixed);
-  scene.lights.push_back(lamp(set::LightType::sphere, glm::dvec3(6, 5, 4)));
-  scene.lights.back().position = {-0.5, -0.8, 1.2};
-  scene.lights.back().radius_m = 0.25;
-  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
-  for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
-  view.calibration = pinhole(48, 32, 0.8);
-  view.world_from_camera = look_at({0.4, -2, 1.0}, {0, 0, 0.15});
+  scene.lights = {sphere_lamp({-0.5, -0.8, 1.2}, 0.25, {6, 5, 4})};
+  view.environment = one_sided_sky();
   return view;
 }
 
@@ -245,8 +208,7 @@ TEST(ClothAndBrushedMetal, HaveTheSameDifferenceByBothEstimators) {
 
 // Patches of every channel from 0 to 1, of which no two beside each other are alike.
 scene::Texture patches(float least) {
-  scene::Texture texture;
-  texture.width = texture.height = 5;
+  scene::Texture texture = texture_of(5, 5);
   texture.nearest = true;
   for (int i = 0; i < 25; ++i) {
     glm::vec4 texel;
@@ -275,7 +237,7 @@ scene::Mesh painted(scene::Mesh mesh) {
 // their colours and their alpha from the mesh, and a lamp that glows in a pattern.
 View patchwork() {
   using scene::Material;
-  View view;
+  View view = empty_view({0.3, -2, 1.1}, {0, 0, 0.15}, pinhole(64, 48, 0.8));
   scene::Scene& scene = view.scene;
   const auto add = adder_to(scene);
   const std::uint32_t any = add_texture(scene, patches(0)),
@@ -293,9 +255,8 @@ View patchwork() {
   add(painted(rectangle_mesh({3, 3})), diffuse({0.6f, 0.5f, 0.4f}), {0, 0, 0}, scene::world_both);
   add(ball(0.2), textured(glass(1.5f), &Material::transmission_texture, any, 1), {-0.7, -0.3, 0.21},
       scene::world_mixed);
-  Material pane = textured(glass(1.5f), &Material::transmission_texture, any);
-  pane.thin_walled = true;
-  add(painted(box_mesh({0.4, 0.004, 0.4})), pane, {0, 0.7, 0.2}, scene::world_both);
+  add(painted(box_mesh({0.4, 0.004, 0.4})), textured(pane(), &Material::transmission_texture, any),
+      {0, 0.7, 0.2}, scene::world_both);
   Material car = textured(metal({0.6f, 0.2f, 0.1f}, 0.5f), &Material::normal_texture, dents);
   car.clearcoat = 1;
   car = textured(car, &Material::clearcoat_texture, any);
@@ -328,10 +289,7 @@ View patchwork() {
   Material sign = textured(emitter({3, 2, 1}), &Material::emission_texture, any, 1);
   sign.alpha_mode = scene::AlphaMode::blend;
   add(painted(box_mesh({0.3, 0.02, 0.2})), sign, {0.5, 0.7, 0.3}, scene::world_both);
-  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
-  for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
-  view.calibration = pinhole(64, 48, 0.8);
-  view.world_from_camera = look_at({0.3, -2, 1.1}, {0, 0, 0.15});
+  view.environment = one_sided_sky();
   return view;
 }
 

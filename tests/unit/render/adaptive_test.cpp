@@ -8,10 +8,7 @@
 namespace previz::test::adaptive_test {
 
 View small_set() {
-  RandomScene options;
-  options.width = 64;
-  options.height = 48;
-  return random_scene(2, options);
+  return random_scene(2, {.width = 64, .height = 48});
 }
 
 double rms_difference(const render::Layers& a, const render::Layers& b) {
@@ -69,20 +66,14 @@ TEST(Adaptive, ReachesTheErrorWithFewerSamplesThanEvenSampling) {
 // Without photons, which a part of a picture shares among its samples.
 TEST(Adaptive, LeavesTheSamplesOfAPixelAsTheyAre) {
   const View view = small_set();
-  set::Estimation estimation;
-  estimation.caustics = set::Caustics::traced;
-  SetRenderer renderer(view, estimation);
-  renderer.begin({{}, 1.0, view.world_from_camera});
-  renderer.render(8);
-  const render::Layers before = renderer.layers();
+  SetRenderer renderer(view, {.caustics = set::Caustics::traced});
+  const render::Layers before = renderer.rendered(8);
   std::vector<std::uint32_t> limits(8 * 6, 8);
   limits[8 * 3 + 4] = 16;  // x 32..39, y 24..31
   renderer.limit_samples(limits);
   renderer.render(20);
   const render::Layers after = renderer.layers();
-  renderer.begin({{}, 1.0, view.world_from_camera});
-  renderer.render(16);
-  const render::Layers all = renderer.layers();
+  const render::Layers all = renderer.rendered(16);
   for (int y = 0; y < 48; ++y) {
     for (int x = 0; x < 64; ++x) {
       const bool inside = x / 8 == 4 && y / 8 == 3;
@@ -226,18 +217,13 @@ TEST(Adaptive, ABudgetSpentByNeedMakesTheBetterPictureAndNoOther) {
 // the rest a steady glow, to which errors are relative. The truth comes from light samples, whose
 // error is far smaller.
 TEST(Adaptive, StoppingAtAnErrorLosesNoLight) {
-  View view;
-  glm::dmat4 above(1);
-  above[3].z = 0.001;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({4, 4})),
-               add_material(view.scene, emitter(glm::vec3(2))), glm::dmat4(1), scene::world_mixed);
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({0.255, 0.255})),
-               add_material(view.scene, diffuse(glm::vec3(0.5f))), above, scene::world_mixed);
+  View view = empty_view({0, 0, 1}, {0, 0, 0}, pinhole(32, 32, 0.5));
+  add(view.scene, rectangle_mesh({4, 4}), emitter(glm::vec3(2)), glm::dmat4(1), scene::world_mixed);
+  add(view.scene, rectangle_mesh({0.255, 0.255}), diffuse(glm::vec3(0.5f)), at({0, 0, 0.001}),
+      scene::world_mixed);
   view.environment = uniform_environment(glm::vec3(1), 256);
   const glm::vec3 overhead = glm::normalize(glm::vec3(0.01f, 0.01f, 1));
   view.environment.radiance[lighting::texel_index(256, overhead)] = glm::vec3(1000);
-  view.calibration = pinhole(32, 32, 0.5);
-  view.world_from_camera = look_at({0, 0, 1}, {0, 0, 0});
   SetRenderer renderer(view, up_to_depth(1));
   const auto sum_of = [&](const set::Quality& wish, std::uint32_t seed) {
     constexpr double exposure = 1e-6;  // nothing is clipped

@@ -21,9 +21,8 @@ render::EncodedEnvironment sky(double brightness) {
 
 // A lamp at infinity that the camera estimates, as a source of both worlds.
 set::Light found_lamp(double angle_rad, double irradiance) {
-  set::Light light = lamp(set::LightType::directional, glm::dvec3(irradiance));
-  light.direction = {std::sin(angle_rad), 0, -std::cos(angle_rad)};
-  light.angular_radius_rad = 0.01;
+  set::Light light =
+      sun_lamp({std::sin(angle_rad), 0, -std::cos(angle_rad)}, 0.01, glm::dvec3(irradiance));
   light.gain_mixed = light.gain_real = 1;
   return light;
 }
@@ -114,7 +113,7 @@ TEST(LightChange, ASteadyChangeIsFollowed) {
 
 render::GpuScene::Stance box_at(const glm::dvec3& place) {
   render::GpuScene::Stance stance;
-  stance.world_from_object = glm::translate(glm::dmat4(1.0), place);
+  stance.world_from_object = at(place);
   stance.low = glm::vec3(-0.5f);
   stance.high = glm::vec3(0.5f);
   stance.presence = scene::world_mixed;
@@ -176,15 +175,12 @@ struct TwoBoxes {
   TwoBoxes() {
     scene::Scene& scene = view.scene;
     const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
-    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
-    still = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.4))), gray,
-                         at({-0.9, 0, 0.2}), scene::world_mixed);
-    walks = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.2))), gray, at({0.9, 0, 0.1}),
-                         scene::world_mixed);
+    add(scene, rectangle_mesh(glm::dvec2(20)), gray);
+    still = add(scene, box_mesh(glm::dvec3(0.4)), gray, at({-0.9, 0, 0.2}), scene::world_mixed);
+    walks = add(scene, box_mesh(glm::dvec3(0.2)), gray, at({0.9, 0, 0.1}), scene::world_mixed);
     see_evenly_lit(view, glm::vec3(0.4f), 1.1);
     view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
   }
-  static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
 };
 
 Plate shown(SetRenderer& renderer, const View& view, int samples, bool accumulates) {
@@ -211,8 +207,7 @@ TEST(LocalHistory, EndsWhereSomethingWalksAndNotElsewhere) {
   std::vector<scene::Instance> instances = boxes.view.scene.instances;
   Plate walked, stood;
   for (int frame = 0; frame < 16; ++frame) {
-    instances[boxes.walks].world_from_object =
-        TwoBoxes::at({0.9 - 0.015 * frame, 0.01 * frame, 0.1});
+    instances[boxes.walks].world_from_object = at({0.9 - 0.015 * frame, 0.01 * frame, 0.1});
     walking.move(instances, {});
     walked = shown(walking, boxes.view, 1, true);
     stood = shown(standing, boxes.view, 1, true);
@@ -235,15 +230,14 @@ TEST(LocalHistory, EndsWhereSomethingWalksAndNotElsewhere) {
 TEST(LocalHistory, KeepsNothingOfAShadowThatIsGone) {
   TwoBoxes boxes;
   boxes.view.environment = uniform_environment(glm::vec3(0));
-  set::Light key = lamp(set::LightType::point, glm::dvec3(3));
-  key.position = {0.6, 1.2, 0.8};
+  set::Light key = point_lamp({0.6, 1.2, 0.8}, glm::dvec3(3));
   key.gain_real = 0;
   boxes.view.scene.lights = {key};
   SetRenderer renderer(boxes.view, up_to_depth(1)), fresh(boxes.view, up_to_depth(1));
   Plate before;
   for (int frame = 0; frame < 12; ++frame) before = shown(renderer, boxes.view, 4, true);
   std::vector<scene::Instance> instances = boxes.view.scene.instances;
-  instances[boxes.walks].world_from_object = TwoBoxes::at({0.1, 0.2, 0.1});
+  instances[boxes.walks].world_from_object = at({0.1, 0.2, 0.1});
   for (SetRenderer* each : {&renderer, &fresh}) each->move(instances, {key});
   const Plate after = shown(renderer, boxes.view, 4, true);
   const Plate begun = shown(fresh, boxes.view, 4, true);
@@ -265,7 +259,7 @@ TEST(LocalHistory, ShowsNoGhostOfWhatHasJumped) {
   SetRenderer renderer(boxes.view), fresh(boxes.view), reference(boxes.view);
   std::vector<scene::Instance> instances = boxes.view.scene.instances;
   for (int frame = 0; frame < 12; ++frame) shown(renderer, boxes.view, 1, true);
-  instances[boxes.walks].world_from_object = TwoBoxes::at({0.2, 0.3, 0.1});
+  instances[boxes.walks].world_from_object = at({0.2, 0.3, 0.1});
   for (SetRenderer* each : {&renderer, &fresh, &reference}) each->move(instances, {});
   const Plate truth = shown(reference, boxes.view, 1024, false);
   for (int frame = 0; frame < 5; ++frame) {

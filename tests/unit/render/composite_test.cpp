@@ -14,11 +14,7 @@ Plate show(const View& view, const Plate& plate, int samples) {
 }
 
 View real_set() {
-  RandomScene options;
-  options.width = 70;
-  options.height = 50;
-  options.virtual_objects = 0;
-  return random_scene(3, options);
+  return random_scene(3, {.width = 70, .height = 50, .virtual_objects = 0});
 }
 
 TEST(Composite, WithoutAVirtualObjectThePlateComesBackBitForBit) {
@@ -42,14 +38,9 @@ TEST(Composite, WithoutAVirtualObjectThePlateComesBackBitForBit) {
 }
 
 TEST(Composite, SamplesDoNotDependOnHowTheyAreAskedFor) {
-  RandomScene options;
-  options.width = 45;
-  options.height = 31;
-  const View view = random_scene(2, options);
+  const View view = random_scene(2, {.width = 45, .height = 31});
   SetRenderer renderer(view);
-  renderer.begin({{}, 1.0, view.world_from_camera});
-  renderer.render(7);
-  const render::Layers whole = renderer.layers();
+  const render::Layers whole = renderer.rendered(7);
   renderer.begin({{}, 1.0, view.world_from_camera});
   for (const int part : {1, 4, 2}) renderer.render(part);
   const render::Layers parts = renderer.layers();
@@ -164,8 +155,7 @@ TEST(Composite, AShadowOnAClippedPlateIsNoDarkerThanTheCameraWouldSeeIt) {
       pixels[x].square_high.w = 1;
     }
     const render::PlateRadiance radiance = render::plate_radiance(plate, response, 1);
-    for (const auto kind :
-         {set::Composite::additive, set::Composite::ratio, set::Composite::hybrid}) {
+    for (const auto kind : all_composites) {
       const render::Layers layers = layers_of(pixels, 1, radiance, {kind, 0.01});
       // The plate is off by half a code at most. The sum keeps that as radiance, and in the shadow
       // a code is share^0.58 of the radiance that it is in the light (the exponent of sRGB's
@@ -182,10 +172,8 @@ TEST(Composite, AShadowOnAClippedPlateIsNoDarkerThanTheCameraWouldSeeIt) {
 TEST(Composite, AShadowOnAnOverexposedTableStaysWhiteByBothEstimators) {
   View view = random_scene(4, {.width = 64, .height = 48, .real_objects = 0});
   for (glm::vec3& radiance : view.environment.radiance) radiance *= 8.0f;
-  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
-    set::Estimation estimation;
-    estimation.estimator = estimator;
-    SetRenderer renderer(view, estimation);
+  for (const auto estimator : both_estimators) {
+    SetRenderer renderer(view, {.estimator = estimator});
     Plate plate{64, 48, 8, std::vector<std::uint16_t>(3 * 64 * 48, 255)};
     renderer.begin({std::make_shared<const Plate>(plate), 1.0, view.world_from_camera});
     renderer.render(64);
@@ -227,17 +215,10 @@ TEST(Composite, AFrameOfAnotherSizeIsRefused) {
 // An out-of-focus point becomes a uniform disc of radius fx R |1/z - 1/focus|, whose variance along
 // one axis is radius^2 / 4; the pixel's box adds 1/12 and the emitter its own width^2 / 12.
 TEST(Lens, DefocusIsTheCircleOfConfusion) {
-  View view;
+  View view = empty_view({0, 0, 0}, {0, 0, -1}, pinhole(64, 64, 0.4));  // looking down
   const double depth = 2.0, width = 0.02;
-  const auto mesh = add_mesh(view.scene, rectangle_mesh({width, width}));
-  glm::dmat4 place(1.0);
-  place[3] = glm::dvec4(0, 0, -depth, 1);
-  add_instance(view.scene, mesh, add_material(view.scene, emitter(glm::vec3(1))), place);
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(64, 64, 0.4);
+  add(view.scene, rectangle_mesh({width, width}), emitter(glm::vec3(1)), at({0, 0, -depth}));
   view.calibration.lens = ThinLens{0.05, 1.0, 1.0};
-  // Looking down -Z from the origin.
-  view.world_from_camera = look_at({0, 0, 0}, {0, 0, -1});
   const int samples = 512;
   const Rendered result = render_view(view, samples);
   double sum = 0, first = 0, second = 0;

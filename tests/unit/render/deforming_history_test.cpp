@@ -20,7 +20,7 @@ struct Figure {
   Figure() {
     scene::Scene& scene = view.scene;
     const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
-    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
+    add(scene, rectangle_mesh(glm::dvec2(20)), gray);
     limb = add_limb(scene, limb_mesh(24, 24, joints), joints, gray, placed_at({-0.5, 0, 0}),
                     scene::world_mixed);
     ball = add_squeezed_ball(scene, squeezed_ball_mesh(0.3, 32, 16), gray,

@@ -11,12 +11,9 @@ constexpr double pi = std::numbers::pi;
 // A large square at the origin in a uniform environment of radiance 1, seen under an angle from its
 // normal by a camera whose picture is so narrow that the angle is the same in all of it.
 View tilted_plane(const scene::Material& material, double angle_rad) {
-  View view;
-  const auto mesh = add_mesh(view.scene, rectangle_mesh({2, 2}));
-  add_instance(view.scene, mesh, add_material(view.scene, material));
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(32, 32, 1e-3);
-  view.world_from_camera = look_at({0, -std::sin(angle_rad), std::cos(angle_rad)}, {0, 0, 0});
+  View view = empty_view({0, -std::sin(angle_rad), std::cos(angle_rad)}, {0, 0, 0},
+                         pinhole(32, 32, 1e-3), glm::vec3(1));
+  add(view.scene, rectangle_mesh({2, 2}), material);
   return view;
 }
 
@@ -146,12 +143,8 @@ TEST(Furnace, ARoughPaneTakesNothing) {
 TEST(Furnace, ARoughGlassBoxTakesNothing) {
   for (const float ior : {1.0f, 1.0001f, 1.5f, 2.5f}) {
     for (const float roughness : {0.1f, 0.5f, 1.0f}) {
-      View view;
-      const auto mesh = add_mesh(view.scene, box_mesh({1, 1, 1}));
-      add_instance(view.scene, mesh, add_material(view.scene, rough_glass(ior, roughness, false)));
-      view.environment = uniform_environment(glm::vec3(1));
-      view.calibration = pinhole(16, 16, 0.2);
-      view.world_from_camera = look_at({0.3, -3, 0.4}, {0, 0, 0});
+      View view = empty_view({0.3, -3, 0.4}, {0, 0, 0}, pinhole(16, 16, 0.2), glm::vec3(1));
+      add(view.scene, box_mesh({1, 1, 1}), rough_glass(ior, roughness, false));
       set::Estimation estimation = up_to_depth(64);
       estimation.caustics = set::Caustics::traced;  // photons are counted with the paths
       const Rendered result = render_clean(view, 32, estimation);
@@ -167,16 +160,9 @@ TEST(Furnace, ARoughGlassBoxTakesNothing) {
 TEST(Furnace, GlassBelowATextureOfNoMetalTakesNothing) {
   scene::Material material = rough_glass(1.5f, 0.5f, false);
   material.metallic = 1;
-  View view;
-  scene::Texture no_metal;
-  no_metal.width = no_metal.height = 1;
-  no_metal.texels = {{1, 1, 0, 1}};
-  material.metallic_roughness_texture = add_texture(view.scene, no_metal);
-  add_instance(view.scene, add_mesh(view.scene, box_mesh({1, 1, 1})),
-               add_material(view.scene, material));
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(16, 16, 0.2);
-  view.world_from_camera = look_at({0.3, -3, 0.4}, {0, 0, 0});
+  View view = empty_view({0.3, -3, 0.4}, {0, 0, 0}, pinhole(16, 16, 0.2), glm::vec3(1));
+  material.metallic_roughness_texture = add_texture(view.scene, texture_of({1, 1, 0, 1}));
+  add(view.scene, box_mesh({1, 1, 1}), material);
   const Rendered textured = render_clean(view, 8, up_to_depth(64));
   view.scene.materials[0].metallic_roughness_texture = scene::no_texture;
   view.scene.materials[0].metallic = 0;
@@ -196,16 +182,12 @@ TEST(Furnace, ASmoothMirrorShowsSchlickAndTheEnvironmentBehindIt) {
 // which is the same box.
 TEST(Furnace, MirroredGlassIsEnteredFromOutside) {
   const auto seen = [](double side) {
-    View view;
-    const auto box = add_mesh(view.scene, box_mesh({1, 1, 1}));
+    View view = empty_view({1.2, -1.7, 1}, {0, 0, 0}, pinhole(24, 24, 0.6));
     glm::dmat4 placed(1.0);
     placed[0] *= side;
-    add_instance(view.scene, box, add_material(view.scene, glass(1.5f)), placed);
-    view.environment = uniform_environment(glm::vec3(0));
+    add(view.scene, box_mesh({1, 1, 1}), glass(1.5f), placed);
     for (std::size_t i = 0; i < view.environment.radiance.size(); i += 3)
       view.environment.radiance[i] = glm::vec3(1, 2, 3);
-    view.calibration = pinhole(24, 24, 0.6);
-    view.world_from_camera = look_at({1.2, -1.7, 1}, {0, 0, 0});
     return mean(render_view(view, 64).layers.mixed);
   };
   const glm::dvec3 plain = seen(1), mirrored = seen(-1);
@@ -222,11 +204,8 @@ TEST(Furnace, MirroredGlassIsEnteredFromOutside) {
 TEST(Furnace, TwoFacingPlanesSumTheirInterreflections) {
   scene::Material lower = diffuse(glm::vec3(0.8f));
   lower.emission = glm::vec3(1);
-  View view;
+  View view = empty_view({0, 0, 0.05}, {0.01, 0, 0}, pinhole(24, 24, 0.4));
   view.scene = facing_planes(40, 0.1, lower, diffuse(glm::vec3(0.6f)));
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(24, 24, 0.4);
-  view.world_from_camera = look_at({0, 0, 0.05}, {0.01, 0, 0});
   const Rendered result = render_clean(view, 32, up_to_depth(64));
   EXPECT_NEAR(mean_mixed(result.layers), 1 / (1 - 0.48), tolerance(result.layers) + 1e-4);
 }

@@ -20,13 +20,11 @@ struct Stage {
   explicit Stage(const glm::vec3& sky) {
     scene::Scene& scene = view.scene;
     const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
-    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
-    box = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.4))), gray, at({0, 0, 0.3}),
-                       scene::world_mixed);
+    add(scene, rectangle_mesh(glm::dvec2(20)), gray);
+    box = add(scene, box_mesh(glm::dvec3(0.4)), gray, at({0, 0, 0.3}), scene::world_mixed);
     see_evenly_lit(view, sky, 0.9);
     view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
   }
-  static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
 };
 
 // The rms over the picture of what a and b are off each other, over that of what b adds.
@@ -157,11 +155,8 @@ TEST(History, OfAMovingCameraHasOutlinesAsOfManySamples) {
 // of a frame alone, of which it may have a tenth more error.
 TEST(History, KnowsTheAlbedoOfAnOutlineFromAroundIt) {
   Stage stage(glm::vec3(0.4f));
-  scene::Texture texture;
-  texture.width = texture.height = 1;
-  texture.texels = {{0.2f, 0.2f, 0.2f, 1}};
   scene::Material dark = diffuse(glm::vec3(1));
-  dark.base_color_texture = add_texture(stage.view.scene, std::move(texture));
+  dark.base_color_texture = add_texture(stage.view.scene, texture_of({0.2f, 0.2f, 0.2f, 1}));
   stage.view.scene.instances[stage.box].material = add_material(stage.view.scene, dark);
   SetRenderer first(stage.view), alone(stage.view), reference(stage.view);
   const glm::dmat4 pose = stage.view.world_from_camera;
@@ -199,10 +194,7 @@ Stage glass_under_a_lamp(double radiance) {
   scene::Scene& scene = stage.view.scene;
   scene.instances[stage.box].mesh = add_mesh(scene, icosphere_mesh(0.3, 4));
   scene.instances[stage.box].material = add_material(scene, glass(1.5f));
-  set::Light key = lamp(set::LightType::sphere, glm::dvec3(radiance));
-  key.position = {1, 1, 3};
-  key.radius_m = 0.05;
-  scene.lights = {key};
+  scene.lights = {sphere_lamp({1, 1, 3}, 0.05, glm::dvec3(radiance))};
   return stage;
 }
 
@@ -253,12 +245,10 @@ TEST(History, OfLightBeyondAllWhiteStaysWhite) {
 void expect_values_stay_in_their_places(const PinholeIntrinsics& lens) {
   Stage stage(glm::vec3(0));
   stage.view.calibration.intrinsics = lens;
-  set::Light added = lamp(set::LightType::point, glm::dvec3(3));
-  added.position = {0, 0, 3};
-  added.gain_mixed = 1;
+  set::Light added = point_lamp({0, 0, 3}, glm::dvec3(3));
   added.gain_real = 0;
   stage.view.scene.lights = {added};
-  stage.view.scene.instances[stage.box].world_from_object = Stage::at({0, 8, 0.3});
+  stage.view.scene.instances[stage.box].world_from_object = at({0, 8, 0.3});
   SetRenderer moving(stage.view, up_to_depth(1)), alone(stage.view, up_to_depth(1));
   glm::dmat4 pose(1.0);
   Plate last;
@@ -295,11 +285,7 @@ TEST(History, OfAMovingCameraKeepsValuesInTheirPlacesThroughARationalLens) {
 }
 
 TEST(History, LeavesThePlateBitForBitWhereNothingDiffers) {
-  RandomScene options;
-  options.width = 71;
-  options.height = 49;
-  options.virtual_objects = 0;
-  View view = random_scene(3, options);
+  View view = random_scene(3, {.width = 71, .height = 49, .virtual_objects = 0});
   for (const bool denoise : {false, true}) {
     SetRenderer renderer(view);
     for (int frame = 0; frame < 4; ++frame) {
@@ -369,14 +355,13 @@ INSTANTIATE_TEST_SUITE_P(AChange, HistoryAfter, ::testing::Values(0, 1, 2));
 
 TEST_P(HistoryAfter, AJumpOrASwitchShowsNoGhost) {
   Stage stage(glm::vec3(0.2f));
-  set::Light key = lamp(set::LightType::point, glm::dvec3(3));
-  key.position = {1, 0, 3};
+  set::Light key = point_lamp({1, 0, 3}, glm::dvec3(3));
   stage.view.scene.lights = {key};
   SetRenderer renderer(stage.view, up_to_depth(1));
   const glm::dmat4 pose = stage.view.world_from_camera;
   for (int frame = 0; frame < 8; ++frame) shown_frame(renderer, pose, 4, true);
   std::vector<scene::Instance> instances = stage.view.scene.instances;
-  if (GetParam() == 0) instances[stage.box].world_from_object = Stage::at({-0.5, 0.3, 0.3});
+  if (GetParam() == 0) instances[stage.box].world_from_object = at({-0.5, 0.3, 0.3});
   if (GetParam() == 1) key.gain_mixed = 0.2;
   renderer.move(instances, {key});
   if (GetParam() == 2)

@@ -19,12 +19,11 @@ struct Room {
     scene::Scene& scene = view.scene;
     const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
     const std::uint32_t red = add_material(scene, diffuse(glm::vec3(0.6f, 0.1f, 0.1f)));
-    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
+    add(scene, rectangle_mesh(glm::dvec2(20)), gray);
     const std::uint32_t boxes = add_mesh(scene, box_mesh(glm::dvec3(0.3)));
     add_instance(scene, boxes, red, placed_at({-0.8, 0.3, 0.15}));
     box = add_instance(scene, boxes, red, placed_at({0.7, -0.3, 0.15}), scene::world_mixed);
-    mirror = add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material),
-                          placed_at({0, 0, 0.5}), scene::world_mixed);
+    mirror = add(scene, std::move(mesh), material, placed_at({0, 0, 0.5}), scene::world_mixed);
     see_evenly_lit(view, glm::vec3(0.4f), 0.9);
     view.world_from_camera = look_at({0, -2, 1.2}, {0, 0, 0.4});
   }

@@ -39,13 +39,11 @@ struct Stage {
   Stage() {
     scene::Scene& scene = view.scene;
     const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
-    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
-    box = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.4))), gray, at({0, 0, 0.3}),
-                       scene::world_mixed);
+    add(scene, rectangle_mesh(glm::dvec2(20)), gray);
+    box = add(scene, box_mesh(glm::dvec3(0.4)), gray, at({0, 0, 0.3}), scene::world_mixed);
     see_evenly_lit(view, glm::vec3(0.4f), 0.9);
     view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
   }
-  static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
 
   // Puts a virtual ball of glass in the place of the box, and a lamp above, whose light it gathers.
   void make_glass() {
@@ -53,10 +51,7 @@ struct Stage {
     view.environment = uniform_environment(glm::vec3(0.05f));
     scene.instances[box].mesh = add_mesh(scene, icosphere_mesh(0.3, 4));
     scene.instances[box].material = add_material(scene, glass(1.5f));
-    set::Light key = lamp(set::LightType::sphere, glm::dvec3(60));
-    key.position = {1, 1, 3};
-    key.radius_m = 0.05;
-    scene.lights = {key};
+    scene.lights = {sphere_lamp({1, 1, 3}, 0.05, glm::dvec3(60))};
   }
 };
 
@@ -69,7 +64,7 @@ struct Moment {
 
 void begin(SetRenderer& renderer, const Stage& stage, const Moment& moment, std::uint32_t seed) {
   std::vector<scene::Instance> instances = stage.view.scene.instances;
-  instances[stage.box].world_from_object = Stage::at(moment.box);
+  instances[stage.box].world_from_object = at(moment.box);
   renderer.move(instances, stage.view.scene.lights);
   renderer.begin(
       {.plate = std::make_shared<const Plate>(
@@ -370,9 +365,7 @@ INSTANTIATE_TEST_SUITE_P(AJump, NeighboursAfter, ::testing::Values(0, 1, 2));
 TEST_P(NeighboursAfter, ShowNoGhost) {
   Stage stage;
   stage.view.environment = uniform_environment(glm::vec3(0.2f));
-  set::Light key = lamp(set::LightType::point, glm::dvec3(3));
-  key.position = {1, 0, 3};
-  stage.view.scene.lights = {key};
+  stage.view.scene.lights = {point_lamp({1, 0, 3}, glm::dvec3(3))};
   Take take;
   for (int i = -2; i <= 2; ++i) {
     const bool is_here = GetParam() == 0 ? i >= 0 : GetParam() == 1 ? i <= 0 : i == 0;
