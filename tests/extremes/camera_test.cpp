@@ -3,12 +3,9 @@
 #include "daemon/lighting/hdr.hpp"
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/response.hpp"
-#include "drivers/error.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/pixels_by_hand.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::lighting::camera_test {
 

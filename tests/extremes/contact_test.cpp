@@ -1,6 +1,5 @@
 // A virtual object that rests exactly on the real table, reaches into it, or contains the camera.
 #include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
 
 #include "tests/extremes/every_way.hpp"
 
@@ -45,21 +44,18 @@ void for_table_pixels(const View& view, const glm::dvec2& low, const glm::dvec2&
   const PinholeIntrinsics& k = view.calibration.intrinsics;
   const glm::dvec3 eye(view.world_from_camera[3]);
   int visited = 0;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      bool inside = true;
-      for (const glm::dvec2& corner : {glm::dvec2(-0.5, -0.5), glm::dvec2(0.5, -0.5),
-                                       glm::dvec2(-0.5, 0.5), glm::dvec2(0.5, 0.5)}) {
-        const glm::dvec3 ray(view.world_from_camera * glm::dvec4((x + corner.x - k.cx) / k.fx,
-                                                                 (y + corner.y - k.cy) / k.fy, 1,
-                                                                 0));
-        const glm::dvec3 at = eye - ray * (eye.z / ray.z);
-        inside = inside && at.x > low.x && at.x < high.x && at.y > low.y && at.y < high.y;
-      }
-      if (!inside) continue;
-      ++visited;
-      visit(static_cast<std::size_t>(y) * width + x);
+  for (const auto& [x, y, i] : pixels_of(width, height)) {
+    bool inside = true;
+    for (const glm::dvec2& corner : {glm::dvec2(-0.5, -0.5), glm::dvec2(0.5, -0.5),
+                                     glm::dvec2(-0.5, 0.5), glm::dvec2(0.5, 0.5)}) {
+      const glm::dvec2 straight((x + corner.x - k.cx) / k.fx, (y + corner.y - k.cy) / k.fy);
+      const glm::dvec3 ray(view.world_from_camera * glm::dvec4(straight, 1, 0));
+      const glm::dvec3 met = eye - ray * (eye.z / ray.z);
+      inside = inside && met.x > low.x && met.x < high.x && met.y > low.y && met.y < high.y;
     }
+    if (!inside) continue;
+    ++visited;
+    visit(i);
   }
   EXPECT_GT(visited, 20) << "nothing was looked at";
 }
@@ -149,10 +145,8 @@ TEST(Contact, ALongRoadDoesNotShadowItself) {
     view.scene.lights[0].direction = glm::dmat3(turned) * view.scene.lights[0].direction;
     view.world_from_camera = turned * view.world_from_camera;
     const Rendered result = show(view);
-    int dark = 0;
-    for (const glm::vec3& pixel : result.layers.mixed)
-      if (std::abs(pixel.g - lit) > 1e-5) ++dark;
-    EXPECT_LE(dark, 4) << turn;
+    const auto is_dark = [](const glm::vec3& pixel) { return std::abs(pixel.g - lit) > 1e-5; };
+    EXPECT_LE(std::ranges::count_if(result.layers.mixed, is_dark), 4) << turn;
   }
 }
 
@@ -168,11 +162,9 @@ TEST_P(ContactByEveryWay, TwinsLookLikeOne) {
   View one = table();
   add_virtual(one, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.2});
   View twins = one;
-  twins.scene.materials.push_back(diffuse({0.1f, 0.9f, 0.4f}));
-  scene::Instance second = twins.scene.instances.back();
-  second.material = static_cast<std::uint32_t>(twins.scene.materials.size() - 1);
-  second.object = 2;
-  twins.scene.instances.push_back(second);
+  const scene::Instance first = twins.scene.instances.back();
+  add_instance(twins.scene, first.mesh, add_material(twins.scene, diffuse({0.1f, 0.9f, 0.4f})),
+               first.world_from_object, first.presence);
   EXPECT_EQ(show(one).layers.mixed, show(twins).layers.mixed);
 }
 

@@ -1,7 +1,4 @@
 // Triangles that are hardly there, not there, or far too many: shaded or dropped, and counted.
-#include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
-
 #include "daemon/scene/bvh.hpp"
 #include "tests/support/gltf_test.hpp"
 #include "tests/support/render_fixture.hpp"

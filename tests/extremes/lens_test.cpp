@@ -2,7 +2,6 @@
 // pinhole, sharp where the focus is; what no lens can be is refused by the key's name.
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/session_toml.hpp"
 #include "tests/extremes/every_way.hpp"
 

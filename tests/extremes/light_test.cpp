@@ -1,6 +1,4 @@
 // Lamps of no size, lamps all around, lamps in an object or on it, and lamps drowned by others.
-#include <numbers>
-
 #include "tests/extremes/every_way.hpp"
 
 namespace previz::test::light_test {

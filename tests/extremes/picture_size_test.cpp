@@ -2,10 +2,7 @@
 // allocated.
 #include "daemon/render/picture_memory.hpp"
 
-#include "drivers/error.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::picture_size_test {
 

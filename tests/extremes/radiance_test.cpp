@@ -1,8 +1,4 @@
 // Light of any strength: the picture is linear in it, and a sun does not drown its sky.
-#include <cmath>
-#include <numbers>
-
-#include "drivers/plate.hpp"
 #include "shaders/lib/octahedral.h"
 #include "tests/extremes/every_way.hpp"
 

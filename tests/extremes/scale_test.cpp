@@ -1,10 +1,6 @@
 // The same set at another size, and at another place, shows the same picture.
-#include <algorithm>
 #include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
-#include <numeric>
 
-#include "drivers/plate.hpp"
 #include "tests/extremes/every_way.hpp"
 
 namespace previz::test::scale_test {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "daemon/render/renderer.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/scenes.hpp"
 #include "tests/support/test.hpp"
 
@@ -89,6 +90,17 @@ inline std::vector<Pixel> pixels_of(int width, int height) {
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) pixels.push_back({x, y, pixels.size()});
   return pixels;
+}
+
+// What a sensor sees of a layer whose codes of 16 bits are linear and end at `white`.
+template <class Radiance>
+Plate linear_plate(int width, int height, const std::vector<Radiance>& layer, double white) {
+  Plate plate{width, height, 16, {}};
+  for (const glm::dvec3 radiance : layer)
+    for (int c = 0; c < 3; ++c)
+      plate.samples.push_back(static_cast<std::uint16_t>(
+          std::lround(65535 * std::clamp(radiance[c] / white, 0.0, 1.0))));
+  return plate;
 }
 
 inline void expect_near(const glm::dvec3& found, const glm::dvec3& expected,

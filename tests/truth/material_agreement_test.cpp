@@ -1,7 +1,5 @@
 // The GPU renderer against the independent CPU tracer on every kind of material: rough and smooth
 // glass, panes, lacquer, cloth, brushed metal, and the textures that say where they are.
-#include <algorithm>
-
 #include "tests/truth/two_tracers.hpp"
 
 namespace previz::test::material_agreement_test {

@@ -1,7 +1,5 @@
 // Lamps that were taken out of an environment and changed in the mixed world, against the CPU
 // tracer.
-#include <cmath>
-
 #include "daemon/lighting/claims.hpp"
 #include "daemon/lighting/light_mode.hpp"
 #include "daemon/pipeline/relight.hpp"

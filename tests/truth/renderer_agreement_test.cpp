@@ -1,14 +1,8 @@
 // The GPU renderer against the independent CPU tracer, both radiances, at reduced size: on sets
 // varied by seed (camera, objects diffuse, textured, plastic, rough and smooth metal, emitter,
 // removed, lamps, lens) and on the ground truth sets.
-#include <filesystem>
-#include <string>
-
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/scene/load.hpp"
-#include "drivers/plate.hpp"
-#include "tests/support/figure.hpp"
-#include "tests/support/render_fixture.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/truth_set.hpp"
@@ -125,11 +119,8 @@ TEST_P(CameraSets, HaveTheSameCompositeByTheCamera) {
   view.scene.materials[0] = diffuse(glm::vec3(0.5f, 0.4f, 0.3f));
   constexpr double white = 8;
   const PinholeIntrinsics& k = view.calibration.intrinsics;
-  Plate plate{k.width, k.height, 16, {}};
-  for (const glm::vec3& pixel : SetRenderer(view).rendered(1024, 7).real)
-    for (int c = 0; c < 3; ++c)
-      plate.samples.push_back(
-          static_cast<std::uint16_t>(std::lround(65535 * std::min(pixel[c] / white, 1.0))));
+  const Plate plate =
+      linear_plate(k.width, k.height, SetRenderer(view).rendered(1024, 7).real, white);
   const auto scrambled = [&](set::RealRadiance radiance, std::uint32_t first_seed) {
     SetRenderer renderer(view, {.real_radiance = radiance});
     truth::Scrambles result = no_pictures(view);

@@ -2,9 +2,6 @@
 // a view of a test.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"
 #include "tests/truth/agreement.hpp"

@@ -1,6 +1,4 @@
 // Surfaces that are not there everywhere, against closed forms.
-#include <numbers>
-
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 

@@ -1,9 +1,6 @@
 // A CPU device that is treated as a graphics card: its pictures are those of a CPU device bit for
 // bit, and no access to memory lacks the barrier that a card would need.
-#include <glm/gtc/matrix_transform.hpp>
-
 #include "daemon/render/device.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::as_gpu_test {
@@ -14,11 +11,9 @@ constexpr int width = 48, height = 36;
 View ball_on_texture() {
   View view = empty_view({0, -0.8, 1}, {0, 0, 0.05}, pinhole(width, height, 0.8), glm::vec3(0.1f));
   scene::Material floor = diffuse(glm::vec3(0.7f));
-  floor.base_color_texture = add_texture(view.scene, texture_of(2, 2,
-                                                                {{0.9f, 0.2f, 0.2f, 1},
-                                                                 {0.2f, 0.9f, 0.2f, 1},
-                                                                 {0.2f, 0.2f, 0.9f, 1},
-                                                                 {0.9f, 0.9f, 0.9f, 1}}));
+  const glm::vec4 red(0.9f, 0.2f, 0.2f, 1), green(0.2f, 0.9f, 0.2f, 1);
+  const glm::vec4 blue(0.2f, 0.2f, 0.9f, 1), white(0.9f, 0.9f, 0.9f, 1);
+  floor.base_color_texture = add_texture(view.scene, texture_of(2, 2, {red, green, blue, white}));
   add(view.scene, rectangle_mesh({2, 2}), floor);
   add(view.scene, icosphere_mesh(0.2, 2), glass(1.5f), at({0, 0, 0.25}), scene::world_mixed);
   view.scene.lights.push_back(sphere_lamp({0.3, 0, 1}, 0.1, glm::dvec3(2)));

@@ -1,10 +1,6 @@
 // The plate as the radiance of real surfaces: what mirrors and virtual objects take from it, and
 // where it may not be taken.
-#include <initializer_list>
-#include <numbers>
-
 #include "drivers/calibration/pinhole.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::camera_test {
@@ -34,13 +30,9 @@ View floor_and_mirror() {
 }
 
 Plate plate_of(const std::function<glm::dvec3(int x, int y)>& radiance) {
-  Plate plate{width, height, 16, {}};
-  for (const auto& [x, y, i] : pixels_of(width, height)) {
-    for (int c = 0; c < 3; ++c)
-      plate.samples.push_back(
-          static_cast<std::uint16_t>(std::lround(radiance(x, y)[c] / white * 65535)));
-  }
-  return plate;
+  std::vector<glm::dvec3> layer;
+  for (const auto& [x, y, i] : pixels_of(width, height)) layer.push_back(radiance(x, y));
+  return linear_plate(width, height, layer, white);
 }
 
 Rendered render_over(const View& view, const Plate& plate, const set::Estimation& estimation,
@@ -133,8 +125,7 @@ TEST(CameraRadiance, OfAPaintedFloorIsWrongByNoMoreThanItsCoat) {
   View real = view;
   real.scene.instances.pop_back();
   const render::Layers seen = render_clean(real, 256).layers;
-  const Plate plate = plate_of(
-      [&](int x, int y) { return glm::dvec3(seen.real[static_cast<std::size_t>(y) * width + x]); });
+  const Plate plate = linear_plate(width, height, seen.real, white);
   const set::Estimation traced = up_to_depth(8);
   const render::Layers by_plate = render_over(view, plate, by_camera(), 64).layers;
   const render::Layers by_model = render_over(view, plate, traced, 64).layers;

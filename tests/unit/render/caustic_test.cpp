@@ -1,10 +1,5 @@
 // Light that a mirror throws onto a Lambert floor, brought by photons, against closed forms: a
 // plane mirror makes an image of the lamp, so the floor at p receives E(p) + E(p mirrored).
-#include <functional>
-#include <numbers>
-#include <utility>
-#include <vector>
-
 #include "daemon/render/photon_schedule.hpp"
 #include "tests/support/render_fixture.hpp"
 
@@ -215,19 +210,13 @@ TEST(MirrorCaustic, OfATintedLamp) {
 // weighs on the total with the radius over the ball's, squared: 0.5 % of the caustic, itself 2 %.
 TEST(GlassCaustic, CarriesAsMuchLightAsTracedPaths) {
   View view = empty_view({0, -0.8, 1}, {0, 0, 0.05}, pinhole(48, 48, 0.8), glm::vec3(0.1f));
-  const auto floor = add_mesh(view.scene, rectangle_mesh({1, 1}));
-  add_instance(view.scene, floor, add_material(view.scene, diffuse(glm::vec3(albedo))));
+  add(view.scene, rectangle_mesh({1, 1}), diffuse(glm::vec3(albedo)));
   add(view.scene, icosphere_mesh(0.1, 3), glass(1.5f), at({0, 0, 0.12}));
   view.scene.lights.push_back(sphere_lamp({0.3, 0, 1}, 0.4, colour));
-  set::Estimation photons{.photons = 4};
-  photons.photon_radius_px = 0.3;  // 7 mm, a fourteenth of the ball
-  set::Estimation traced = photons;
-  traced.caustics = set::Caustics::traced;
-  set::Estimation none = photons;
-  none.caustics = set::Caustics::none;
-  const Measured by_photons = measure(view, photons);
-  const Measured by_paths = measure(view, traced);
-  const Measured without = measure(view, none);
+  // 7 mm, a fourteenth of the ball.
+  const Measured by_photons = measure(view, {.photons = 4, .photon_radius_px = 0.3});
+  const Measured by_paths = measure(view, {.caustics = set::Caustics::traced});
+  const Measured without = measure(view, {.caustics = set::Caustics::none});
   const double error = std::hypot(by_photons.error.g, by_paths.error.g);
   // Photons that are gathered over the edge of the floor or of the ball's foot weigh less than
   // this.
@@ -237,20 +226,13 @@ TEST(GlassCaustic, CarriesAsMuchLightAsTracedPaths) {
 
 // A floor in a block of glass: photons enter it and paths leave it, under the same angles outside.
 void expect_as_much_light_through(const scene::Material& glass_block) {
-  View view;
-  const auto floor = add_mesh(view.scene, rectangle_mesh({2, 2}));
-  add_instance(view.scene, floor, add_material(view.scene, diffuse(glm::vec3(albedo))));
+  // Nothing is seen beside the block.
+  View view = empty_view({0, -0.2, 1}, {0, 0, 0}, pinhole(32, 32, 0.2), glm::vec3(1));
+  add(view.scene, rectangle_mesh({2, 2}), diffuse(glm::vec3(albedo)));
   add(view.scene, box_mesh({0.36, 0.36, 0.1}), glass_block);
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(32, 32, 0.2);  // nothing beside the block
-  view.world_from_camera = look_at({0, -0.2, 1}, {0, 0, 0});
-  set::Estimation photons = up_to_depth(3);  // the glass, the floor, the glass
-  photons.photons = 8;
-  photons.photon_radius_px = 1;
-  set::Estimation traced = photons;
-  traced.caustics = set::Caustics::traced;
-  const Measured by_photons = measure(view, photons);
-  const Measured by_paths = measure(view, traced);
+  // The glass, the floor, the glass.
+  const Measured by_photons = measure(view, {.max_depth = 3, .photons = 8, .photon_radius_px = 1});
+  const Measured by_paths = measure(view, {.max_depth = 3, .caustics = set::Caustics::traced});
   const double error = std::hypot(by_photons.error.g, by_paths.error.g);
   EXPECT_NEAR(by_photons.mixed.g, by_paths.mixed.g, 4 * error);
   EXPECT_LT(error, 7e-3 * by_paths.mixed.g) << "or this would show nothing";
@@ -283,10 +265,7 @@ TEST(Photons, LeaveNoDifferenceWhereTheWorldsAreEqual) {
 TEST(Photons, GiveTheSamePictureHoweverTheSamplesAreSplit) {
   View view = mirror_and_floor();
   view.scene.lights = {key};
-  set::Estimation estimation;
-  estimation.photons = 40;  // many in a bucket
-  estimation.photon_radius_px = 10;
-  SetRenderer renderer(view, estimation);
+  SetRenderer renderer(view, {.photons = 40, .photon_radius_px = 10});  // many in a bucket
   const auto picture = [&](int first) {
     renderer.begin({{}, 1.0, view.world_from_camera});
     renderer.render(first);

@@ -1,8 +1,5 @@
 // Clear solids that take light away inside (KHR_materials_volume), against closed forms: what is
 // left after d metres is colour^(d / distance).
-#include <functional>
-#include <numbers>
-
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 
@@ -56,9 +53,8 @@ TEST(ColouredGlass, CountsEveryCrossing) {
   const glm::dvec3 once = left_after(thickness_m);
   const glm::dvec3 expected = r + (1 - r) * (1 - r) * once / (1.0 - r * once);
   for (const auto estimator : both_estimators) {
-    set::Estimation estimation = up_to_depth(16);  // 0.04^14 of it is left out
-    estimation.estimator = estimator;
-    const Rendered result = render_clean(view, 64, estimation);
+    // 0.04^14 of it is left out.
+    const Rendered result = render_clean(view, 64, up_to_depth(16, estimator));
     // 4096 paths that end in one of few values: four standard errors of the pixels' spread.
     const double error = standard_error_of_pixels(result.layers);
     EXPECT_NEAR(mean(result.layers.mixed).g, expected.g, 4 * error + 2 * one_way);
@@ -85,10 +81,10 @@ TEST(ColouredGlass, ColoursWhatIsSeenFromInside) {
 
 // A pane, metal and a solid without light going in have no inside.
 TEST(ColouredGlass, NeedsAnInsideThatLightGetsInto) {
-  scene::Material pane = coloured(1);
-  pane.thin_walled = true;
-  expect_all(render_clean(slab(pane), 1).layers.mixed, glm::dvec3(1), 0);
-  EXPECT_FALSE(scene::attenuates(pane));
+  scene::Material thin = coloured(1);
+  thin.thin_walled = true;
+  expect_all(render_clean(slab(thin), 1).layers.mixed, glm::dvec3(1), 0);
+  EXPECT_FALSE(scene::attenuates(thin));
   scene::Material opaque = coloured(1);
   opaque.transmission = 0;
   EXPECT_FALSE(scene::attenuates(opaque));
@@ -131,11 +127,8 @@ void expect_floor_lit_through_slab(double lamp_z) {
   constexpr double albedo = 0.6, low = 0.3, high = low + thickness_m;
   add(view.scene, rectangle_mesh({0.6, 0.6}), diffuse(glm::vec3(albedo)));
   add(view.scene, box_mesh({0.8, 0.8, thickness_m}), coloured(1), at({0, 0, (low + high) / 2}));
-  set::Light light = point_lamp({0.05, 0.1, lamp_z}, glm::dvec3(2, 3, 5));
-  view.scene.lights.push_back(light);
-  set::Estimation estimation = up_to_depth(3);
-  estimation.photons = 400;  // a pixel; some reach the floor
-  estimation.photon_radius_px = 1;
+  const set::Light light = point_lamp({0.05, 0.1, lamp_z}, glm::dvec3(2, 3, 5));
+  view.scene.lights = {light};
   glm::dvec3 expected(0);
   const PinholeIntrinsics& k = view.calibration.intrinsics;
   const glm::dvec3 eye(view.world_from_camera[3]);
@@ -149,7 +142,8 @@ void expect_floor_lit_through_slab(double lamp_z) {
                 left_after((std::min(lamp_z, high) - low) / cosine);
   }
   expected /= k.width * k.height;
-  SetRenderer renderer(view, estimation);
+  // 400 photons a pixel, of which some reach the floor.
+  SetRenderer renderer(view, {.max_depth = 3, .photons = 400, .photon_radius_px = 1});
   std::vector<glm::dvec3> means;
   for (std::uint32_t seed = 1; seed <= 16; ++seed)
     means.push_back(mean(renderer.rendered_clean(4, seed).mixed));

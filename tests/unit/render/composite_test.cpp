@@ -1,6 +1,5 @@
 // The composite: untouched plates bit for bit, samples independent of how they are asked for, and
 // the equation itself.
-#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::composite_test {
@@ -50,6 +49,11 @@ TEST(Composite, SamplesDoNotDependOnHowTheyAreAskedFor) {
   EXPECT_EQ(whole.variance, parts.variance);
 }
 
+// A plate of one pixel.
+render::PlateRadiance seen_as(double radiance, double error = 0) {
+  return {std::vector<double>(3, radiance), std::vector<double>(3, error), {}};
+}
+
 // A virtual object of radiance 0.5 covers the white half of a black-and-white pixel: the composite
 // is 0.25, where composites of single samples would average to 0.5 (shaders/README.md, "The
 // composite").
@@ -59,7 +63,7 @@ TEST(Composite, CoveredPixelsUseMeansNotSamples) {
   pixel.mixed_high = gpu::vec4(0.5f, 0.5f, 0.5f, 1.0f);
   pixel.diff_high = gpu::vec4(-0.5f, -0.5f, -0.5f, 0.0f);
   pixel.square_high.w = 2;
-  const render::PlateRadiance plate{std::vector<double>(3, 0.5), std::vector<double>(3, 0.0), {}};
+  const render::PlateRadiance plate = seen_as(0.5);
   const render::Layers layers = layers_of(std::span(&pixel, 1), 2, plate);
   // 0.25 + (1 - 0.5) (0.5 - 0.5)
   EXPECT_FLOAT_EQ(layers.composite[0].g, 0.25f);
@@ -74,9 +78,7 @@ double composited(double camera, double mixed, double real, const render::Compos
   pixel.mixed_high.w = 0;
   pixel.diff_high = pixel.uncovered_high = gpu::vec4(static_cast<float>(mixed - real));
   pixel.uncovered_high.w = gpu::SAMPLE_FULL;
-  const render::PlateRadiance plate{
-      std::vector<double>(3, camera), std::vector<double>(3, 1e-6), {}};
-  return layers_of(std::span(&pixel, 1), 1, plate, rule).composite[0].g;
+  return layers_of(std::span(&pixel, 1), 1, seen_as(camera, 1e-6), rule).composite[0].g;
 }
 
 // A shadow halves the light on a surface whose albedo the phantom has wrong by a factor of two.
@@ -98,8 +100,7 @@ TEST(Composite, TheSumLightsABlackSurfaceAndTheRatioDoesNot) {
 }
 
 TEST(Composite, AllRulesAreOneWhereTheModelIsRight) {
-  using enum set::Composite;
-  for (const auto kind : {additive, ratio, hybrid})
+  for (const auto kind : all_composites)
     EXPECT_FLOAT_EQ(composited(0.5, 0.2, 0.5, {kind, 0.01}), 0.2);
 }
 
@@ -107,14 +108,13 @@ TEST(Composite, AllRulesAreOneWhereTheModelIsRight) {
 // The rule may forgive that on the real surface, but it must not multiply the object's own light:
 // the true value is 0.5 * 1 + 0.5 * 0.2.
 TEST(Composite, NoRuleMultipliesAnObjectsOwnLight) {
-  using enum set::Composite;
   gpu::GpuPixel pixel{};
   // Two samples: one covered (Lm = 1, Lr = 0.1), one not (Lm = Lr = 0.1).
   pixel.mixed_high = gpu::vec4(1.1f, 1.1f, 1.1f, 1.0f);
   pixel.diff_high = gpu::vec4(0.9f, 0.9f, 0.9f, 0.0f);
   pixel.square_high.w = 2;
-  const render::PlateRadiance plate{std::vector<double>(3, 0.2), std::vector<double>(3, 0.0), {}};
-  for (const auto kind : {additive, ratio, hybrid}) {
+  const render::PlateRadiance plate = seen_as(0.2);
+  for (const auto kind : all_composites) {
     const render::Layers layers = layers_of(std::span(&pixel, 1), 2, plate, {kind, 0.01});
     EXPECT_NEAR(layers.composite[0].g, 0.6, 1e-6);
   }
@@ -128,7 +128,7 @@ TEST(Composite, TheVarianceAtAnEdgeHoldsTheMasks) {
   pixel.mixed_high = n * gpu::vec4(0.6f, 0.6f, 0.6f, 0.5f);
   pixel.diff_high = n * gpu::vec4(0.4f, 0.4f, 0.4f, 0.0f);
   pixel.square_high = n * gpu::vec4(0.5f, 0.5f, 0.5f, 1.0f);
-  const render::PlateRadiance plate{std::vector<double>(3, 0.2), std::vector<double>(3, 0.0), {}};
+  const render::PlateRadiance plate = seen_as(0.2);
   const render::Layers layers = layers_of(std::span(&pixel, 1), 100, plate);
   EXPECT_NEAR(layers.composite[0].g, 0.6, 1e-6);
   EXPECT_NEAR(layers.variance[0].g, 0.64 * 0.25 / (n - 1.0), 1e-8);
@@ -222,13 +222,12 @@ TEST(Lens, DefocusIsTheCircleOfConfusion) {
   const int samples = 512;
   const Rendered result = render_view(view, samples);
   double sum = 0, first = 0, second = 0;
-  for (int y = 0; y < 64; ++y)
-    for (int x = 0; x < 64; ++x) {
-      const double value = result.layers.mixed[64 * y + x].g;
-      sum += value;
-      first += value * x;
-      second += value * x * x;
-    }
+  for (const auto& [x, y, i] : pixels_of(64, 64)) {
+    const double value = result.layers.mixed[i].g;
+    sum += value;
+    first += value * x;
+    second += value * x * x;
+  }
   const double fx = view.calibration.intrinsics.fx;
   const double radius = fx * 0.025 * std::abs(1 / depth - 1 / 1.0);
   const double pixels = fx * width / depth;  // the emitter's width

@@ -1,12 +1,8 @@
 // Meshes that deform on the GPU: the vertices are those that the CPU computes, the tree follows
 // them, and the picture is that of the same mesh in the same shape for good.
-#include <algorithm>
-#include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "daemon/render/deformer.hpp"
-#include "drivers/error.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/bvh_decode.hpp"
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"

@@ -1,9 +1,5 @@
 // Noise taken out of a composite: as much as its variance foretells, and nothing of what is no
 // noise.
-#include <numbers>
-#include <random>
-
-#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::denoise_test {
@@ -176,14 +172,13 @@ TEST_P(DenoiseEdges, StayBetweenSurfaces) {
   render::Layers raw =
       wall([&](int x, int y) { return glm::vec3(left(x, y) ? 0.45f : 0.55f) + noise(x, y); },
            sigma * sigma);
-  for (int y = 0; y < height; ++y)
-    for (int x = width / 2; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      if (GetParam() == 0) raw.normal[i] = glm::vec3(1, 0, 0);
-      if (GetParam() == 1) raw.depth[i] = 2.2f;
-      if (GetParam() == 2) raw.mask[i] = 0;   // the difference is as large as the radiance
-      if (GetParam() == 3) raw.depth[i] = 0;  // nothing was met
-    }
+  for (const auto& [x, y, i] : all_pixels) {
+    if (x < width / 2) continue;
+    if (GetParam() == 0) raw.normal[i] = glm::vec3(1, 0, 0);
+    if (GetParam() == 1) raw.depth[i] = 2.2f;
+    if (GetParam() == 2) raw.mask[i] = 0;   // the difference is as large as the radiance
+    if (GetParam() == 3) raw.depth[i] = 0;  // nothing was met
+  }
   const render::Layers clean = denoised(raw);
   // Beside the edge, where the halves would be blended first: to nearly nothing of the 0.1, where
   // this leaves nine tenths of it.
@@ -325,19 +320,17 @@ TEST(Denoise, LeavesARealSurfaceBesideAVirtualOneBitForBit) {
         return glm::vec3(glm::dvec3(camera.end()[-3], camera.end()[-2], camera.end()[-1]));
       },
       0.01);
-  for (int y = 0; y < height; ++y)
-    for (int x = width / 3; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      raw.mask[i] = 0;
-      raw.diff[i] = glm::vec3(0);
-      raw.variance[i] = glm::vec3(0);
-    }
+  for (const auto& [x, y, i] : all_pixels) {
+    if (x < width / 3) continue;
+    raw.mask[i] = 0;
+    raw.diff[i] = glm::vec3(0);
+    raw.variance[i] = glm::vec3(0);
+  }
   const render::Layers clean = denoised(raw, plate_of(camera));
-  for (int y = 0; y < height; ++y)
-    for (int x = width / 3; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      EXPECT_EQ(clean.composite[i], raw.composite[i]) << x << ", " << y;
-    }
+  for (const auto& [x, y, i] : all_pixels) {
+    if (x < width / 3) continue;
+    EXPECT_EQ(clean.composite[i], raw.composite[i]) << x << ", " << y;
+  }
   EXPECT_LT(spread(clean, [&](int x, int) { return covered(x); }).variance, 0.01 / 20);
 }
 
@@ -390,23 +383,21 @@ TEST(Denoise, LeavesAContactShadowWhereItIs) {
     std::mt19937 random(seed);
     render::Layers raw = wall([](int, int) { return glm::vec3(0); });
     raw.samples = samples;
-    for (int y = 0; y < height; ++y)
-      for (int x = foot; x < width; ++x) {
-        const auto i = static_cast<std::size_t>(y) * width + x;
-        std::binomial_distribution<int> hits(samples, 0.6 * std::exp((foot - x) / falls_over));
-        const double n = hits(random), mean = n * shadow / samples;
-        raw.mask[i] = 0;
-        raw.diff[i] = raw.mixed[i] = glm::vec3(mean);
-        raw.variance[i] = glm::vec3((n * shadow * shadow / samples - mean * mean) / (samples - 1));
-      }
+    for (const auto& [x, y, i] : all_pixels) {
+      if (x < foot) continue;
+      std::binomial_distribution<int> hits(samples, 0.6 * std::exp((foot - x) / falls_over));
+      const double n = hits(random), mean = n * shadow / samples;
+      raw.mask[i] = 0;
+      raw.diff[i] = raw.mixed[i] = glm::vec3(mean);
+      raw.variance[i] = glm::vec3((n * shadow * shadow / samples - mean * mean) / (samples - 1));
+    }
     const std::vector<double> camera(3 * raw.composite.size(), 0.5);
     const render::Layers clean = denoised(raw, plate_of(camera));
-    for (int y = 0; y < height; ++y)
-      for (int x = foot + 4; x < width; ++x) {
-        const auto i = static_cast<std::size_t>(y) * width + x;
-        drawn += raw.diff[i].r;
-        shown += clean.composite[i].r - 0.5;
-      }
+    for (const auto& [x, y, i] : all_pixels) {
+      if (x < foot + 4) continue;
+      drawn += raw.diff[i].r;
+      shown += clean.composite[i].r - 0.5;
+    }
   }
   EXPECT_LT(shown / drawn, std::exp(most_blur / (2 * falls_over * falls_over)));
   EXPECT_GT(shown / drawn, 0.97);

@@ -3,7 +3,6 @@
 
 #include "daemon/render/device.hpp"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::device_limits_test {
 

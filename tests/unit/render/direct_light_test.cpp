@@ -1,6 +1,4 @@
 // Direct light of every kind of lamp on a Lambert plane, against closed forms.
-#include <numbers>
-
 #include "daemon/scene/placement.hpp"
 #include "tests/support/render_fixture.hpp"
 

@@ -1,8 +1,5 @@
 // Pixels that are partly covered or defocused (P18): where the plate is the renderer's own
 // converged real world, the composite must be its mixed world, on every pixel.
-#include <algorithm>
-
-#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::edge_test {
@@ -57,22 +54,14 @@ View striped_set() {
   return view;
 }
 
-Plate plate_of(const Picture& picture) {
-  Plate plate{width, height, 16, {}};
-  for (const glm::dvec3& radiance : picture.mean)
-    for (int c = 0; c < 3; ++c)
-      plate.samples.push_back(
-          static_cast<std::uint16_t>(std::lround(65535 * std::min(radiance[c] / white, 1.0))));
-  return plate;
-}
-
 void expect_seamless(const View& view, set::Estimator estimator) {
   const auto real = [](const render::Layers& layers) { return layers.real; };
   const auto mixed = [](const render::Layers& layers) { return layers.mixed; };
   const auto composite = [](const render::Layers& layers) { return layers.composite; };
   const Picture plate_picture = converge(view, {}, set::Estimator::paired, 100, real);
   const Picture truth = converge(view, {}, set::Estimator::paired, 200, mixed);
-  const Picture composited = converge(view, plate_of(plate_picture), estimator, 300, composite);
+  const Picture composited = converge(view, linear_plate(width, height, plate_picture.mean, white),
+                                      estimator, 300, composite);
   int beyond = 0;
   double sum = 0, square = 0;
   for (std::size_t p = 0; p < truth.mean.size(); ++p) {

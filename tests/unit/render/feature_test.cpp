@@ -113,7 +113,7 @@ Material see_through(scene::AlphaMode mode, float alpha,
 struct Row {
   const char* what;
   std::vector<Material> materials;
-  std::vector<const char*> needed, not_needed;
+  std::vector<const char*> needed, not_needed = {};
   std::optional<scene::Texture> texture = {};  // the materials' texture 0
 };
 
@@ -135,17 +135,17 @@ const Row rows[] = {
      {but(coloured_glass(green), [](Material& m) { m.thin_walled = true; })},
      {},
      {"coloured glass"}},
-    {"coloured glass", {coloured_glass(green)}, {"coloured glass"}, {}},
+    {"coloured glass", {coloured_glass(green)}, {"coloured glass"}},
     {"an index of 1, which reflects nothing", {plastic(white, 0.5f, 1)}, {}, {"gloss"}},
     {"plastic", {plastic(white, 0.3f)}, {"gloss"}, {"cloth", "brushed metal", "coloured gloss"}},
-    {"cloth", {under_sheen(diffuse(white))}, {"cloth"}, {}},
+    {"cloth", {under_sheen(diffuse(white))}, {"cloth"}},
     {"strokes on what does not reflect", {brushed(diffuse(white))}, {}, {"brushed metal"}},
     {"strokes on what lets light through", {brushed(glass(1.5f))}, {}, {"brushed metal"}},
-    {"brushed metal", {brushed(metal(white, 0.3f))}, {"brushed metal"}, {}},
+    {"brushed metal", {brushed(metal(white, 0.3f))}, {"brushed metal"}},
     {"metal, which has no coat", {coloured_gloss(1)}, {}, {"coloured gloss"}},
-    {"coloured gloss", {coloured_gloss(0)}, {"coloured gloss"}, {}},
+    {"coloured gloss", {coloured_gloss(0)}, {"coloured gloss"}},
     {"a pane that fibres stand on, which is no clear view", {under_sheen(pane())}, {}, {"panes"}},
-    {"a pane", {pane()}, {"panes"}, {}},
+    {"a pane", {pane()}, {"panes"}},
     {"normals of a texture",
      {but(diffuse(white), [](Material& m) { m.normal_texture = 0; })},
      {"textures", "normal maps"},
@@ -165,14 +165,18 @@ const Row rows[] = {
      {},
      {"refraction"}},
     {"metal that a texture takes away",
-     {but(glass(1.5f), [](Material& m) { m.metallic = 1, m.metallic_roughness_texture = 0; })},
+     {but(glass(1.5f),
+          [](Material& m) {
+            m.metallic = 1;
+            m.metallic_roughness_texture = 0;
+          })},
      {"refraction"},
      {},
      texture_of({1, 1, 0, 1})},
     {"alpha of what is opaque", {see_through(opaque, 0.8f)}, {}, {"alpha"}},
     {"0.8, above the cut-off of 0.5", {see_through(mask, 0.8f)}, {}, {"alpha"}},
     {"0.48, below it", {see_through(mask, 0.8f, 0)}, {"alpha"}, {}, texture_of({1, 1, 1, 0.6f})},
-    {"a veil", {see_through(blend, 0.8f)}, {"alpha"}, {}},
+    {"a veil", {see_through(blend, 0.8f)}, {"alpha"}},
     {"a veil of 1", {see_through(blend, 1)}, {}, {"alpha"}},
     // The shaders read texels as halves, whose neighbours below 1 are 2^-11 apart.
     {"1 as a half", {see_through(blend, 1, 0)}, {}, {"alpha"}, texture_of({1, 1, 1, 0.9999f})},

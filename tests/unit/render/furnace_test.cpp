@@ -1,8 +1,7 @@
 // White furnaces: where the light around is the same from everywhere, what a surface shows has a
 // closed form.
-#include <numbers>
-
 #include "tests/support/render_fixture.hpp"
+#include "tests/truth/cpu_bsdf.hpp"
 
 namespace previz::test::furnace_test {
 
@@ -100,11 +99,8 @@ scene::Material lacquered(scene::Material below, float roughness) {
 // that nothing is lost but what single scattering loses in rough lacquer.
 TEST(Furnace, LacquerReflectsItsShareAndLeavesTheRest) {
   for (const double angle : {0.1, 1.2}) {
-    const double cosine = std::cos(angle), eta = 1.5;
-    const double behind = std::sqrt(1 - (1 - cosine * cosine) / (eta * eta));
-    const double parallel = (eta * cosine - behind) / (eta * cosine + behind);
-    const double across = (cosine - eta * behind) / (cosine + eta * behind);
-    const double share = 0.8 * 0.5 * (parallel * parallel + across * across);
+    const double cosine = std::cos(angle);
+    const double share = 0.8 * truth::fresnel_dielectric(cosine, 1.5);
     const View black = tilted_plane(lacquered(diffuse(glm::vec3(0)), 0), angle);
     // The angle varies by 5e-4 over the picture; the slope of the reflectance is below 2.
     EXPECT_NEAR(mean_mixed(render_clean(black, 1).layers), share, 1e-3);
@@ -145,9 +141,9 @@ TEST(Furnace, ARoughGlassBoxTakesNothing) {
     for (const float roughness : {0.1f, 0.5f, 1.0f}) {
       View view = empty_view({0.3, -3, 0.4}, {0, 0, 0}, pinhole(16, 16, 0.2), glm::vec3(1));
       add(view.scene, box_mesh({1, 1, 1}), rough_glass(ior, roughness, false));
-      set::Estimation estimation = up_to_depth(64);
-      estimation.caustics = set::Caustics::traced;  // photons are counted with the paths
-      const Rendered result = render_clean(view, 32, estimation);
+      // Photons would be counted with the paths.
+      const Rendered result =
+          render_clean(view, 32, {.max_depth = 64, .caustics = set::Caustics::traced});
       const double samples = 32.0 * 16 * 16;
       const double vertices = static_cast<double>(result.counters.rays) / samples - 1;
       EXPECT_NEAR(mean_mixed(result.layers), 1, tolerance(result.layers) + vertices * table_error)
@@ -196,7 +192,7 @@ TEST(Furnace, MirroredGlassIsEnteredFromOutside) {
   if (!render::is_gpu(*shared_device())) {
     EXPECT_EQ(plain, mirrored);
   }
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(mirrored[c] / plain[c], 1, 1e-6);
+  expect_near(mirrored / plain, glm::dvec3(1), 1e-6);
 }
 
 // Lower plane emits 1 and reflects a, upper reflects b: L_lower = 1 + a b L_lower. The squares are

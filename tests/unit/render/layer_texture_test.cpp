@@ -1,8 +1,5 @@
 // Colours of vertices, textures that lie differently on a surface, and the textures that say where
 // a surface is glass, lacquered, glossy, brushed or cloth: each by its channel (KHR_materials_*).
-#include <algorithm>
-#include <numbers>
-
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 

@@ -1,7 +1,4 @@
 // The film camera's lens as the shaders have it: a ray for each corner of a pixel.
-#include <cmath>
-#include <limits>
-
 #include "daemon/render/corner_rays.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "tests/support/render_fixture.hpp"

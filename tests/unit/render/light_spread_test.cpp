@@ -7,7 +7,6 @@
 #include "daemon/render/gpu_lights.hpp"
 #include "daemon/render/scene_lights.hpp"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::light_spread_test {
 
@@ -99,10 +98,8 @@ struct Rays {
 };
 
 Rays rays_of(const View& view, set::LightSampling sampling = set::LightSampling::importance) {
-  set::Estimation estimation;
-  const Rendered with = render_clean(view, 4, estimation, sampling);
-  estimation.difference_sampling = 0;
-  const Rendered without = render_clean(view, 4, estimation, sampling);
+  const Rendered with = render_clean(view, 4, {}, sampling);
+  const Rendered without = render_clean(view, 4, {.difference_sampling = 0}, sampling);
   return {with.counters.rays, without.counters.rays,
           with.layers.mixed == without.layers.mixed && with.layers.diff == without.layers.diff};
 }

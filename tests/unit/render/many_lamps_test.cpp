@@ -3,7 +3,6 @@
 
 #include "daemon/render/emission_weights.hpp"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::many_lamps_test {
 

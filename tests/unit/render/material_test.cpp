@@ -1,11 +1,7 @@
 // Cloth, brushed metal and coloured gloss against closed forms: in the light of one distant lamp,
 // where nothing is left to chance, and in white furnaces.
-#include <cmath>
-#include <numbers>
-#include <utility>
-#include <vector>
-
 #include "tests/support/render_fixture.hpp"
+#include "tests/truth/cpu_bsdf.hpp"
 
 namespace previz::test::material_test {
 
@@ -173,10 +169,7 @@ TEST(Sheen, LiesBelowLacquer) {
   const glm::dvec3 o = direction(1.1, 0.3), i = direction(0.8, 0.9);
   const double bare = scattered(plane_seen_from(o, coated), i).g;
   coated.clearcoat = 0.8f;  // smooth: it mirrors the dark
-  const double eta = 1.5, behind = std::sqrt(1 - (1 - o.z * o.z) / (eta * eta));
-  const double parallel = (eta * o.z - behind) / (eta * o.z + behind);
-  const double across = (o.z - eta * behind) / (o.z + eta * behind);
-  const double share = 0.8 * 0.5 * (parallel * parallel + across * across);
+  const double share = 0.8 * truth::fresnel_dielectric(o.z, 1.5);
   EXPECT_NEAR(scattered(plane_seen_from(o, coated), i).g, (1 - share) * bare,
               over_the_picture * bare);
 }
@@ -199,11 +192,8 @@ double coat_formula(const glm::dvec3& o, const glm::dvec3& i, const glm::dvec3& 
   const glm::dvec3 h = glm::normalize(o + i);
   const double d =
       std::pow(glm::dot(h, t) / along, 2) + std::pow(glm::dot(h, b) / across, 2) + h.z * h.z;
-  const double behind = std::sqrt(1 - (1 - o.z * o.z) / 2.25);
-  const double parallel = (1.5 * o.z - behind) / (1.5 * o.z + behind);
-  const double perpendicular = (o.z - 1.5 * behind) / (o.z + 1.5 * behind);
-  return 0.5 * (parallel * parallel + perpendicular * perpendicular) /
-         (pi * along * across * d * d) / (1 + lambda(o) + lambda(i)) / (4 * o.z);
+  return truth::fresnel_dielectric(o.z, 1.5) / (pi * along * across * d * d) /
+         (1 + lambda(o) + lambda(i)) / (4 * o.z);
 }
 
 // The wider direction follows the texture coordinates, also where the instance is a mirror image,
@@ -269,18 +259,13 @@ TEST(ColouredGloss, FadesTowardsGrazing) {
   gloss.specular = 0.9f;
   gloss.specular_color = {1, 0.25f, 0};
   for (const double angle : {0.0, 0.9, 1.4}) {
-    const double cosine = std::cos(angle), behind = std::sqrt(1 - (1 - cosine * cosine) / 2.25);
-    const double parallel = (1.5 * cosine - behind) / (1.5 * cosine + behind);
-    const double across = (cosine - 1.5 * behind) / (cosine + 1.5 * behind);
-    const double fresnel = 0.5 * (parallel * parallel + across * across);
+    const double fresnel = truth::fresnel_dielectric(std::cos(angle), 1.5);
     const glm::dvec3 f0 = 0.04 * glm::dvec3(gloss.specular_color);
     const glm::dvec3 coat = 0.9 * (f0 + (1.0 - f0) * ((fresnel - 0.04) / 0.96));
     const Rendered result = in_white_furnace(plane_seen_from(direction(angle, 0.2), gloss), 32);
-    for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR(
-          mean(result.layers.mixed)[c], 1 - coat.r + coat[c],
-          4 * standard_errors_of_pixels(result.layers)[c] + over_the_picture * coat.r + 1e-6)
-          << "angle " << angle << " channel " << c;
+    SCOPED_TRACE(angle);
+    expect_near(mean(result.layers.mixed), 1 - coat.r + coat,
+                4.0 * standard_errors_of_pixels(result.layers) + over_the_picture * coat.r + 1e-6);
   }
 }
 

@@ -1,7 +1,6 @@
 // Smooth thin panes: light goes straight through them, in shadow rays, paths and photons alike.
-#include <numbers>
-
 #include "tests/support/render_fixture.hpp"
+#include "tests/truth/cpu_bsdf.hpp"
 
 namespace previz::test::pane_test {
 
@@ -14,10 +13,7 @@ const glm::dvec3 tint(0.9, 0.6, 0.2);
 // What a clear pane lets through: the unpolarised reflectance R of one side, and between both sides
 // R' = 2 R / (1 + R).
 double transmittance(double cosine, double ior) {
-  const double behind = std::sqrt(1 - (1 - cosine * cosine) / (ior * ior));
-  const double p = (ior * cosine - behind) / (ior * cosine + behind);
-  const double s = (cosine - ior * behind) / (cosine + ior * behind);
-  const double once = 0.5 * (p * p + s * s);
+  const double once = truth::fresnel_dielectric(cosine, ior);
   return 1 - 2 * once / (1 + once);
 }
 

@@ -1,6 +1,4 @@
 // The device's own clock: what it times is what ran, and it is silent where nobody asked.
-#include <algorithm>
-
 #include "daemon/render/device.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 

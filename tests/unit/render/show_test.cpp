@@ -1,7 +1,4 @@
 // The picture made on the device is that of the layers, whatever they are composited by.
-#include <random>
-
-#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::show_test {
@@ -46,11 +43,10 @@ INSTANTIATE_TEST_SUITE_P(Composites, ShowOf,
                                            set::Composite::hybrid));
 
 TEST_P(ShowOf, ASetIsThePictureOfItsLayers) {
-  set::Estimation estimation{.composite = GetParam()};
   View view = random_scene(3, {.width = 71, .height = 49});  // an odd number of pixels
   // The denoiser keeps photons' light apart and divides by the albedo of a scene with textures:
   // both are in no layer.
-  estimation.caustics = set::Caustics::traced;
+  const set::Estimation estimation{.composite = GetParam(), .caustics = set::Caustics::traced};
   for (scene::Material& material : view.scene.materials)
     material.base_color_texture = material.metallic_roughness_texture = material.emission_texture =
         scene::no_texture;

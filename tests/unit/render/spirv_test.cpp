@@ -10,7 +10,6 @@
 #include "shaders/refit_nodes.spv.h"
 #include "shaders/shade.spv.h"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::spirv_test {
 

@@ -2,7 +2,6 @@
 // footprint covers, and that pictures converge to those of textures looked up at points.
 #include "daemon/render/mip_levels.hpp"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::texture_filter_test {
 
@@ -31,9 +30,8 @@ View seen_from_above(scene::Texture texture) {
   scene::Material material = diffuse(glm::vec3(1));
   material.base_color_texture = add_texture(view.scene, std::move(texture));
   add(view.scene, rectangle_mesh({1, 1}), material);
-  set::Light sun = lamp(set::LightType::directional);
-  sun.emission = glm::dvec3(std::numbers::pi);  // a white surface has a radiance of 1
-  view.scene.lights = {sun};
+  // A white surface has a radiance of 1.
+  view.scene.lights = {lamp(set::LightType::directional, glm::dvec3(std::numbers::pi))};
   return view;
 }
 

@@ -2,7 +2,6 @@
 // that, and that the picture is that of a scene which was made so.
 #include "daemon/render/feature.hpp"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::variants_test {
 
