@@ -213,13 +213,7 @@ View random_scene(std::uint32_t seed, const RandomScene& options) {
   const double x = random.uniform(-0.1, 0.1), y = random.uniform(-0.1, 0.1);
   view.world_from_camera = look_at(eye, {x, y, 0.05});
   view.calibration = pinhole(options.width, options.height, random.uniform(0.7, 1.0));
-  if (options.lens) {
-    ThinLens lens;
-    lens.focal_length_m = 0.05;
-    lens.f_number = random.uniform(1.4, 4);
-    lens.focus_distance_m = distance_m;
-    view.calibration.lens = lens;
-  }
+  if (options.lens) view.calibration.lens = ThinLens{0.05, random.uniform(1.4, 4), distance_m};
   return view;
 }
 

@@ -3,6 +3,7 @@
 #include "tests/truth/cpu_tracer.hpp"
 
 #include "shaders/lib/octahedral.h"
+#include "tests/support/ggx_albedo.hpp"
 #include "tests/support/scenes.hpp"
 #include "tests/support/test.hpp"
 #include "tests/truth/cpu_bsdf.hpp"
@@ -193,35 +194,6 @@ TEST(CpuTracer, SmoothMetalIsSchlick) {
   expect_radiance(radiance_of_origin(scene, white, 64), expected, 1e-4);
 }
 
-// Directional albedo of the GGX lobe (F = 1) by quadrature over half vectors, written on its own:
-// int G2/G1(v) over the visible normals = int D(h) G2 (v.h) / (nv nh ...) in (cos, phi) of l.
-double ggx_albedo(double nv, double alpha) {
-  const glm::dvec3 v(std::sqrt(1 - nv * nv), 0, nv);
-  const auto lambda = [&](double c) {
-    const double t2 = (1 - c * c) / (c * c);
-    return (std::sqrt(1 + alpha * alpha * t2) - 1) / 2;
-  };
-  // Over the half vector's slope radius: D is then smooth in tan^2 = alpha^2 u / (1 - u).
-  const int n = 2000, m = 500;
-  double sum = 0;
-  for (int i = 0; i < n; ++i) {
-    const double u = (i + 0.5) / n;
-    const double tan2 = alpha * alpha * u / (1 - u);
-    const double nh = 1 / std::sqrt(1 + tan2);
-    const double sine = std::sqrt(1 - nh * nh);
-    for (int j = 0; j < m; ++j) {
-      const double phi = 2 * pi * (j + 0.5) / m;
-      const glm::dvec3 h(sine * std::cos(phi), sine * std::sin(phi), nh);
-      const double vh = glm::dot(v, h);
-      const double nl = 2 * vh * nh - nv;
-      if (vh <= 0 || nl <= 0) continue;
-      // D nh dh is a probability over h: f cos dl = D G2 / (4 nl nv) nl 4 vh dh.
-      sum += vh / (nv * nh) / (1 + lambda(nv) + lambda(nl)) / n / m;
-    }
-  }
-  return sum;
-}
-
 // What single scattering loses is given back; the table of it is off by less than 1e-3.
 TEST(CpuTracer, WhiteRoughMetalAndGlassKeepAllLight) {
   for (const float roughness : {0.1F, 0.4F, 1.0F}) {
@@ -238,7 +210,7 @@ TEST(CpuTracer, PlasticFurnaceMixesByTheFresnelTermOfTheView) {
   const glm::dvec3 base(0.5F, 0.2F, 0.8F);
   const double nv = eye.z / glm::length(eye);
   const double fresnel = fresnel_dielectric(nv, 1.5);
-  const glm::dvec3 expected = (1 - fresnel) * base + fresnel * ggx_albedo(nv, 0.09);
+  const glm::dvec3 expected = (1 - fresnel) * base + fresnel * test::ggx_albedo(nv, 0.09, 1);
   const Estimate e =
       radiance_of_origin(floor_of(plastic(glm::vec3(base), std::sqrt(0.09F))), white, 40000);
   expect_radiance(e, expected, 2e-4);

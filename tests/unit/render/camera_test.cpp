@@ -69,6 +69,14 @@ bool is_inside(const glm::dvec2& pixel) {
   return pixel.x > 3 && pixel.y > 3 && pixel.x < width - 4 && pixel.y < height - 4;
 }
 
+// The pixels that show nothing but the floor in the mirror.
+std::vector<std::size_t> mirrored_pixels(const View& view, const render::Layers& layers) {
+  std::vector<std::size_t> pixels;
+  for (const auto& [x, y, i] : pixels_of(width, height))
+    if (is_inside(mirrored_pixel(view, x, y)) && layers.mask[i] == 1) pixels.push_back(i);
+  return pixels;
+}
+
 // The floor is dark in the model, and bright in the plate, rising from left to right: the mirror
 // shows the plate's floor.
 // `where_it_can`: where the floor is seen too flat, the model is traced, which is black.
@@ -131,8 +139,7 @@ TEST(CameraRadiance, OfAPaintedFloorIsWrongByNoMoreThanItsCoat) {
   const render::Layers by_model = render_over(view, plate, traced, 64).layers;
   render::Layers shown;
   double expected = 0;
-  for (const auto& [x, y, i] : pixels_of(width, height)) {
-    if (!is_inside(mirrored_pixel(view, x, y)) || by_plate.mask[i] != 1) continue;
+  for (const std::size_t i : mirrored_pixels(view, by_plate)) {
     shown.mixed.push_back(by_plate.mixed[i] - by_model.mixed[i]);
     expected += static_cast<double>(by_model.mixed[i].g);
   }
@@ -156,10 +163,8 @@ TEST(CameraRadiance, AMirrorShowsThePlateWithVirtualShadows) {
   estimation.max_depth = 2;  // mirror, floor: not what the mirror adds to the floor
   const Rendered result = render_over(view, plate, estimation, 16);
   render::Layers shown;  // the pixels that show the floor in the mirror; all expect the same
-  for (const auto& [x, y, i] : pixels_of(width, height)) {
-    if (is_inside(mirrored_pixel(view, x, y)) && result.layers.mask[i] == 1)
-      shown.mixed.push_back(result.layers.composite[i]);
-  }
+  for (const std::size_t i : mirrored_pixels(view, result.layers))
+    shown.mixed.push_back(result.layers.composite[i]);
   ASSERT_GT(shown.mixed.size(), 20u);
   // The difference is followed by chance, so far from the roof.
   EXPECT_NEAR(mean(shown.mixed).g, 2 - brought, 4 * standard_error_of_pixels(shown));
@@ -204,11 +209,8 @@ TEST(CameraRadiance, WhatIsHiddenIsTraced) {
   add(view.scene, rectangle_mesh({4, 2.6}), 0u, pose, scene::world_real);
   const Plate plate = plate_of([](int, int) { return glm::dvec3(1); });
   const Rendered result = render_over(view, plate, by_camera());
-  for (const auto& [x, y, i] : pixels_of(width, height)) {
-    if (is_inside(mirrored_pixel(view, x, y)) && result.layers.mask[i] == 1) {
-      EXPECT_EQ(result.layers.mixed[i], glm::vec3(0)) << x << ' ' << y;
-    }
-  }
+  for (const std::size_t i : mirrored_pixels(view, result.layers))
+    EXPECT_EQ(result.layers.mixed[i], glm::vec3(0)) << i;
 }
 
 TEST(CameraRadiance, WithNothingVirtualThePlateIsUntouched) {
