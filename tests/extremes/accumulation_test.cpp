@@ -1,8 +1,5 @@
 // The real accumulate shader, fed with ten million samples from 1e-4 to 1e4: the means of the sums
 // are within 1e-6 of the exact ones.
-#include <cmath>
-#include <random>
-
 #include "daemon/render/kernel.hpp"
 #include "shaders/accumulate.spv.h"
 #include "tests/support/pixels_by_hand.hpp"

@@ -1,6 +1,5 @@
 // A virtual object that rests exactly on the real table, reaches into it, or contains the camera.
 #include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
 
 #include "tests/extremes/every_way.hpp"
 
@@ -13,30 +12,18 @@ const double lit = albedo / std::numbers::pi * 0.5 / std::sqrt(1.25);
 
 // A real table z = 0 under a point lamp and no other light, seen from the shadows' side.
 View table() {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
-               add_material(view.scene, diffuse(glm::vec3(albedo))));
-  view.environment = uniform_environment(glm::vec3(0));
-  set::Light sun;
-  sun.type = set::LightType::directional;
-  sun.direction = glm::normalize(glm::dvec3(0, -1, -0.5));
-  sun.gain_real = 1;
-  view.scene.lights.push_back(sun);
-  view.calibration = pinhole(width, height, 0.6);
-  view.world_from_camera = look_at({0.1, -1.2, 0.9}, {0, -0.1, 0});
+  View view = empty_view({0.1, -1.2, 0.9}, {0, -0.1, 0}, pinhole(width, height, 0.6));
+  add(view.scene, rectangle_mesh({2, 2}), diffuse(glm::vec3(albedo)));
+  view.scene.lights = {sun_lamp(glm::normalize(glm::dvec3(0, -1, -0.5)))};
   return view;
 }
 
-std::uint32_t add_virtual(View& view, const scene::Mesh& mesh, const glm::dvec3& at) {
-  return add_instance(view.scene, add_mesh(view.scene, mesh),
-                      add_material(view.scene, diffuse({0.8f, 0.3f, 0.2f})),
-                      glm::translate(glm::dmat4(1), at), scene::world_mixed);
+std::uint32_t add_virtual(View& view, const scene::Mesh& mesh, const glm::dvec3& place) {
+  return add(view.scene, mesh, diffuse({0.8f, 0.3f, 0.2f}), at(place), scene::world_mixed);
 }
 
 Rendered show(const View& view, set::Estimator estimator = set::Estimator::paired) {
-  set::Estimation estimation = up_to_depth(1);
-  estimation.estimator = estimator;
-  return render_clean(view, 4, estimation);
+  return render_clean(view, 4, up_to_depth(1, estimator));
 }
 
 class ContactByEveryWay : public EveryWay {
@@ -57,21 +44,18 @@ void for_table_pixels(const View& view, const glm::dvec2& low, const glm::dvec2&
   const PinholeIntrinsics& k = view.calibration.intrinsics;
   const glm::dvec3 eye(view.world_from_camera[3]);
   int visited = 0;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      bool inside = true;
-      for (const glm::dvec2& corner : {glm::dvec2(-0.5, -0.5), glm::dvec2(0.5, -0.5),
-                                       glm::dvec2(-0.5, 0.5), glm::dvec2(0.5, 0.5)}) {
-        const glm::dvec3 ray(view.world_from_camera * glm::dvec4((x + corner.x - k.cx) / k.fx,
-                                                                 (y + corner.y - k.cy) / k.fy, 1,
-                                                                 0));
-        const glm::dvec3 at = eye - ray * (eye.z / ray.z);
-        inside = inside && at.x > low.x && at.x < high.x && at.y > low.y && at.y < high.y;
-      }
-      if (!inside) continue;
-      ++visited;
-      visit(static_cast<std::size_t>(y) * width + x);
+  for (const auto& [x, y, i] : pixels_of(width, height)) {
+    bool inside = true;
+    for (const glm::dvec2& corner : {glm::dvec2(-0.5, -0.5), glm::dvec2(0.5, -0.5),
+                                     glm::dvec2(-0.5, 0.5), glm::dvec2(0.5, 0.5)}) {
+      const glm::dvec2 straight((x + corner.x - k.cx) / k.fx, (y + corner.y - k.cy) / k.fy);
+      const glm::dvec3 ray(view.world_from_camera * glm::dvec4(straight, 1, 0));
+      const glm::dvec3 met = eye - ray * (eye.z / ray.z);
+      inside = inside && met.x > low.x && met.x < high.x && met.y > low.y && met.y < high.y;
     }
+    if (!inside) continue;
+    ++visited;
+    visit(i);
   }
   EXPECT_GT(visited, 20) << "nothing was looked at";
 }
@@ -104,7 +88,7 @@ TEST(Contact, OfTwoFacesInOnePlaneOneWinsEverywhere) {
 // its light, to the rounding of a float, but for a share of the samples. Rays that start `lift_m`
 // above the table miss the tip of the shadow by twice that.
 void expect_dark_before_box(const View& view, double top_m, double lift_m = 0, double stray = 0) {
-  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
+  for (const auto estimator : both_estimators) {
     const Rendered result = show(view, estimator);
     // The shadow is twice as long as the box is high.
     const double tip = -0.2 - 2 * (top_m - lift_m);
@@ -161,10 +145,8 @@ TEST(Contact, ALongRoadDoesNotShadowItself) {
     view.scene.lights[0].direction = glm::dmat3(turned) * view.scene.lights[0].direction;
     view.world_from_camera = turned * view.world_from_camera;
     const Rendered result = show(view);
-    int dark = 0;
-    for (const glm::vec3& pixel : result.layers.mixed)
-      if (std::abs(pixel.g - lit) > 1e-5) ++dark;
-    EXPECT_LE(dark, 4) << turn;
+    const auto is_dark = [](const glm::vec3& pixel) { return std::abs(pixel.g - lit) > 1e-5; };
+    EXPECT_LE(std::ranges::count_if(result.layers.mixed, is_dark), 4) << turn;
   }
 }
 
@@ -180,11 +162,9 @@ TEST_P(ContactByEveryWay, TwinsLookLikeOne) {
   View one = table();
   add_virtual(one, box_mesh({0.4, 0.4, 0.4}), {0, 0, 0.2});
   View twins = one;
-  twins.scene.materials.push_back(diffuse({0.1f, 0.9f, 0.4f}));
-  scene::Instance second = twins.scene.instances.back();
-  second.material = static_cast<std::uint32_t>(twins.scene.materials.size() - 1);
-  second.object = 2;
-  twins.scene.instances.push_back(second);
+  const scene::Instance first = twins.scene.instances.back();
+  add_instance(twins.scene, first.mesh, add_material(twins.scene, diffuse({0.1f, 0.9f, 0.4f})),
+               first.world_from_object, first.presence);
   EXPECT_EQ(show(one).layers.mixed, show(twins).layers.mixed);
 }
 
@@ -205,17 +185,13 @@ TEST_P(ContactByEveryWay, IsDeterministic) {
 // In a closed virtual box that emits 1 and reflects a half, every pixel is covered and shows 2; in
 // the real world the camera sees past it.
 TEST(Contact, ABoxAroundTheCameraCoversEverything) {
-  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
+  for (const auto estimator : both_estimators) {
     View view = table();
     scene::Material wall = diffuse(glm::vec3(0.5f));
     wall.emission = glm::vec3(1);
-    add_instance(view.scene, add_mesh(view.scene, inside_out(box_mesh({1, 1, 1}))),
-                 add_material(view.scene, wall), glm::translate(glm::dmat4(1), {0.1, -1.2, 0.9}),
-                 scene::world_mixed);
-    set::Estimation estimation;
-    estimation.estimator = estimator;
-    estimation.max_depth = 64;
-    const Rendered result = render_view(view, 8, estimation);
+    add(view.scene, inside_out(box_mesh({1, 1, 1})), wall, at({0.1, -1.2, 0.9}),
+        scene::world_mixed);
+    const Rendered result = render_view(view, 8, up_to_depth(64, estimator));
     for (const float mask : result.layers.mask) ASSERT_EQ(mask, 1.0f);
     EXPECT_NEAR(mean(result.layers.mixed).g, 2, 4 * standard_error_of_pixels(result.layers) + 1e-5);
     EXPECT_GT(mean(result.layers.real).g, 0);
@@ -225,12 +201,8 @@ TEST(Contact, ABoxAroundTheCameraCoversEverything) {
 
 // Inside a ball of clear glass in a white environment all directions bring 1.
 TEST(Contact, AGlassBallAroundTheCameraTakesNothing) {
-  View view;
-  view.world_from_camera = look_at({0.3, -0.2, 0.1}, {0, 1, 0.2});
-  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(1, 4)),
-               add_material(view.scene, glass(1.5f)), glm::dmat4(1), scene::world_mixed);
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(width, height, 1.5);
+  View view = empty_view({0.3, -0.2, 0.1}, {0, 1, 0.2}, pinhole(width, height, 1.5), glm::vec3(1));
+  add(view.scene, icosphere_mesh(1, 4), glass(1.5f), glm::dmat4(1), scene::world_mixed);
   const Rendered result = render_clean(view, 4, up_to_depth(64));
   // Inside, a ray meets the ball at the same angle again and again; from 0.37 off the centre of one
   // of index 1.5 that angle is below the critical one, so every ray comes out.

@@ -2,14 +2,7 @@
 // picture that is shown, with and without its noise.
 #pragma once
 
-#include <algorithm>
-#include <cmath>
-#include <memory>
-#include <ostream>
-#include <string>
-
 #include "daemon/lighting/response.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {

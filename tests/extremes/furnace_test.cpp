@@ -8,18 +8,14 @@ constexpr double energy = 1e-3;  // the bound of shaders/README.md, "Numerical e
 // A plane seen from three angles in an environment of radiance 1. Where directions are chosen by
 // the BSDF alone, there is little chance in it; with light samples, four standard errors.
 void expect_reflectance(const scene::Material& material, double expected) {
-  scene::Scene scene;
-  add_instance(scene, add_mesh(scene, rectangle_mesh({2, 2})), add_material(scene, material));
-  render::Renderer renderer(shared_device(), {}, pinhole(16, 16, 0.02));
-  renderer.set_scene(scene);
+  View view = empty_view({0, 0, 1}, {0, 0, 0}, pinhole(16, 16, 0.02), glm::vec3(1));
+  add(view.scene, rectangle_mesh({2, 2}), material);
+  SetRenderer renderer(view);
   for (const auto sampling : {set::LightSampling::bsdf, set::LightSampling::importance}) {
-    renderer.set_environment(uniform_environment(glm::vec3(1)), sampling);
+    renderer.set_environment(view.environment, sampling);
     for (const double angle : {0.0, 0.8, 1.5}) {
-      render::FrameInput frame;
-      frame.world_from_camera = look_at({0, -std::sin(angle), std::cos(angle)}, {0, 0, 0});
-      renderer.begin(frame);
-      renderer.render(8);
-      const render::Layers layers = renderer.layers();
+      renderer.world_from_camera = look_at({0, -std::sin(angle), std::cos(angle)}, {0, 0, 0});
+      const render::Layers layers = renderer.rendered(8);
       const bool sure = sampling == set::LightSampling::bsdf;
       EXPECT_NEAR(mean(layers.mixed).g, expected,
                   sure ? energy : 4 * standard_error_of_pixels(layers) + 1e-5)
@@ -54,12 +50,8 @@ TEST(ExtremeFurnace, WhitePlasticTakesNothing) {
 }
 
 TEST(ExtremeFurnace, BlackPlasticReflectsItsCoatAlone) {
-  View view;
-  const auto plane = add_mesh(view.scene, rectangle_mesh({2, 2}));
-  add_instance(view.scene, plane, add_material(view.scene, plastic(glm::vec3(0), 0, 2.5f)));
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(16, 16, 1e-3);
-  view.world_from_camera = look_at({0, 0, 1}, {0, 0, 0});
+  View view = empty_view({0, 0, 1}, {0, 0, 0}, pinhole(16, 16, 1e-3), glm::vec3(1));
+  add(view.scene, rectangle_mesh({2, 2}), plastic(glm::vec3(0), 0, 2.5f));
   const Rendered result = render_clean(view, 1, up_to_depth(64));
   const double f0 = std::pow((2.5 - 1) / (2.5 + 1), 2);
   EXPECT_NEAR(mean(result.layers.mixed).g, f0, 1e-6);  // one path, no chance in it
@@ -70,13 +62,8 @@ TEST(ExtremeFurnace, ClearGlassTakesNothing) {
   for (const float ior : {1.0f, 1.0001f, 1.5f, 2.5f}) {
     for (const bool thin : {false, true}) {
       for (const scene::Mesh& mesh : {box_mesh({4, 4, 0.5}), icosphere_mesh(1, 5)}) {
-        View view;
-        scene::Material material = glass(ior);
-        material.thin_walled = thin;
-        add_instance(view.scene, add_mesh(view.scene, mesh), add_material(view.scene, material));
-        view.environment = uniform_environment(glm::vec3(1));
-        view.calibration = pinhole(16, 16, 0.8);
-        view.world_from_camera = look_at({0.3, -0.4, 3}, {0, 0, 0});
+        View view = empty_view({0.3, -0.4, 3}, {0, 0, 0}, pinhole(16, 16, 0.8), glm::vec3(1));
+        add(view.scene, mesh, thin ? pane(glm::vec3(1), ior) : glass(ior));
         const Rendered result = render_clean(view, 4, up_to_depth(64));
         for (const glm::vec3& pixel : result.layers.mixed)
           EXPECT_NEAR(pixel.g, 1, 1e-5) << ior << ' ' << mesh.name << (thin ? " thin" : "");
@@ -88,14 +75,10 @@ TEST(ExtremeFurnace, ClearGlassTakesNothing) {
 // Opaque to what enters, so what is left is the outer reflection, at normal incidence f0.
 TEST(ExtremeFurnace, BlackGlassReflectsItsSurfaceAlone) {
   for (const float ior : {1.0f, 1.0001f, 2.5f}) {
-    View view;
+    View view = empty_view({0, 0, 3}, {0, 0, 0}, pinhole(16, 16, 1e-3), glm::vec3(1));
     scene::Material material = glass(ior);
     material.base_color = glm::vec3(0);
-    add_instance(view.scene, add_mesh(view.scene, box_mesh({4, 4, 0.5})),
-                 add_material(view.scene, material));
-    view.environment = uniform_environment(glm::vec3(1));
-    view.calibration = pinhole(16, 16, 1e-3);
-    view.world_from_camera = look_at({0, 0, 3}, {0, 0, 0});
+    add(view.scene, box_mesh({4, 4, 0.5}), material);
     const Rendered result = render_clean(view, 64, up_to_depth(64));
     const double f0 = std::pow((ior - 1.0) / (ior + 1.0), 2);
     // The choice between the lobes is a coin of 16 * 16 * 64 tosses.
@@ -109,11 +92,8 @@ TEST(ExtremeFurnace, SixtyFourBouncesAddUp) {
   for (const float albedo : {0.0f, 0.5f, 1.0f}) {
     scene::Material wall = diffuse(glm::vec3(albedo));
     wall.emission = glm::vec3(1);
-    View view;
+    View view = empty_view({0.1, -0.2, 0.1}, {0.3, 0.9, 0.2}, pinhole(32, 32, 1.2));
     view.scene = furnace_box({2, 2, 2}, wall);
-    view.environment = uniform_environment(glm::vec3(0));
-    view.calibration = pinhole(32, 32, 1.2);
-    view.world_from_camera = look_at({0.1, -0.2, 0.1}, {0.3, 0.9, 0.2});
     const Rendered result = render_clean(view, 32, up_to_depth(64));
     double expected = 0;
     for (int bounce = 0; bounce <= 64; ++bounce) expected += std::pow(albedo, bounce);
@@ -130,25 +110,16 @@ INSTANTIATE_TEST_SUITE_P(Ways, FurnaceByEveryWay, testing::Values(paired, differ
                          name_of_way);
 
 TEST_P(FurnaceByEveryWay, AWhiteBallOnAWhiteFloorIsNotSeen) {
-  scene::Material thin = glass(2.5f);
-  thin.thin_walled = true;
   for (const scene::Material& material :
        {diffuse(glm::vec3(1)), metal(glm::vec3(1), 0), metal(glm::vec3(1), 1e-4f),
-        plastic(glm::vec3(1), 0, 2.5f), glass(1.0001f), glass(2.5f), thin}) {
-    View view;
-    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({8, 8})),
-                 add_material(view.scene, diffuse(glm::vec3(1))));
-    glm::dmat4 pose(1);
-    pose[3] = {0, 0, 0.3, 1};
-    add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.3, 3)),
-                 add_material(view.scene, material), pose, scene::world_mixed);
-    view.environment = uniform_environment(glm::vec3(1));
-    view.calibration = pinhole(24, 18, 0.6);
-    view.world_from_camera = look_at({0, -1.5, 1}, {0, 0, 0.2});
-    set::Estimation estimation = up_to_depth(64);
-    estimation.caustics = set::Caustics::traced;
+        plastic(glm::vec3(1), 0, 2.5f), glass(1.0001f), glass(2.5f), pane(glm::vec3(1), 2.5f)}) {
+    View view = empty_view({0, -1.5, 1}, {0, 0, 0.2}, pinhole(24, 18, 0.6), glm::vec3(1));
+    add(view.scene, rectangle_mesh({8, 8}), diffuse(glm::vec3(1)));
+    add(view.scene, icosphere_mesh(0.3, 3), material, at({0, 0, 0.3}), scene::world_mixed);
     const Seen white{{24, 18, 16, std::vector<std::uint16_t>(3 * 24 * 18, 32768)}, 32768.0 / 65535};
-    const render::Layers layers = render_by(GetParam(), view, white, 16, estimation).layers;
+    const render::Layers layers =
+        render_by(GetParam(), view, white, 16, {.max_depth = 64, .caustics = set::Caustics::traced})
+            .layers;
     // The pixels' errors are independent of each other.
     EXPECT_NEAR(mean(layers.mixed).g, 1, 4 * standard_error_of_pixels(layers) + energy);
     EXPECT_NEAR(mean(layers.composite).g, 1, 4 * standard_error_of_pixels(layers) + energy);

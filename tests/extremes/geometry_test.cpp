@@ -1,6 +1,4 @@
 // Triangles that are hardly there, not there, or far too many: shaded or dropped, and counted.
-#include <glm/gtc/matrix_transform.hpp>
-
 #include "daemon/scene/bvh.hpp"
 #include "tests/support/gltf_test.hpp"
 #include "tests/support/render_fixture.hpp"
@@ -27,12 +25,8 @@ scene::Mesh strips(float side, const std::vector<float>& heights) {
 }
 
 View seen_from_above(scene::Mesh mesh, const scene::Material& material) {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, std::move(mesh)),
-               add_material(view.scene, material));
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(48, 36, 0.5);
-  view.world_from_camera = look_at({0.01, -0.02, 2}, {0, 0, 0});
+  View view = empty_view({0.01, -0.02, 2}, {0, 0, 0}, pinhole(48, 36, 0.5), glm::vec3(1));
+  add(view.scene, std::move(mesh), material);
   return view;
 }
 
@@ -74,12 +68,11 @@ TEST(ExtremeGeometry, WhatCannotBeTracedChangesNoBit) {
     EXPECT_EQ(scene::build_mesh_bvh(dirty).dropped_triangles, 5u);
     const auto scene_with = [&](const scene::Mesh& mesh, bool with_empty) {
       View view = seen_from_above(rectangle_mesh({4, 4}), diffuse(glm::vec3(0.7f)));
-      add_instance(view.scene, add_mesh(view.scene, mesh), add_material(view.scene, material),
-                   glm::translate(glm::dmat4(1), {0.1, 0, 0.3}), scene::world_mixed);
+      add(view.scene, mesh, material, at({0.1, 0, 0.3}), scene::world_mixed);
       if (with_empty) {
         scene::Mesh empty;
         empty.name = "empty";
-        add_instance(view.scene, add_mesh(view.scene, empty), 1, glm::dmat4(1), scene::world_mixed);
+        add(view.scene, empty, 1u, glm::dmat4(1), scene::world_mixed);
       }
       return view;
     };
@@ -94,8 +87,7 @@ TEST(ExtremeGeometry, WhatCannotBeTracedChangesNoBit) {
 TEST(ExtremeGeometry, ASceneOfNothingShowsTheLightAround) {
   View view;
   scene::Mesh empty;
-  add_instance(view.scene, add_mesh(view.scene, empty),
-               add_material(view.scene, emitter(glm::vec3(1))), glm::dmat4(1), scene::world_mixed);
+  add(view.scene, empty, emitter(glm::vec3(1)), glm::dmat4(1), scene::world_mixed);
   view.environment = uniform_environment({0.25f, 0.5f, 2});
   view.calibration = pinhole(17, 9, 0.7);
   for (const glm::vec3& pixel : show(view, 2).layers.mixed)
@@ -111,7 +103,7 @@ TEST(ExtremeGeometry, AMillionTrianglesInOnePixel) {
   const auto ball = add_mesh(view.scene, uv_sphere_mesh(radius, 1000, 501));
   EXPECT_EQ(view.scene.meshes[ball].triangles.size(), 1'000'000u);
   add_instance(view.scene, ball, add_material(view.scene, diffuse(glm::vec3(1))),
-               glm::translate(glm::dmat4(1), {0, 0, distance}), scene::world_mixed);
+               at({0, 0, distance}), scene::world_mixed);
   view.environment = uniform_environment(glm::vec3(1));
   constexpr int samples = 1024;
   const Rendered result = show(view, samples);
@@ -142,16 +134,11 @@ TEST_F(GltfGeometry, BadTrianglesAreCountedAndTheRestIsShown) {
                                           0, 1, 5,           // no area
                                           1, 1, 2})}}));
   gltf.root("none", gltf.mesh({{"attributes", {{"POSITION", gltf.positions({3, {1, 1, 1}})}}}}));
-  View view;
+  View view = empty_view({0, -0.1, 1}, {0, 0, 0}, pinhole(32, 24, 0.5), glm::vec3(1));
   view.scene = load();
-  EXPECT_THAT(view.scene.notes,
-              ::testing::Contains(::testing::HasSubstr("1 triangle has a position that is not")));
-  EXPECT_THAT(view.scene.notes,
-              ::testing::Contains(::testing::HasSubstr("2 triangles have no area; dropped")));
-  EXPECT_THAT(view.scene.notes, ::testing::Contains(::testing::HasSubstr("is empty; skipped")));
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(32, 24, 0.5);
-  view.world_from_camera = look_at({0, -0.1, 1}, {0, 0, 0});
+  EXPECT_THAT(view.scene.notes, Contains(HasSubstr("1 triangle has a position that is not")));
+  EXPECT_THAT(view.scene.notes, Contains(HasSubstr("2 triangles have no area; dropped")));
+  EXPECT_THAT(view.scene.notes, Contains(HasSubstr("is empty; skipped")));
   const Rendered result = show(view, 2);
   for (const float depth : result.layers.depth) EXPECT_GT(depth, 0);
 }

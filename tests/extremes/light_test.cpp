@@ -1,9 +1,10 @@
 // Lamps of no size, lamps all around, lamps in an object or on it, and lamps drowned by others.
-#include <numbers>
-
 #include "tests/extremes/every_way.hpp"
 
 namespace previz::test::light_test {
+
+constexpr set::LightType near_types[] = {set::LightType::point, set::LightType::spot,
+                                         set::LightType::rectangle, set::LightType::sphere};
 
 constexpr double pi = std::numbers::pi;
 constexpr double albedo = 0.5;
@@ -12,17 +13,13 @@ render::Layers show(const View& view, int samples = 32) {
   return render_clean(view, samples, up_to_depth(4)).layers;
 }
 
-// Lamps of this estimator: those that the difference estimator is to find are virtual, because it
-// leaves out the light that both worlds share.
 class LightByEveryWay : public EveryWay {
  protected:
-  static set::Light lamp(set::LightType type) {
-    set::Light light = test::lamp(type);
-    if (GetParam().estimator == set::Estimator::difference) light.gain_real = 0;
-    return light;
-  }
-  // Over a black plate.
-  static render::Layers show(const View& view, int samples = 32) {
+  // Over a black plate. Lamps that the difference estimator is to find are virtual, because it
+  // leaves out the light that both worlds share.
+  static render::Layers show(View view, int samples = 32) {
+    if (GetParam().estimator == set::Estimator::difference)
+      for (set::Light& light : view.scene.lights) light.gain_real = 0;
     const PinholeIntrinsics& k = view.calibration.intrinsics;
     const Seen nothing{{k.width, k.height, 16,
                         std::vector<std::uint16_t>(3 * static_cast<std::size_t>(k.width) *
@@ -52,9 +49,7 @@ TEST_P(LightByEveryWay, ADiscBringsItsIrradianceAtAnyAngle) {
   for (const double radius : {pi / 2, 0.1, 1e-3, 1e-5, 1e-9, 1e-20, 0.0}) {
     SCOPED_TRACE(radius);
     View view = lit_point(albedo);
-    set::Light sun = lamp(set::LightType::directional);
-    sun.angular_radius_rad = radius;
-    view.scene.lights.push_back(sun);
+    view.scene.lights = {sun_lamp({0, 0, -1}, radius)};
     expect_irradiance(view, 1);
   }
 }
@@ -63,23 +58,16 @@ TEST_P(LightByEveryWay, ADiscBringsItsIrradianceAtAnyAngle) {
 // edge is where it should be, however small it is. A camera ray is right to 1e-7.
 TEST(ExtremeLight, ADiscLooksAsLargeAsItIs) {
   for (const double radius : {0.2, 4.65e-3, 1e-3, 1e-4}) {
-    View view;
-    view.environment = uniform_environment(glm::vec3(0));
-    set::Light sun = lamp(set::LightType::directional);
-    sun.angular_radius_rad = radius;
-    view.scene.lights.push_back(sun);
-    view.calibration = pinhole(64, 64, 4 * radius);
-    view.world_from_camera = look_at({0, 0, 0}, {0, 0, 1});
+    View view = empty_view({0, 0, 0}, {0, 0, 1}, pinhole(64, 64, 4 * radius));
+    view.scene.lights = {sun_lamp({0, 0, -1}, radius)};
     const render::Layers layers = show(view, 64);
     const PinholeIntrinsics& k = view.calibration.intrinsics;
     double flux = 0;
-    for (int y = 0; y < k.height; ++y) {
-      for (int x = 0; x < k.width; ++x) {
-        const double u = (x - k.cx) / k.fx, v = (y - k.cy) / k.fy;
-        // dw cos(theta) of a pixel: 1 / (fx fy) (1 + u^2 + v^2)^-2
-        flux += static_cast<double>(layers.mixed[static_cast<std::size_t>(y) * 64 + x].g) /
-                (k.fx * k.fy * std::pow(1 + u * u + v * v, 2));
-      }
+    for (const auto& [x, y, i] : pixels_of(k.width, k.height)) {
+      const double u = (x - k.cx) / k.fx, v = (y - k.cy) / k.fy;
+      // dw cos(theta) of a pixel: 1 / (fx fy) (1 + u^2 + v^2)^-2
+      flux +=
+          static_cast<double>(layers.mixed[i].g) / (k.fx * k.fy * std::pow(1 + u * u + v * v, 2));
     }
     // Pixels that the edge crosses, 100 with 64 stratified samples each, are uncertain by 0.5 / 64
     // of a pixel at most; the disc covers 800.
@@ -91,11 +79,8 @@ TEST_P(LightByEveryWay, ASphereOfAlmostNoSize) {
   for (const double radius : {0.1, 1e-4, 1e-9, 1e-15}) {
     SCOPED_TRACE(radius);
     View view = lit_point(albedo);
-    set::Light bulb = lamp(set::LightType::sphere);
-    bulb.position = {0.5, 0, 1};
-    bulb.radius_m = radius;
-    bulb.emission = glm::dvec3(1 / (radius * radius));
-    view.scene.lights.push_back(bulb);
+    view.scene.lights.push_back(
+        sphere_lamp({0.5, 0, 1}, radius, glm::dvec3(1 / (radius * radius))));
     expect_irradiance(view, pi / 1.25 * (1 / std::sqrt(1.25)));
   }
 }
@@ -104,11 +89,7 @@ TEST_P(LightByEveryWay, ARectangleOfAlmostNoSize) {
   for (const double side : {1e-2, 1e-6, 1e-12}) {
     SCOPED_TRACE(side);
     View view = lit_point(albedo);
-    set::Light panel = lamp(set::LightType::rectangle);
-    panel.position = {0, 0, 1};
-    panel.width_m = panel.height_m = side;
-    panel.emission = glm::dvec3(1 / (side * side));
-    view.scene.lights.push_back(panel);
+    view.scene.lights.push_back(panel_lamp({0, 0, 1}, {side, side}, glm::dvec3(1 / (side * side))));
     expect_irradiance(view, 1);
   }
 }
@@ -128,32 +109,25 @@ TEST_P(LightByEveryWay, ARectangleOfNoSizeIsNotSeen) {
 // A closed lamp all around: every direction brings the same radiance.
 TEST(ExtremeLight, ALampThatFillsTheSphere) {
   View view = lit_point(albedo, 1);
-  add_instance(view.scene, add_mesh(view.scene, inside_out(icosphere_mesh(5, 3))),
-               add_material(view.scene, emitter(glm::vec3(2))));
+  add(view.scene, inside_out(icosphere_mesh(5, 3)), emitter(glm::vec3(2)));
   expect_irradiance(show(view), 2 * pi);
 }
 
 // Sphere lamps emit outwards: inside one there is no light, and no division by a negative angle.
 TEST(ExtremeLight, InsideASphereLampItIsDark) {
   View view = lit_point(albedo, 1);
-  set::Light bulb = lamp(set::LightType::sphere);
-  bulb.radius_m = 5;
-  view.scene.lights.push_back(bulb);
+  view.scene.lights = {sphere_lamp({0, 0, 0}, 5)};
   EXPECT_EQ(mean(show(view).mixed), glm::dvec3(0));
 }
 
 // Every kind of lamp in a closed opaque box: nothing comes out. In a glass ball: finite.
 TEST(ExtremeLight, InsideAnObject) {
-  for (const auto type : {set::LightType::point, set::LightType::spot, set::LightType::rectangle,
-                          set::LightType::sphere}) {
+  for (const auto type : near_types) {
     for (const bool opaque : {true, false}) {
       View view = lit_point(albedo);
-      glm::dmat4 pose(1);
-      pose[3] = {0.2, 0, 0.6, 1};
-      const auto shell =
-          add_mesh(view.scene, opaque ? box_mesh({0.3, 0.3, 0.3}) : icosphere_mesh(0.2, 3));
       const auto material = add_material(view.scene, opaque ? diffuse(glm::vec3(1)) : glass(1.5f));
-      add_instance(view.scene, shell, material, pose, scene::world_mixed);
+      add(view.scene, opaque ? box_mesh({0.3, 0.3, 0.3}) : icosphere_mesh(0.2, 3), material,
+          at({0.2, 0, 0.6}), scene::world_mixed);
       set::Light inside = lamp(type);
       inside.position = {0.2, 0, 0.6};
       inside.width_m = inside.height_m = inside.radius_m = 0.05;
@@ -170,8 +144,7 @@ TEST(ExtremeLight, InsideAnObject) {
 // Exactly on the surface it would light, and exactly where the camera is: no sample is dropped
 // (show() sees to that), and no pixel is infinite, negative or not a number.
 TEST_P(LightByEveryWay, OnASurfaceAndInTheLens) {
-  for (const auto type : {set::LightType::point, set::LightType::spot, set::LightType::rectangle,
-                          set::LightType::sphere}) {
+  for (const auto type : near_types) {
     for (const glm::dvec3& place : {glm::dvec3(0), glm::dvec3(0, -1, 0.5)}) {
       View view = lit_point(albedo);
       set::Light light = lamp(type);
@@ -191,17 +164,9 @@ TEST_P(LightByEveryWay, OnASurfaceAndInTheLens) {
 // the lamp's, and it must not be forgotten when lights are chosen.
 TEST_P(LightByEveryWay, ACandleIsNotDrownedByASun) {
   View view = lit_point(albedo);
-  glm::dmat4 far(1);
-  for (const double x : {-1e3, 1e3}) {
-    far[3] = {x, 0, 0, 1};
-    add_instance(view.scene, 0, 0, far);
-  }
-  set::Light sun = lamp(set::LightType::directional);
-  view.scene.lights.push_back(sun);
-  set::Light candle = lamp(set::LightType::point);
-  candle.position = {0, 0, 0.01};
-  candle.emission = glm::dvec3(1e-4);
-  view.scene.lights.push_back(candle);
+  for (const double x : {-1e3, 1e3}) add_instance(view.scene, 0, 0, at({x, 0, 0}));
+  view.scene.lights = {lamp(set::LightType::directional),
+                       point_lamp({0, 0, 0.01}, glm::dvec3(1e-4))};
   view.calibration = pinhole(24, 24, 1e-4);
   expect_irradiance(view, 2);
 }

@@ -7,29 +7,18 @@ namespace previz::test::photon_test {
 
 // A diffuse floor with a glass ball over it under a lamp.
 View caustic_set() {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({1, 1})),
-               add_material(view.scene, diffuse(glm::vec3(0.6f))));
-  glm::dmat4 pose(1);
-  pose[3] = {0, 0, 0.25, 1};
-  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.1, 3)),
-               add_material(view.scene, glass(1.5f)), pose, scene::world_mixed);
-  set::Light lamp;
-  lamp.position = {0.1, 0.1, 1.5};
-  lamp.gain_real = 1;
-  view.scene.lights.push_back(lamp);
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(24, 24, 0.5);
-  view.world_from_camera = look_at({0, -0.6, 0.6}, {0, 0, 0});
+  View view = empty_view({0, -0.6, 0.6}, {0, 0, 0}, pinhole(24, 24, 0.5));
+  add(view.scene, rectangle_mesh({1, 1}), diffuse(glm::vec3(0.6f)));
+  add(view.scene, icosphere_mesh(0.1, 3), glass(1.5f), at({0, 0, 0.25}), scene::world_mixed);
+  view.scene.lights = {point_lamp({0.1, 0.1, 1.5})};
   return view;
 }
 
 set::Estimation photons_of_radius(double pixels) {
-  set::Estimation estimation = up_to_depth(6);
-  estimation.caustics = set::Caustics::photons;
-  estimation.photons = 10;
-  estimation.photon_radius_px = pixels;
-  return estimation;
+  return {.max_depth = 6,
+          .caustics = set::Caustics::photons,
+          .photons = 10,
+          .photon_radius_px = pixels};
 }
 
 // The product of the rule's steps is Gamma(n + 5/3) / (Gamma(5/3) Gamma(n + 2)), which a million
@@ -78,22 +67,18 @@ TEST_P(PhotonsByEveryWay, AShrunkRadiusIsFinite) {
 // What is still blurred over the picture's edge is the same by four standard errors over the seeds.
 TEST(ExtremePhotons, ASmallerRadiusLosesNoLight) {
   const View view = caustic_set();
-  constexpr int seeds = 6;
-  double sum = 0, squares = 0;
-  for (std::uint32_t seed = 1; seed <= seeds; ++seed) {
+  std::vector<glm::dvec3> changes;
+  for (std::uint32_t seed = 1; seed <= 6; ++seed) {
     const auto light = [&](double radius_px) {
       set::Estimation estimation = photons_of_radius(radius_px);
       estimation.seed = seed;
       return mean(render_clean(view, 4, estimation).layers.mixed).g;
     };
-    const double change = light(0.2) / light(2) - 1;
-    sum += change;
-    squares += change * change;
+    changes.emplace_back(light(0.2) / light(2) - 1);
   }
-  const double centre = sum / seeds;
-  const double error = std::sqrt((squares / seeds - centre * centre) / (seeds - 1));
-  EXPECT_LT(std::abs(centre), 4 * error);
-  EXPECT_LT(error, 0.01) << "nothing was shown";
+  const auto [change, error] = estimate_of(changes);
+  EXPECT_LT(std::abs(change.g), 4 * error.g);
+  EXPECT_LT(error.g, 0.01) << "nothing was shown";
 }
 
 // The lamp shines away from all glass, or is black, or the ball is where no photon can reach it:
@@ -105,14 +90,11 @@ TEST_P(PhotonsByEveryWay, NoneStoredIsNoCaustic) {
   away.scene.lights[0].outer_cone_rad = 0.2;
   View black = caustic_set();
   black.scene.lights[0].emission = glm::dvec3(0);
-  for (const View& view : {away, black}) {
+  for (const View& view : {away, black})
     EXPECT_EQ(mean(show(view, 4, photons_of_radius(2)).mixed), glm::dvec3(0));
-  }
   View hidden = caustic_set();
-  glm::dmat4 pose(1);
-  pose[3] = {0, 0, 0.25, 1};
-  add_instance(hidden.scene, add_mesh(hidden.scene, box_mesh({0.3, 0.3, 0.3})),
-               add_material(hidden.scene, diffuse(glm::vec3(0.6f))), pose, scene::world_mixed);
+  add(hidden.scene, box_mesh({0.3, 0.3, 0.3}), diffuse(glm::vec3(0.6f)), at({0, 0, 0.25}),
+      scene::world_mixed);
   set::Estimation none = photons_of_radius(2);
   none.caustics = set::Caustics::none;
   EXPECT_EQ(show(hidden, 4, photons_of_radius(2)).mixed, show(hidden, 4, none).mixed);

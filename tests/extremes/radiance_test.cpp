@@ -1,23 +1,12 @@
 // Light of any strength: the picture is linear in it, and a sun does not drown its sky.
-#include <cmath>
-#include <numbers>
-
-#include "drivers/plate.hpp"
 #include "shaders/lib/octahedral.h"
 #include "tests/extremes/every_way.hpp"
 
 namespace previz::test::radiance_test {
 
 View lit_set() {
-  RandomScene options;
-  options.width = 48;
-  options.height = 36;
-  View view = random_scene(6, options);
-  set::Light lamp;
-  lamp.gain_real = 1;
-  lamp.position = {0.3, 0.2, 0.9};
-  lamp.emission = glm::dvec3(0.4, 0.5, 0.6);
-  view.scene.lights.push_back(lamp);
+  View view = random_scene(6, {.width = 48, .height = 36});
+  view.scene.lights = {point_lamp({0.3, 0.2, 0.9}, glm::dvec3(0.4, 0.5, 0.6))};
   return view;
 }
 
@@ -75,16 +64,9 @@ TEST_P(RadianceByEveryWay, AMillionAndAMillionthScaleThePicture) {
 // they spoil is counted, none is dropped in silence, and the picture stays finite.
 TEST(Radiance, ThatCannotBeIsCounted) {
   for (const float albedo : {std::nanf(""), -0.5f}) {
-    View view;
-    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({20, 20})),
-                 add_material(view.scene, diffuse(glm::vec3(albedo))));
-    set::Light lamp;
-    lamp.gain_real = 1;
-    lamp.position = {0.3, 0.2, 0.9};
-    view.scene.lights.push_back(lamp);
-    view.environment = uniform_environment(glm::vec3(0));
-    view.calibration = pinhole(16, 16, 0.5);
-    view.world_from_camera = look_at({0, -0.6, 1}, {0, 0, 0});
+    View view = empty_view({0, -0.6, 1}, {0, 0, 0}, pinhole(16, 16, 0.5));
+    add(view.scene, rectangle_mesh({20, 20}), diffuse(glm::vec3(albedo)));
+    view.scene.lights = {point_lamp({0.3, 0.2, 0.9})};
     const Rendered result = render_view(view, 4);
     const render::Counters& counters = result.counters;
     constexpr std::uint64_t all = 16 * 16 * 4;
@@ -114,13 +96,10 @@ double bump_irradiance() {
 
 TEST(Radiance, OfASunAMillionTimesItsSkyIsUnbiasedAndSoIsTheSky) {
   for (const float sun : {1.0f, 1e6f}) {
-    View view;
-    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
-                 add_material(view.scene, diffuse(glm::vec3(0.5f))));
+    View view = empty_view({0, -0.6, 1}, {0, 0, 0}, pinhole(32, 32, 1e-3));
+    add(view.scene, rectangle_mesh({2, 2}), diffuse(glm::vec3(0.5f)));
     view.environment = uniform_environment(glm::vec3(1), sun_map);
     view.environment.radiance[sun_y * sun_map + sun_x] = glm::vec3(sun);
-    view.calibration = pinhole(32, 32, 1e-3);
-    view.world_from_camera = look_at({0, -0.6, 1}, {0, 0, 0});
     const render::Layers layers = show(view);
     const double expected = 0.5 * (1 + (sun - 1) * bump_irradiance() / std::numbers::pi);
     // Four standard errors, and 1e-4 for the quadrature and single precision.

@@ -1,42 +1,24 @@
 // The same set at another size, and at another place, shows the same picture.
-#include <algorithm>
 #include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
-#include <numeric>
 
-#include "drivers/plate.hpp"
 #include "tests/extremes/every_way.hpp"
 
 namespace previz::test::scale_test {
 
 // Every material, a lens, lamps with and without an extent, and glass that casts a caustic.
 View rich_set() {
-  RandomScene options;
-  options.width = 48;
-  options.height = 36;
-  options.lens = true;
-  View view = random_scene(4, options);
-  const auto ball = add_mesh(view.scene, icosphere_mesh(0.05, 3));
-  add_instance(view.scene, ball, add_material(view.scene, glass(1.5f)),
-               glm::translate(glm::dmat4(1), {0.02, -0.12, 0.08}), scene::world_mixed);
-  set::Light lamp;
-  lamp.gain_real = 1;
-  lamp.type = set::LightType::point;
-  lamp.position = {0.3, 0.2, 0.9};
-  lamp.emission = glm::dvec3(0.4, 0.5, 0.6);
-  view.scene.lights.push_back(lamp);
-  lamp.type = set::LightType::rectangle;
-  lamp.position = {-0.3, 0.1, 0.8};
-  lamp.emission = glm::dvec3(2);
-  lamp.width_m = lamp.height_m = 0.1;
-  view.scene.lights.push_back(lamp);
+  View view = random_scene(4, {.width = 48, .height = 36, .lens = true});
+  add(view.scene, icosphere_mesh(0.05, 3), glass(1.5f), at({0.02, -0.12, 0.08}),
+      scene::world_mixed);
+  view.scene.lights = {point_lamp({0.3, 0.2, 0.9}, glm::dvec3(0.4, 0.5, 0.6)),
+                       panel_lamp({-0.3, 0.1, 0.8}, {0.1, 0.1}, glm::dvec3(2))};
   return view;
 }
 
 // Everything `factor` times as large and then moved. A point's intensity grows with the square of
 // the distances, so that the radiance stays as it is.
 View resized(View view, double factor, const glm::dvec3& move = {}) {
-  const glm::dmat4 place = glm::scale(glm::translate(glm::dmat4(1), move), glm::dvec3(factor));
+  const glm::dmat4 place = glm::scale(at(move), glm::dvec3(factor));
   for (scene::Instance& instance : view.scene.instances)
     instance.world_from_object = place * instance.world_from_object;
   for (set::Light& light : view.scene.lights) {
@@ -125,11 +107,8 @@ TEST_P(ScaleByEveryWay, AKilometreFromTheOriginShowsTheSame) {
 
 // Inside a closed black-lit box with bright light all around it: what is not black has leaked.
 TEST(Scale, NothingLeaksIntoAClosedBoxOfAnySize) {
-  View view;
+  View view = empty_view({0.1, -0.2, 0.1}, {0.9, 0.8, 0.6}, pinhole(48, 48, 1.8), glm::vec3(1e6f));
   view.scene = furnace_box({2, 1.7, 1.3}, diffuse(glm::vec3(0.9f)));
-  view.environment = uniform_environment(glm::vec3(1e6f));
-  view.calibration = pinhole(48, 48, 1.8);
-  view.world_from_camera = look_at({0.1, -0.2, 0.1}, {0.9, 0.8, 0.6});
   for (const double factor : {1e-3, 1.0, 1e3}) {
     for (const glm::dvec3& move : {glm::dvec3(0), glm::dvec3(700, -600, 400)}) {
       const Rendered result = show(resized(view, factor, move));
@@ -140,27 +119,18 @@ TEST(Scale, NothingLeaksIntoAClosedBoxOfAnySize) {
 
 // A sun two degrees above the horizon: where a surface shadows itself, a pixel is dark.
 TEST(Scale, NoSurfaceOfAnySizeShadowsItself) {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({40, 40})),
-               add_material(view.scene, diffuse(glm::vec3(0.5f))),
-               glm::rotate(glm::dmat4(1), 0.3, glm::normalize(glm::dvec3(1, 2, 3))));
-  view.environment = uniform_environment(glm::vec3(0));
-  const glm::dmat3 turn(view.scene.instances[0].world_from_object);
-  set::Light sun;
-  sun.type = set::LightType::directional;
-  sun.direction = turn * glm::dvec3(-std::cos(0.035), 0, -std::sin(0.035));
-  sun.gain_real = 1;
-  view.scene.lights.push_back(sun);
-  view.calibration = pinhole(48, 48, 0.9);
-  view.world_from_camera = look_at(turn * glm::dvec3(0.3, -1, 2), {0, 0, 0});
+  const glm::dmat4 turned = glm::rotate(glm::dmat4(1), 0.3, glm::normalize(glm::dvec3(1, 2, 3)));
+  const glm::dmat3 turn(turned);
+  View view = empty_view(turn * glm::dvec3(0.3, -1, 2), {0, 0, 0}, pinhole(48, 48, 0.9));
+  add(view.scene, rectangle_mesh({40, 40}), diffuse(glm::vec3(0.5f)), turned);
+  view.scene.lights = {sun_lamp(turn * glm::dvec3(-std::cos(0.035), 0, -std::sin(0.035)))};
   const double expected = 0.5 / std::numbers::pi * std::sin(0.035);
   for (const double factor : {1e-3, 1.0, 1e3}) {
     for (const glm::dvec3& move : {glm::dvec3(0), glm::dvec3(700, -600, 400)}) {
       const Rendered result = show(resized(view, factor, move));
-      for (std::size_t i = 0; i < result.layers.mixed.size(); ++i) {
-        // One float rounding of the normal is 1e-7 / 0.035 of the cosine.
-        ASSERT_NEAR(result.layers.mixed[i].g / expected, 1, 2e-5) << factor;
-      }
+      // One float rounding of the normal is 1e-7 / 0.035 of the cosine.
+      for (const glm::vec3& pixel : result.layers.mixed)
+        ASSERT_NEAR(pixel.g / expected, 1, 2e-5) << factor;
     }
   }
 }

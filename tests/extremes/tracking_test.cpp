@@ -4,12 +4,22 @@
 
 namespace previz::tracking::tracking_test {
 
-// One small tag seen nearly face on, at many tilts: both poses explain it. Whatever is tracked must
-// be the true one; the rest must say so and hold the truth among their candidates.
-TEST(ExtremeTracking, NeverFlipsASingleTag) {
+// One small tag.
+TagScene single_tag() {
   TagScene scene;
   scene.lens = test::plain_lens(240, 200, 450);
   scene.tags = {flat_tag(5, 0.08, {0, 0, 0})};
+  return scene;
+}
+
+Track first_track(const TagScene& scene, const Frame& frame) {
+  return make_apriltag_tracker(settings_for(scene), scene.lens)->track(frame);
+}
+
+// One small tag seen nearly face on, at many tilts: both poses explain it. Whatever is tracked must
+// be the true one; the rest must say so and hold the truth among their candidates.
+TEST(ExtremeTracking, NeverFlipsASingleTag) {
+  TagScene scene = single_tag();
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0, 1);
   int tracked = 0, ambiguous = 0;
@@ -19,8 +29,7 @@ TEST(ExtremeTracking, NeverFlipsASingleTag) {
     const glm::dvec3 eye = range * glm::dvec3(std::sin(tilt) * std::cos(around),
                                               std::sin(tilt) * std::sin(around), std::cos(tilt));
     scene.world_from_camera = camera_looking(eye, {0, 0, 0}, {0.2, 1, 0.1});
-    const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
-    const Track track = tracker->track(picture(scene, random, 600));
+    const Track track = first_track(scene, picture(scene, random, 600));
     ASSERT_NE(track.status, TrackStatus::lost) << track.reason;
     if (track.status == TrackStatus::tracked) {
       ++tracked;
@@ -46,9 +55,7 @@ TEST(ExtremeTracking, NeverFlipsASingleTag) {
 
 // Known from a slanted view, a single tag stays known while it turns to where either pose would do.
 TEST(ExtremeTracking, TheLastPoseDecidesWhileItIsRecent) {
-  TagScene scene;
-  scene.lens = test::plain_lens(240, 200, 450);
-  scene.tags = {flat_tag(5, 0.08, {0, 0, 0})};
+  TagScene scene = single_tag();
   const auto place = [&](double tilt) {
     scene.world_from_camera =
         camera_looking({2 * std::sin(tilt), 0.1, 2 * std::cos(tilt)}, {0, 0, 0}, {0, 1, 0});
@@ -89,8 +96,7 @@ TEST(ExtremeTracking, GrazingAngles) {
   for (double elevation : {45.0, 25.0, 15.0, 10.0, 7.0, 5.0, 3.0, 1.0}) {
     const double e = glm::radians(elevation);
     scene.world_from_camera = camera_looking({0, -0.9 * std::cos(e), 0.9 * std::sin(e)}, {0, 0, 0});
-    const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
-    const Track track = tracker->track(picture(scene, random));
+    const Track track = first_track(scene, picture(scene, random));
     status = track.status;
     if (!track.pose) continue;
     const double sigma = translation_sigma(*track.pose);
@@ -114,8 +120,7 @@ TEST(ExtremeTracking, DetectionLimit) {
   TrackStatus status = TrackStatus::tracked;
   for (double range : {0.6, 1.2, 2.4, 4.8, 9.6}) {
     scene.world_from_camera = camera_looking({0.1, -0.8 * range, 0.6 * range}, {0.02, 0.03, 0});
-    const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
-    const Track track = tracker->track(picture(scene, random));
+    const Track track = first_track(scene, picture(scene, random));
     status = track.status;
     if (!track.pose) continue;
     EXPECT_GT(translation_sigma(*track.pose), last);

@@ -1,12 +1,7 @@
 // Runs pixels and layers that a test makes by hand through the renderer's steps after sampling.
 #pragma once
 
-#include <algorithm>
-#include <random>
-#include <span>
-
 #include "daemon/render/presenter.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {

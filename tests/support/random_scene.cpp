@@ -91,9 +91,8 @@ void add_random_object(scene::Scene& scene, Random& random, const glm::dvec2& ce
     mesh = random.below(2) == 0 ? uv_sphere_mesh(radius_m, 48, 24) : icosphere_mesh(radius_m, 3);
     if (mesh.uvs.empty() && kind == Kind::textured) mesh = uv_sphere_mesh(radius_m, 48, 24);
   }
-  const glm::dmat4 at = glm::translate(glm::dmat4(1.0), glm::dvec3(cell, 0.5 * height_m - sink_m));
-  const std::uint32_t mesh_index = add_mesh(scene, std::move(mesh));
-  add_instance(scene, mesh_index, material, glm::rotate(at, turn, glm::dvec3(0, 0, 1)), presence);
+  const glm::dmat4 place = at(glm::dvec3(cell, 0.5 * height_m - sink_m));
+  add(scene, std::move(mesh), material, glm::rotate(place, turn, glm::dvec3(0, 0, 1)), presence);
 }
 
 void add_objects(scene::Scene& scene, Random& random, std::uint32_t seed,
@@ -197,8 +196,7 @@ View random_scene(std::uint32_t seed, const RandomScene& options) {
   View view;
   const std::uint32_t table_material = add_random_material(
       view.scene, random, random.below(2) == 0 ? Kind::diffuse : Kind::textured);
-  const std::uint32_t table = add_mesh(view.scene, box_mesh({1.4, 1.2, 0.03}));
-  add_instance(view.scene, table, table_material, glm::translate(glm::dmat4(1.0), {0, 0, -0.015}));
+  add(view.scene, box_mesh({1.4, 1.2, 0.03}), table_material, at({0, 0, -0.015}));
   add_objects(view.scene, random, seed, options);
   for (int i = 0; i < options.lights; ++i) view.scene.lights.push_back(random_light(random));
   Random tints(seed + 1);  // numbers of their own, so that the rest of the view stays as it is
@@ -215,13 +213,7 @@ View random_scene(std::uint32_t seed, const RandomScene& options) {
   const double x = random.uniform(-0.1, 0.1), y = random.uniform(-0.1, 0.1);
   view.world_from_camera = look_at(eye, {x, y, 0.05});
   view.calibration = pinhole(options.width, options.height, random.uniform(0.7, 1.0));
-  if (options.lens) {
-    ThinLens lens;
-    lens.focal_length_m = 0.05;
-    lens.f_number = random.uniform(1.4, 4);
-    lens.focus_distance_m = distance_m;
-    view.calibration.lens = lens;
-  }
+  if (options.lens) view.calibration.lens = ThinLens{0.05, random.uniform(1.4, 4), distance_m};
   return view;
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "daemon/render/renderer.hpp"
+#include "drivers/plate.hpp"
 #include "tests/support/scenes.hpp"
 #include "tests/support/test.hpp"
 
@@ -13,18 +14,39 @@ inline const std::shared_ptr<render::Device>& shared_device() {
   return device;
 }
 
-inline lighting::EnvironmentMap uniform_environment(const glm::vec3& radiance, int size = 4) {
-  return {size, std::vector<glm::vec3>(static_cast<std::size_t>(size) * size, radiance)};
+inline void expect_clean(const render::Counters& counters) {
+  EXPECT_EQ(counters.dropped_not_finite, 0u);
+  EXPECT_EQ(counters.dropped_negative, 0u);
+  EXPECT_EQ(counters.stopped_in_layers, 0u);
+  EXPECT_EQ(counters.unfinished, 0u);
+  EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
 }
 
 // Holds a view's scene and environment.
 struct SetRenderer : render::Renderer {
   explicit SetRenderer(const View& view, const set::Estimation& estimation = {},
+                       set::LightSampling sampling = set::LightSampling::importance,
                        std::shared_ptr<render::Device> device = shared_device())
-      : render::Renderer(std::move(device), estimation, view.calibration) {
+      : render::Renderer(std::move(device), estimation, view.calibration),
+        world_from_camera(view.world_from_camera) {
     set_scene(view.scene);
-    set_environment(view.environment, set::LightSampling::importance);
+    set_environment(view.environment, sampling);
   }
+
+  // Renders a frame that stands alone, from where the view's camera is.
+  render::Layers rendered(int samples, std::optional<std::uint32_t> seed = {}) {
+    begin({{}, 1.0, world_from_camera, seed});
+    render(samples);
+    return layers();
+  }
+  // The same, and nothing may have been dropped on the way.
+  render::Layers rendered_clean(int samples, std::optional<std::uint32_t> seed = {}) {
+    render::Layers result = rendered(samples, seed);
+    expect_clean(counters());
+    return result;
+  }
+
+  glm::dmat4 world_from_camera;
 };
 
 struct Rendered {
@@ -34,22 +56,9 @@ struct Rendered {
 
 inline Rendered render_view(const View& view, int samples, const set::Estimation& estimation = {},
                             set::LightSampling sampling = set::LightSampling::importance) {
-  render::Renderer renderer(shared_device(), estimation, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, sampling);
-  render::FrameInput frame;
-  frame.world_from_camera = view.world_from_camera;
-  renderer.begin(frame);
-  renderer.render(samples);
-  return {renderer.layers(), renderer.counters()};
-}
-
-inline void expect_clean(const render::Counters& counters) {
-  EXPECT_EQ(counters.dropped_not_finite, 0u);
-  EXPECT_EQ(counters.dropped_negative, 0u);
-  EXPECT_EQ(counters.stopped_in_layers, 0u);
-  EXPECT_EQ(counters.unfinished, 0u);
-  EXPECT_EQ(render::validation_messages(*shared_device()), 0u);
+  SetRenderer renderer(view, estimation, sampling);
+  render::Layers layers = renderer.rendered(samples);
+  return {std::move(layers), renderer.counters()};
 }
 
 // The same, and nothing may have been dropped on the way.
@@ -60,10 +69,46 @@ inline Rendered render_clean(const View& view, int samples, const set::Estimatio
   return result;
 }
 
-inline set::Estimation up_to_depth(int max_depth) {
-  set::Estimation estimation;
-  estimation.max_depth = max_depth;
-  return estimation;
+inline set::Estimation up_to_depth(int max_depth,
+                                   set::Estimator estimator = set::Estimator::paired) {
+  return {.estimator = estimator, .max_depth = max_depth};
+}
+
+inline constexpr set::Estimator both_estimators[] = {set::Estimator::paired,
+                                                     set::Estimator::difference};
+inline constexpr set::Composite all_composites[] = {set::Composite::additive, set::Composite::ratio,
+                                                    set::Composite::hybrid};
+
+struct Pixel {
+  int x, y;
+  std::size_t i;  // in a layer
+};
+
+// All pixels of a picture, row by row.
+inline std::vector<Pixel> pixels_of(int width, int height) {
+  std::vector<Pixel> pixels;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) pixels.push_back({x, y, pixels.size()});
+  return pixels;
+}
+
+// What a sensor sees of a layer whose codes of 16 bits are linear and end at `white`.
+template <class Radiance>
+Plate linear_plate(int width, int height, const std::vector<Radiance>& layer, double white) {
+  Plate plate{width, height, 16, {}};
+  for (const glm::dvec3 radiance : layer)
+    for (int c = 0; c < 3; ++c)
+      plate.samples.push_back(static_cast<std::uint16_t>(
+          std::lround(65535 * std::clamp(radiance[c] / white, 0.0, 1.0))));
+  return plate;
+}
+
+inline void expect_near(const glm::dvec3& found, const glm::dvec3& expected,
+                        const glm::dvec3& bound) {
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(found[c], expected[c], bound[c]) << "channel " << c;
+}
+inline void expect_near(const glm::dvec3& found, const glm::dvec3& expected, double bound) {
+  expect_near(found, expected, glm::dvec3(bound));
 }
 
 // Mean of a layer over the picture, per channel, in double precision.
@@ -73,7 +118,25 @@ inline glm::dvec3 mean(const std::vector<glm::vec3>& layer) {
   return sum / static_cast<double>(layer.size());
 }
 
-// Standard error of that mean, from the renderer's own variance of each pixel's mean (an
+// The mean of independent values by channel, and its standard error.
+struct Estimate {
+  glm::dvec3 mean{0}, error{0};
+};
+
+inline Estimate estimate_of(const std::vector<glm::dvec3>& values) {
+  const auto n = static_cast<double>(values.size());
+  Estimate result;
+  glm::dvec3 squares(0);
+  for (const glm::dvec3& value : values) {
+    result.mean += value / n;
+    squares += value * value / n;
+  }
+  const glm::dvec3 variance = glm::max(squares - result.mean * result.mean, 0.0);
+  result.error = glm::sqrt(variance / (n - 1));
+  return result;
+}
+
+// Standard error of the mean of a layer, from the renderer's own variance of each pixel's mean (an
 // over-estimate, because it ignores that the samples are stratified). For mask = 0 the variance is
 // the difference's, so this is for pictures whose mask is 1.
 inline glm::dvec3 standard_error(const render::Layers& layers) {
@@ -81,14 +144,18 @@ inline glm::dvec3 standard_error(const render::Layers& layers) {
   return glm::sqrt(mean(layers.variance) / n);
 }
 
-// Standard error of the mean of the green mixed radiance from the spread of the pixels, for
-// pictures whose pixels all expect the same value. An over-estimate: neighbours' errors cancel.
-inline double standard_error_of_pixels(const render::Layers& layers) {
-  const double centre = mean(layers.mixed).g;
-  double sum = 0;
-  for (const glm::vec3& pixel : layers.mixed) sum += (pixel.g - centre) * (pixel.g - centre);
+// Standard error of the mean of the mixed radiance from the spread of the pixels, by channel and of
+// green, for pictures whose pixels all expect the same value. An over-estimate: neighbours' errors
+// cancel.
+inline glm::dvec3 standard_errors_of_pixels(const render::Layers& layers) {
+  const glm::dvec3 centre = mean(layers.mixed);
+  glm::dvec3 sum(0);
+  for (const glm::dvec3 pixel : layers.mixed) sum += (pixel - centre) * (pixel - centre);
   const auto n = static_cast<double>(layers.mixed.size());
-  return std::sqrt(sum / (n * (n - 1)));
+  return glm::sqrt(sum / (n * (n - 1)));
+}
+inline double standard_error_of_pixels(const render::Layers& layers) {
+  return standard_errors_of_pixels(layers).g;
 }
 
 }  // namespace previz::test

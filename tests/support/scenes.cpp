@@ -157,6 +157,13 @@ scene::Material glass(float ior) {
   return material;
 }
 
+scene::Material pane(const glm::vec3& tint, float ior) {
+  scene::Material material = glass(ior);
+  material.thin_walled = true;
+  material.base_color = tint;
+  return material;
+}
+
 scene::Material emitter(const glm::vec3& radiance) {
   scene::Material material = diffuse(glm::vec3(0));
   material.name = "emitter";
@@ -192,27 +199,53 @@ std::uint32_t add_instance(scene::Scene& scene, std::uint32_t mesh, std::uint32_
   return scene.instances.back().object;
 }
 
+std::uint32_t add(scene::Scene& scene, scene::Mesh mesh, scene::Material material,
+                  const glm::dmat4& world_from_object, std::uint32_t presence) {
+  return add(scene, std::move(mesh), add_material(scene, std::move(material)), world_from_object,
+             presence);
+}
+
+std::uint32_t add(scene::Scene& scene, scene::Mesh mesh, std::uint32_t material,
+                  const glm::dmat4& world_from_object, std::uint32_t presence) {
+  return add_instance(scene, add_mesh(scene, std::move(mesh)), material, world_from_object,
+                      presence);
+}
+
+glm::dmat4 at(const glm::dvec3& place) {
+  return glm::translate(glm::dmat4(1.0), place);
+}
+
+scene::Texture texture_of(int width, int height, std::vector<glm::vec4> texels) {
+  scene::Texture texture;
+  texture.width = width;
+  texture.height = height;
+  texture.texels = std::move(texels);
+  return texture;
+}
+
+scene::Texture texture_of(const glm::vec4& texel) {
+  return texture_of(1, 1, {texel});
+}
+
 scene::Scene facing_planes(double side_m, double gap_m, const scene::Material& lower,
                            const scene::Material& upper) {
   scene::Scene scene;
   const std::uint32_t square = add_mesh(scene, rectangle_mesh({side_m, side_m}));
   add_instance(scene, square, add_material(scene, lower));
-  const glm::dmat4 above = glm::translate(glm::dmat4(1.0), {0, 0, gap_m});
   add_instance(scene, square, add_material(scene, upper),
-               glm::rotate(above, pi, glm::dvec3(1, 0, 0)));
+               glm::rotate(at({0, 0, gap_m}), pi, glm::dvec3(1, 0, 0)));
   return scene;
 }
 
 scene::Scene furnace_box(const glm::dvec3& size, const scene::Material& wall) {
   scene::Scene scene;
-  add_instance(scene, add_mesh(scene, inside_out(box_mesh(size))), add_material(scene, wall));
+  add(scene, inside_out(box_mesh(size)), wall);
   return scene;
 }
 
 scene::Scene furnace_sphere(double radius_m, int subdivisions, const scene::Material& wall) {
   scene::Scene scene;
-  add_instance(scene, add_mesh(scene, inside_out(icosphere_mesh(radius_m, subdivisions))),
-               add_material(scene, wall));
+  add(scene, inside_out(icosphere_mesh(radius_m, subdivisions)), wall);
   return scene;
 }
 
@@ -224,8 +257,8 @@ scene::Scene cornell_box() {
   const std::uint32_t lamp = add_material(scene, emitter({15, 12, 8}));
   const std::uint32_t square = add_mesh(scene, rectangle_mesh({1, 1}));
   const std::uint32_t lamp_square = add_mesh(scene, rectangle_mesh({0.4, 0.4}));
-  const auto place = [](const glm::dvec3& at, double angle, const glm::dvec3& axis) {
-    return glm::rotate(glm::translate(glm::dmat4(1.0), at), angle, axis);
+  const auto place = [](const glm::dvec3& where, double angle, const glm::dvec3& axis) {
+    return glm::rotate(at(where), angle, axis);
   };
   const glm::dvec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
   add_instance(scene, square, white, place({0, 0, 0}, 0, x));
@@ -235,10 +268,8 @@ scene::Scene cornell_box() {
   add_instance(scene, square, green, place({0.5, 0, 0.5}, -pi / 2, y));
   add_instance(scene, lamp_square, lamp, place({0, 0, 0.999}, pi, x));
   // Both boxes sink a millimetre into the floor.
-  add_instance(scene, add_mesh(scene, box_mesh({0.3, 0.3, 0.6})), white,
-               place({-0.18, 0.18, 0.299}, 0.3, z));
-  add_instance(scene, add_mesh(scene, box_mesh({0.3, 0.3, 0.3})), white,
-               place({0.2, -0.15, 0.149}, -0.3, z));
+  add(scene, box_mesh({0.3, 0.3, 0.6}), white, place({-0.18, 0.18, 0.299}, 0.3, z));
+  add(scene, box_mesh({0.3, 0.3, 0.3}), white, place({0.2, -0.15, 0.149}, -0.3, z));
   return scene;
 }
 
@@ -251,13 +282,54 @@ set::Light lamp(set::LightType type, const glm::dvec3& emission) {
   return light;
 }
 
+set::Light point_lamp(const glm::dvec3& position, const glm::dvec3& emission) {
+  set::Light light = lamp(set::LightType::point, emission);
+  light.position = position;
+  return light;
+}
+
+set::Light sphere_lamp(const glm::dvec3& position, double radius_m, const glm::dvec3& emission) {
+  set::Light light = lamp(set::LightType::sphere, emission);
+  light.position = position;
+  light.radius_m = radius_m;
+  return light;
+}
+
+set::Light panel_lamp(const glm::dvec3& position, const glm::dvec2& size,
+                      const glm::dvec3& emission) {
+  set::Light light = lamp(set::LightType::rectangle, emission);
+  light.position = position;
+  light.width_m = size.x;
+  light.height_m = size.y;
+  return light;
+}
+
+set::Light sun_lamp(const glm::dvec3& direction, double angular_radius_rad,
+                    const glm::dvec3& emission) {
+  set::Light light = lamp(set::LightType::directional, emission);
+  light.direction = direction;
+  light.angular_radius_rad = angular_radius_rad;
+  return light;
+}
+
+lighting::EnvironmentMap uniform_environment(const glm::vec3& radiance, int size) {
+  return {size, std::vector<glm::vec3>(static_cast<std::size_t>(size) * size, radiance)};
+}
+
+lighting::EnvironmentMap one_sided_sky() {
+  lighting::EnvironmentMap sky = uniform_environment({0.3f, 0.4f, 0.5f}, 8);
+  for (std::size_t i = 9; i < 15; ++i) sky.radiance[i] *= 6.0f;
+  return sky;
+}
+
+View empty_view(const glm::dvec3& eye, const glm::dvec3& target, const ObserverCalibration& camera,
+                const glm::vec3& sky) {
+  return {{}, uniform_environment(sky), camera, look_at(eye, target)};
+}
+
 View lit_point(double albedo, double side_m) {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({side_m, side_m})),
-               add_material(view.scene, diffuse(glm::vec3(static_cast<float>(albedo)))));
-  view.environment = {4, std::vector<glm::vec3>(16, glm::vec3(0))};
-  view.calibration = pinhole(32, 32, 1e-3);
-  view.world_from_camera = look_at({0, -1, 0.5}, {0, 0, 0});
+  View view = empty_view({0, -1, 0.5}, {0, 0, 0}, pinhole(32, 32, 1e-3));
+  add(view.scene, rectangle_mesh({side_m, side_m}), diffuse(glm::vec3(static_cast<float>(albedo))));
   return view;
 }
 

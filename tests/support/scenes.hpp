@@ -25,16 +25,31 @@ scene::Mesh inside_out(scene::Mesh mesh);
 scene::Material diffuse(const glm::vec3& albedo);  // Lambert: no specular at all
 scene::Material plastic(const glm::vec3& base_color, float roughness, float ior = 1.5f);
 scene::Material metal(const glm::vec3& f0, float roughness);
-scene::Material glass(float ior);                    // smooth, solid
-scene::Material emitter(const glm::vec3& radiance);  // reflects nothing
+scene::Material glass(float ior);                                              // smooth, solid
+scene::Material pane(const glm::vec3& tint = glm::vec3(1), float ior = 1.5f);  // smooth, thin
+scene::Material emitter(const glm::vec3& radiance);                            // reflects nothing
 
 std::uint32_t add_mesh(scene::Scene& scene, scene::Mesh mesh);
 std::uint32_t add_material(scene::Scene& scene, scene::Material material);
 std::uint32_t add_texture(scene::Scene& scene, scene::Texture texture);
-// Returns the instance's index; Instance::object counts instances.
+// Each returns the instance's index; Instance::object counts instances.
 std::uint32_t add_instance(scene::Scene& scene, std::uint32_t mesh, std::uint32_t material,
                            const glm::dmat4& world_from_object = glm::dmat4(1.0),
                            std::uint32_t presence = scene::world_both);
+// Of a mesh of its own, and of a material of its own or of one that is there.
+std::uint32_t add(scene::Scene& scene, scene::Mesh mesh, scene::Material material,
+                  const glm::dmat4& world_from_object = glm::dmat4(1.0),
+                  std::uint32_t presence = scene::world_both);
+std::uint32_t add(scene::Scene& scene, scene::Mesh mesh, std::uint32_t material,
+                  const glm::dmat4& world_from_object = glm::dmat4(1.0),
+                  std::uint32_t presence = scene::world_both);
+
+// Moves the origin to a place.
+glm::dmat4 at(const glm::dvec3& place);
+
+// Texels are given row by row from the top.
+scene::Texture texture_of(int width, int height, std::vector<glm::vec4> texels = {});
+scene::Texture texture_of(const glm::vec4& texel);  // of a single one
 
 // Squares of the given side at z = 0 (facing up) and z = gap (facing down).
 scene::Scene facing_planes(double side_m, double gap_m, const scene::Material& lower,
@@ -47,8 +62,21 @@ scene::Scene furnace_sphere(double radius_m, int subdivisions, const scene::Mate
 // -X, green wall at +X, a square emitter of side 0.4 just below the ceiling, two white boxes.
 scene::Scene cornell_box();
 
-// A lamp that is there in both worlds.
+// Lamps that are there in both worlds.
 set::Light lamp(set::LightType type, const glm::dvec3& emission = glm::dvec3(1));
+set::Light point_lamp(const glm::dvec3& position, const glm::dvec3& emission = glm::dvec3(1));
+set::Light sphere_lamp(const glm::dvec3& position, double radius_m,
+                       const glm::dvec3& emission = glm::dvec3(1));
+// A rectangle that faces down, its width along X.
+set::Light panel_lamp(const glm::dvec3& position, const glm::dvec2& size,
+                      const glm::dvec3& emission = glm::dvec3(1));
+// At infinity; the light travels in this direction.
+set::Light sun_lamp(const glm::dvec3& direction, double angular_radius_rad = 0,
+                    const glm::dvec3& emission = glm::dvec3(1));
+
+lighting::EnvironmentMap uniform_environment(const glm::vec3& radiance, int size = 4);
+// Bluish, with a side that is six times as bright.
+lighting::EnvironmentMap one_sided_sky();
 
 // All that a renderer is given for one picture.
 struct View {
@@ -63,6 +91,10 @@ struct View {
 glm::dmat4 look_at(const glm::dvec3& eye, const glm::dvec3& target);
 // Square pixels, centred principal point, no distortion.
 ObserverCalibration pinhole(int width, int height, double horizontal_fov_rad);
+
+// Nothing but the sky, as a camera at `eye` sees it that looks at `target`.
+View empty_view(const glm::dvec3& eye, const glm::dvec3& target, const ObserverCalibration& camera,
+                const glm::vec3& sky = glm::vec3(0));
 
 // A Lambert plane z = 0 in the dark, seen at the origin from the side by so narrow a picture that
 // the whole of it shows one point.

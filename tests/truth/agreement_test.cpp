@@ -2,7 +2,6 @@
 #include "tests/truth/agreement.hpp"
 #include "tests/support/test.hpp"
 
-#include "drivers/error.hpp"
 #include "tests/truth/cpu_random.hpp"
 
 namespace previz::truth::agreement_test {

@@ -3,7 +3,6 @@
 #include "tests/support/test.hpp"
 
 #include "daemon/lighting/response.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/truth/cpu_random.hpp"
 
@@ -17,14 +16,11 @@ TruthFrame constructed() {
   t.height = 24;
   t.exposure = 1.25;  // white at 0.8
   t.response.kind = ResponseCurve::Kind::srgb;
-  for (int y = 0; y < t.height; ++y) {
-    for (int x = 0; x < t.width; ++x) {
-      const bool covered = x >= 20;
-      t.plate.emplace_back(0.2F);
-      t.real.emplace_back(0.2F);
-      t.mixed.emplace_back(covered ? 0.4F : 0.1F);
-      t.mask.push_back(covered ? 1.0F : 0.0F);
-    }
+  t.plate = t.real = std::vector<glm::vec3>(32 * 24, glm::vec3(0.2F));
+  for (int i = 0; i < 32 * 24; ++i) {
+    const bool covered = i % 32 >= 20;
+    t.mixed.emplace_back(covered ? 0.4F : 0.1F);
+    t.mask.push_back(covered ? 1.0F : 0.0F);
   }
   return t;
 }
@@ -73,20 +69,15 @@ TEST(Compare, BlockMeansAverageNoiseAway) {
   const TruthFrame t = constructed();
   EstimatedFrame e = perfect(t);
   // A checkerboard of +-0.05 vanishes in every 8x8 mean.
-  for (std::size_t i = 0; i < e.diff.size(); ++i) {
-    e.diff[i] += glm::vec3((i % 2) ? 0.05F : -0.05F);
-  }
+  for (std::size_t i = 0; i < e.diff.size(); ++i) e.diff[i] += glm::vec3((i % 2) ? 0.05F : -0.05F);
   EXPECT_LT(compare(t, e).e_diff, 1e-5);
 }
 
 TEST(Compare, EverythingIsClippedAtTheSensorsWhite) {
   TruthFrame t = constructed();
-  for (std::size_t i = 0; i < t.mixed.size(); ++i) {
-    if (t.mask[i] == 1)
-      t.mixed[i] = glm::vec3(50);  // a lamp's mirror image
-    else
-      t.mixed[i] = glm::vec3(1000);  // D = 0.8 - 0.2
-  }
+  // A lamp's mirror image, and D = 0.8 - 0.2.
+  for (std::size_t i = 0; i < t.mixed.size(); ++i)
+    t.mixed[i] = glm::vec3(t.mask[i] == 1 ? 50 : 1000);
   EstimatedFrame e = perfect(t);
   for (auto& value : e.mixed) value *= 3.0F;
   for (auto& value : e.diff) value *= 0.5F;

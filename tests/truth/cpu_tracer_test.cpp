@@ -3,6 +3,7 @@
 #include "tests/truth/cpu_tracer.hpp"
 
 #include "shaders/lib/octahedral.h"
+#include "tests/support/ggx_albedo.hpp"
 #include "tests/support/scenes.hpp"
 #include "tests/support/test.hpp"
 #include "tests/truth/cpu_bsdf.hpp"
@@ -16,15 +17,12 @@ using test::emitter;
 using test::glass;
 using test::look_at;
 using test::metal;
+using test::pane;
 using test::plastic;
+using test::uniform_environment;
 
 constexpr double pi = std::numbers::pi;
 const glm::dvec3 eye(0.3, -1.0, 1.5);
-
-std::uint32_t add(scene::Scene& scene, scene::Mesh mesh, const scene::Material& material) {
-  const std::uint32_t mesh_index = test::add_mesh(scene, std::move(mesh));
-  return test::add_instance(scene, mesh_index, test::add_material(scene, material));
-}
 
 // A parallelogram around `centre` that faces cross(half_u, half_v).
 std::uint32_t add_quad(scene::Scene& scene, const glm::vec3& centre, const glm::vec3& half_u,
@@ -32,26 +30,20 @@ std::uint32_t add_quad(scene::Scene& scene, const glm::vec3& centre, const glm::
   scene::Mesh mesh = test::rectangle_mesh({2, 2});
   for (glm::vec3& p : mesh.positions) p = centre + p.x * half_u + p.y * half_v;
   mesh.normals.assign(4, glm::normalize(glm::cross(half_u, half_v)));
-  return add(scene, std::move(mesh), material);
+  return test::add(scene, std::move(mesh), material);
 }
 
 // A sphere around the origin of 2 n segments and n rings.
 std::uint32_t add_sphere(scene::Scene& scene, double radius, int n,
                          const scene::Material& material) {
-  return add(scene, test::uv_sphere_mesh(radius, 2 * n, n), material);
-}
-
-lighting::EnvironmentMap constant_environment(const glm::vec3& radiance, int size = 4) {
-  return {size, std::vector<glm::vec3>(static_cast<std::size_t>(size * size), radiance)};
+  return test::add(scene, test::uv_sphere_mesh(radius, 2 * n, n), material);
 }
 
 ObserverCalibration pinhole(int width, int height, double focal_px) {
   return test::pinhole(width, height, 2 * std::atan(0.5 * width / focal_px));
 }
 
-ObserverCalibration one_pixel() {
-  return pinhole(1, 1, 1e4);
-}  // 1e-4 rad wide
+const ObserverCalibration one_pixel = pinhole(1, 1, 1e4);  // 1e-4 rad wide
 
 struct Estimate {
   glm::dvec3 mean, standard_error;
@@ -63,19 +55,18 @@ Estimate radiance_of_origin(const scene::Scene& scene, const lighting::Environme
                             const glm::dvec3& from = eye) {
   CpuTracer tracer(scene, environment, options);
   const TracedPicture p =
-      tracer.trace(one_pixel(), look_at(from, glm::dvec3(0)), scene::world_mixed, samples, 1);
+      tracer.trace(one_pixel, look_at(from, glm::dvec3(0)), scene::world_mixed, samples, 1);
   return {p.mean[0], p.standard_error[0]};
 }
 
 void expect_radiance(const Estimate& e, const glm::dvec3& expected, double relative_bound = 1e-9) {
-  for (int c = 0; c < 3; ++c) {
+  for (int c = 0; c < 3; ++c)
     EXPECT_NEAR(e.mean[c], expected[c],
                 5 * e.standard_error[c] + relative_bound * std::abs(expected[c]) + 1e-12)
         << "channel " << c << ", standard error " << e.standard_error[c];
-  }
 }
 
-const lighting::EnvironmentMap no_environment = {};
+const lighting::EnvironmentMap no_environment = {}, white = uniform_environment(glm::vec3(1));
 
 scene::Scene floor_of(const scene::Material& material) {
   scene::Scene scene;
@@ -83,13 +74,7 @@ scene::Scene floor_of(const scene::Material& material) {
   return scene;
 }
 
-set::Light lamp(set::LightType type) {
-  set::Light light;
-  light.type = type;
-  light.position = {0.4, 0.2, 1.2};
-  light.emission = {3, 2, 1};
-  return light;
-}
+const glm::dvec3 place(0.4, 0.2, 1.2), emission(3, 2, 1);  // of lamps
 
 TEST(CpuEnvironment, MapsDirectionsAsTheSharedHeaderDoes) {
   Random random(1, 1);
@@ -104,7 +89,7 @@ TEST(CpuEnvironment, MapsDirectionsAsTheSharedHeaderDoes) {
 }
 
 TEST(CpuEnvironment, IsContinuousOverTheSquaresEdges) {
-  lighting::EnvironmentMap map = constant_environment(glm::vec3(0), 8);
+  lighting::EnvironmentMap map = uniform_environment(glm::vec3(0), 8);
   Random random(2, 1);
   for (glm::vec3& texel : map.radiance) texel = glm::vec3(static_cast<float>(random.uniform()));
   const Environment environment(map);
@@ -119,11 +104,10 @@ TEST(CpuEnvironment, IsContinuousOverTheSquaresEdges) {
 }
 
 TEST(CpuEnvironment, SamplesWithTheDensityItStates) {
-  lighting::EnvironmentMap map = constant_environment(glm::vec3(0), 8);
+  lighting::EnvironmentMap map = uniform_environment(glm::vec3(0), 8);
   Random random(3, 1);
-  for (glm::vec3& texel : map.radiance) {
+  for (glm::vec3& texel : map.radiance)
     texel = glm::vec3(static_cast<float>(std::pow(random.uniform(), 8.0)));
-  }
   const Environment environment(map);
   double by_samples = 0;
   double uniform = 0;
@@ -174,16 +158,15 @@ TEST(CpuTracer, DiffuseFurnace) {
   for (const float albedo : {0.0F, 0.5F, 1.0F}) {
     scene::Scene scene;
     add_sphere(scene, 0.5, 32, diffuse(glm::vec3(albedo)));
-    CpuTracer tracer(scene, constant_environment({1, 2, 3}));
+    CpuTracer tracer(scene, uniform_environment({1, 2, 3}));
     // The sphere fills the picture.
     const TracedPicture p =
         tracer.trace(pinhole(8, 8, 40), look_at({0, -1, 1}, {0, 0, 0}), scene::world_mixed, 256, 1);
     // A shading normal is up to pi/64 off its facet's; the light it would gather from below the
     // facet is lost: at most (1 - cos(pi/64))/2 = 0.06 %.
-    for (std::size_t i = 0; i < p.mean.size(); ++i) {
+    for (std::size_t i = 0; i < p.mean.size(); ++i)
       expect_radiance({p.mean[i], p.standard_error[i]},
                       static_cast<double>(albedo) * glm::dvec3(1, 2, 3), 7e-4);
-    }
   }
 }
 
@@ -193,7 +176,7 @@ TEST(CpuTracer, GlassFurnaceLosesNothing) {
     add_sphere(scene, 0.5, 256, glass(ior));
     TraceOptions options;
     options.max_depth = 64;
-    CpuTracer tracer(scene, constant_environment({1, 1, 1}), options);
+    CpuTracer tracer(scene, white, options);
     const TracedPicture p = tracer.trace(pinhole(8, 8, 32), look_at({0, -2, 0.1}, {0, 0, 0}),
                                          scene::world_mixed, 400, 1);
     // Every path but those absorbed by a shading normal at odds with its facet carries exactly 1;
@@ -208,52 +191,18 @@ TEST(CpuTracer, SmoothMetalIsSchlick) {
   const glm::dvec3 f0(0.9F, 0.5F, 0.2F);
   const glm::dvec3 expected = f0 + (1.0 - f0) * std::pow(1 - c, 5);
   // The pixel is 1e-4 rad wide; Schlick's slope in angle is below 1.
-  expect_radiance(radiance_of_origin(scene, constant_environment({1, 1, 1}), 64), expected, 1e-4);
-}
-
-// Directional albedo of the GGX lobe (F = 1) by quadrature over half vectors, written on its own:
-// int G2/G1(v) over the visible normals = int D(h) G2 (v.h) / (nv nh ...) in (cos, phi) of l.
-double ggx_albedo(double nv, double alpha) {
-  const glm::dvec3 v(std::sqrt(1 - nv * nv), 0, nv);
-  const auto lambda = [&](double c) {
-    const double t2 = (1 - c * c) / (c * c);
-    return (std::sqrt(1 + alpha * alpha * t2) - 1) / 2;
-  };
-  // Over the half vector's slope radius: D is then smooth in tan^2 = alpha^2 u / (1 - u).
-  const int n = 2000, m = 500;
-  double sum = 0;
-  for (int i = 0; i < n; ++i) {
-    const double u = (i + 0.5) / n;
-    const double tan2 = alpha * alpha * u / (1 - u);
-    const double nh = 1 / std::sqrt(1 + tan2);
-    const double sine = std::sqrt(1 - nh * nh);
-    for (int j = 0; j < m; ++j) {
-      const double phi = 2 * pi * (j + 0.5) / m;
-      const glm::dvec3 h(sine * std::cos(phi), sine * std::sin(phi), nh);
-      const double vh = glm::dot(v, h);
-      const double nl = 2 * vh * nh - nv;
-      if (vh <= 0 || nl <= 0) continue;
-      // D nh dh is a probability over h: f cos dl = D G2 / (4 nl nv) nl 4 vh dh.
-      sum += vh / (nv * nh) / (1 + lambda(nv) + lambda(nl)) / n / m;
-    }
-  }
-  return sum;
+  expect_radiance(radiance_of_origin(scene, white, 64), expected, 1e-4);
 }
 
 // What single scattering loses is given back; the table of it is off by less than 1e-3.
 TEST(CpuTracer, WhiteRoughMetalAndGlassKeepAllLight) {
   for (const float roughness : {0.1F, 0.4F, 1.0F}) {
-    scene::Material pane = glass(1.5F);
-    pane.thin_walled = true;
-    pane.roughness = roughness;
-    for (const glm::dvec3& from :
-         {glm::dvec3(0, 0, 1), glm::dvec3(1, 0, 1), glm::dvec3(1, 0, 0.2)}) {
-      for (const scene::Material& material : {metal(glm::vec3(1), roughness), pane}) {
-        const Estimate e = radiance_of_origin(floor_of(material), constant_environment({1, 1, 1}),
-                                              20000, {}, from);
-        expect_radiance(e, glm::dvec3(1), 1e-3);
-      }
-    }
+    scene::Material frosted = pane();
+    frosted.roughness = roughness;
+    for (const glm::dvec3& from : {glm::dvec3(0, 0, 1), glm::dvec3(1, 0, 1), glm::dvec3(1, 0, 0.2)})
+      for (const scene::Material& material : {metal(glm::vec3(1), roughness), frosted})
+        expect_radiance(radiance_of_origin(floor_of(material), white, 20000, {}, from),
+                        glm::dvec3(1), 1e-3);
   }
 }
 
@@ -261,9 +210,9 @@ TEST(CpuTracer, PlasticFurnaceMixesByTheFresnelTermOfTheView) {
   const glm::dvec3 base(0.5F, 0.2F, 0.8F);
   const double nv = eye.z / glm::length(eye);
   const double fresnel = fresnel_dielectric(nv, 1.5);
-  const glm::dvec3 expected = (1 - fresnel) * base + fresnel * ggx_albedo(nv, 0.09);
-  const Estimate e = radiance_of_origin(floor_of(plastic(glm::vec3(base), std::sqrt(0.09F))),
-                                        constant_environment({1, 1, 1}), 40000);
+  const glm::dvec3 expected = (1 - fresnel) * base + fresnel * test::ggx_albedo(nv, 0.09, 1);
+  const Estimate e =
+      radiance_of_origin(floor_of(plastic(glm::vec3(base), std::sqrt(0.09F))), white, 40000);
   expect_radiance(e, expected, 2e-4);
 }
 
@@ -278,22 +227,19 @@ TEST(CpuTracer, FresnelAtTheKnownAngles) {
 }
 
 TEST(CpuTracer, ThinPaneSumsItsInnerReflections) {
-  scene::Material pane = glass(1.5F);
-  pane.thin_walled = true;
-  pane.base_color = {0.5F, 0.5F, 0.5F};
   const Estimate e =
-      radiance_of_origin(floor_of(pane), constant_environment({1, 1, 1}), 20000, {}, {0, 0, 1});
+      radiance_of_origin(floor_of(pane(glm::vec3(0.5F))), white, 20000, {}, {0, 0, 1});
   const double r = 2 * 0.04 / 1.04;
   expect_radiance(e, glm::dvec3(r + (1 - r) * 0.5), 1e-6);
 }
 
 TEST(CpuTracer, PointAndSpotLight) {
   auto scene = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
-  scene.lights = {lamp(set::LightType::point)};
+  scene.lights = {test::point_lamp(place, emission)};
   const glm::dvec3 to_light = scene.lights[0].position;
   const double d2 = glm::dot(to_light, to_light);
   const double cosine = to_light.z / std::sqrt(d2);
-  const glm::dvec3 expected = 0.5 / pi * glm::dvec3(3, 2, 1) * cosine / d2;
+  const glm::dvec3 expected = 0.5 / pi * emission * cosine / d2;
   // The pixel covers 2e-4 m of floor: relative change below 2e-4.
   expect_radiance(radiance_of_origin(scene, no_environment, 64), expected, 2e-4);
 
@@ -308,12 +254,10 @@ TEST(CpuTracer, PointAndSpotLight) {
 
 TEST(CpuTracer, DirectionalLightOfAnySize) {
   auto scene = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
-  set::Light light = lamp(set::LightType::directional);
-  light.direction = glm::normalize(glm::dvec3(0.3, 0.4, -1));
-  const glm::dvec3 expected = 0.5 / pi * glm::dvec3(3, 2, 1) * -light.direction.z;
+  const glm::dvec3 direction = glm::normalize(glm::dvec3(0.3, 0.4, -1));
+  const glm::dvec3 expected = 0.5 / pi * emission * -direction.z;
   for (const double radius : {0.0, 0.0046, 0.5}) {
-    light.angular_radius_rad = radius;
-    scene.lights = {light};
+    scene.lights = {test::sun_lamp(direction, radius, emission)};
     // A uniform disc wholly above the horizon gives cos times its facing irradiance, exactly.
     expect_radiance(radiance_of_origin(scene, no_environment, 20000), expected);
   }
@@ -321,15 +265,13 @@ TEST(CpuTracer, DirectionalLightOfAnySize) {
 
 TEST(CpuTracer, SphereLight) {
   auto scene = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
-  scene.lights = {lamp(set::LightType::sphere)};
   for (const double radius : {1e-4, 0.3, 1.1}) {
-    scene.lights[0].radius_m = radius;
-    const glm::dvec3 c = scene.lights[0].position;
-    const double d2 = glm::dot(c, c);
-    const double irradiance = pi * radius * radius / d2 * c.z / std::sqrt(d2);
+    scene.lights = {test::sphere_lamp(place, radius, emission)};
+    const double d2 = glm::dot(place, place);
+    const double irradiance = pi * radius * radius / d2 * place.z / std::sqrt(d2);
     // Seen past the lamp.
     expect_radiance(radiance_of_origin(scene, no_environment, 20000, {}, {-1, -1, 0.2}),
-                    0.5 / pi * irradiance * glm::dvec3(3, 2, 1), 5e-4);
+                    0.5 / pi * irradiance * emission, 5e-4);
   }
 }
 
@@ -341,15 +283,9 @@ double rectangle_irradiance(double half_a, double half_b, double height) {
 }
 
 TEST(CpuTracer, RectangleLightAndEmissiveQuad) {
-  const glm::dvec3 expected = 0.5 / pi * rectangle_irradiance(0.4, 0.25, 0.6) * glm::dvec3(3, 2, 1);
+  const glm::dvec3 expected = 0.5 / pi * rectangle_irradiance(0.4, 0.25, 0.6) * emission;
   auto scene = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
-  set::Light light = lamp(set::LightType::rectangle);
-  light.position = {0, 0, 0.6};
-  light.direction = {0, 0, -1};
-  light.up = {0, 1, 0};
-  light.width_m = 0.8;
-  light.height_m = 0.5;
-  scene.lights = {light};
+  scene.lights = {test::panel_lamp({0, 0, 0.6}, {0.8, 0.5}, emission)};
   expect_radiance(radiance_of_origin(scene, no_environment, 20000), expected, 1e-5);
   // It emits to one side, blocks nothing and shines into a mirror.
   scene.lights[0].direction = {0, 0, 1};
@@ -362,10 +298,7 @@ TEST(CpuTracer, RectangleLightAndEmissiveQuad) {
 
 TEST(CpuTracer, LampsAreSeenByMirrorsAndByTheCamera) {
   auto scene = floor_of(metal(glm::vec3(1), 0));
-  set::Light light = lamp(set::LightType::sphere);
-  light.position = glm::dvec3(-eye.x, -eye.y, eye.z) * 0.8;
-  light.radius_m = 0.1;
-  scene.lights = {light};
+  scene.lights = {test::sphere_lamp(glm::dvec3(-eye.x, -eye.y, eye.z) * 0.8, 0.1, emission)};
   expect_radiance(radiance_of_origin(scene, no_environment, 16), {3, 2, 1});
   scene.lights[0].position = eye * 0.5;
   expect_radiance(radiance_of_origin(scene, no_environment, 16), {3, 2, 1});
@@ -395,13 +328,13 @@ TEST(CpuTracer, WorldsSeeWhatIsPresentInThem) {
   auto scene = floor_of(diffuse({0.5F, 0.5F, 0.5F}));
   const std::uint32_t quad =
       add_quad(scene, {0, 0, 0.1F}, {0.2F, 0, 0}, {0, 0.2F, 0}, diffuse({0.1F, 0.2F, 0.3F}));
-  const lighting::EnvironmentMap environment = constant_environment({1, 1, 1});
+  const lighting::EnvironmentMap environment = white;
   for (const std::uint32_t presence : {scene::world_mixed, scene::world_real}) {
     scene.instances[quad].presence = presence;
     CpuTracer tracer(scene, environment);
     const auto pose = look_at({0, 0, 1}, {0, 0, 0});
     for (const std::uint32_t world : {scene::world_mixed, scene::world_real}) {
-      const TracedPicture p = tracer.trace(one_pixel(), pose, world, 64, 1);
+      const TracedPicture p = tracer.trace(one_pixel, pose, world, 64, 1);
       EXPECT_EQ(p.mask[0], 1) << "the worlds' first hits differ, whichever is traced";
       EXPECT_NEAR(p.depth[0], world == presence ? 0.9 : 1.0, 1e-6);
       const bool bright = world != presence;
@@ -423,10 +356,9 @@ TEST(CpuTracer, ScaleAndPlaceChangeNothing) {
     glm::dmat4 world(1);
     for (int i = 0; i < 3; ++i) world[i] *= scale;
     world[3] = {offset, offset, offset, 1};
-    for (scene::Instance& instance : scene.instances) {
+    for (scene::Instance& instance : scene.instances)
       instance.world_from_object = world * instance.world_from_object;
-    }
-    lighting::EnvironmentMap environment = constant_environment({1, 1, 1}, 16);
+    lighting::EnvironmentMap environment = uniform_environment({1, 1, 1}, 16);
     environment.radiance[100] = {40, 30, 20};
     CpuTracer tracer(scene, environment);
     const glm::dvec3 shift(offset);
@@ -439,9 +371,8 @@ TEST(CpuTracer, ScaleAndPlaceChangeNothing) {
     means.push_back(mean);
   }
   // The same random numbers: paths differ only where rounding flips a hit, about one in 1e4.
-  for (const glm::dvec3& mean : means) {
+  for (const glm::dvec3& mean : means)
     for (int c = 0; c < 3; ++c) EXPECT_NEAR(mean[c] / means[0][c], 1, 5e-3);
-  }
 }
 
 }  // namespace previz::truth::cpu_tracer_test

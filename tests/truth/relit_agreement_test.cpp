@@ -1,18 +1,14 @@
 // Lamps that were taken out of an environment and changed in the mixed world, against the CPU
 // tracer.
-#include <cmath>
-
 #include "daemon/lighting/claims.hpp"
 #include "daemon/lighting/light_mode.hpp"
 #include "daemon/pipeline/relight.hpp"
-#include "tests/support/render_fixture.hpp"
-#include "tests/truth/agreement.hpp"
-#include "tests/truth/cpu_tracer.hpp"
+#include "tests/truth/two_tracers.hpp"
 
 namespace previz::test::relit_agreement_test {
 
 constexpr double degree = 0.017453292519943295;
-constexpr int scrambles = 16, samples = 32;
+constexpr int samples = 32;
 
 struct Lamp {
   glm::dvec3 direction;
@@ -47,18 +43,11 @@ lighting::EnvironmentMap sky(bool mixed) {
 
 // A real floor with a real box, and a virtual ball.
 View stage() {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
-               add_material(view.scene, diffuse(glm::vec3(0.6))));
-  glm::dmat4 at(1.0);
-  at[3] = {-0.35, 0.1, 0.1, 1};
-  add_instance(view.scene, add_mesh(view.scene, box_mesh({0.2, 0.2, 0.2})),
-               add_material(view.scene, diffuse({0.7f, 0.5f, 0.3f})), at);
-  at[3] = {0.1, 0, 0.2, 1};
-  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.2, 3)),
-               add_material(view.scene, diffuse(glm::vec3(0.8))), at, scene::world_mixed);
-  view.calibration = pinhole(64, 48, 0.7);
-  view.world_from_camera = look_at({0, -1.2, 0.8}, {0, 0, 0.1});
+  View view = empty_view({0, -1.2, 0.8}, {0, 0, 0.1}, pinhole(64, 48, 0.7));
+  add(view.scene, rectangle_mesh({2, 2}), diffuse(glm::vec3(0.6)));
+  add(view.scene, box_mesh({0.2, 0.2, 0.2}), diffuse({0.7f, 0.5f, 0.3f}), at({-0.35, 0.1, 0.1}));
+  add(view.scene, icosphere_mesh(0.2, 3), diffuse(glm::vec3(0.8)), at({0.1, 0, 0.2}),
+      scene::world_mixed);
   view.environment = sky(false);
   return view;
 }
@@ -91,31 +80,22 @@ Parted parted(const lighting::EnvironmentMap& map) {
   return {light.lighting.environment, pipeline::relit(light, set, {})};
 }
 
-truth::Scrambles none(const View& view) {
-  return {view.calibration.intrinsics.width, view.calibration.intrinsics.height, {}};
-}
-
 struct Pictures {
-  truth::Scrambles mixed, real, difference;
+  Worlds worlds;
+  truth::Scrambles difference;
 };
 
 Pictures by_renderer(const View& view, const Parted& light, set::Estimator estimator,
                      std::uint32_t first_seed) {
-  Pictures result{none(view), none(view), none(view)};
-  set::Estimation estimation;
-  estimation.estimator = estimator;
-  render::Renderer renderer(shared_device(), estimation, view.calibration);
-  renderer.set_scene(view.scene);
+  Pictures result{{no_pictures(view), no_pictures(view)}, no_pictures(view)};
+  SetRenderer renderer(view, {.estimator = estimator});
   renderer.set_environment(light.rest, set::LightSampling::importance);
   renderer.set_sources(light.lamps);
   for (std::uint32_t i = 0; i < scrambles; ++i) {
-    renderer.begin({{}, 1.0, view.world_from_camera, first_seed + i});
-    renderer.render(samples);
-    expect_clean(renderer.counters());
-    const render::Layers layers = renderer.layers();
-    result.mixed.pictures.emplace_back(layers.mixed.begin(), layers.mixed.end());
-    result.real.pictures.emplace_back(layers.real.begin(), layers.real.end());
-    result.difference.pictures.emplace_back(layers.diff.begin(), layers.diff.end());
+    const render::Layers layers = renderer.rendered_clean(samples, first_seed + i);
+    result.worlds.mixed.pictures.push_back(widen(layers.mixed));
+    result.worlds.real.pictures.push_back(widen(layers.real));
+    result.difference.pictures.push_back(widen(layers.diff));
   }
   return result;
 }
@@ -127,7 +107,7 @@ truth::Scrambles by_cpu(const View& view, const lighting::EnvironmentMap& map,
     scene.lights.push_back(lamp);
     scene.light_objects.push_back(scene::no_object);
   }
-  truth::Scrambles result = none(view);
+  truth::Scrambles result = no_pictures(view);
   truth::CpuTracer tracer(scene, map);
   for (int i = 0; i < scrambles; ++i)
     result.pictures.push_back(tracer
@@ -152,10 +132,7 @@ TEST(RelitLamps, AreThoseOfTheCpuTracerInBothWorlds) {
   const Pictures gpu = by_renderer(view, light, set::Estimator::paired, 1000);
   const truth::Scrambles mixed = by_cpu(view, light.rest, light.lamps, scene::world_mixed);
   const truth::Scrambles real = by_cpu(view, light.rest, light.lamps, scene::world_real);
-  const truth::Agreement in_mixed = truth::agreement(gpu.mixed, mixed);
-  EXPECT_TRUE(in_mixed.agree) << "mixed: " << in_mixed.report();
-  const truth::Agreement in_real = truth::agreement(gpu.real, real);
-  EXPECT_TRUE(in_real.agree) << "real: " << in_real.report();
+  expect_agree(gpu.worlds, {mixed, real});
 
   // And they light as the changed environment does: the discs that stand for them have its flux. As
   // in SourceLight, their outline moves a mean by at most 0.5 %; chance, which 16 pictures of 32
@@ -171,8 +148,7 @@ TEST(RelitLamps, AreTheSameByBothEstimators) {
   const Parted light = parted(view.environment);
   const Pictures paired = by_renderer(view, light, set::Estimator::paired, 1);
   const Pictures difference = by_renderer(view, light, set::Estimator::difference, 1001);
-  const truth::Agreement agreement = truth::agreement(paired.difference, difference.difference);
-  EXPECT_TRUE(agreement.agree) << agreement.report();
+  expect_agree(paired.difference, difference.difference);
 }
 
 }  // namespace previz::test::relit_agreement_test

@@ -1,14 +1,8 @@
 // The GPU renderer against the independent CPU tracer, both radiances, at reduced size: on sets
 // varied by seed (camera, objects diffuse, textured, plastic, rough and smooth metal, emitter,
 // removed, lamps, lens) and on the ground truth sets.
-#include <filesystem>
-#include <string>
-
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/scene/load.hpp"
-#include "drivers/plate.hpp"
-#include "tests/support/figure.hpp"
-#include "tests/support/render_fixture.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/truth_set.hpp"
@@ -19,13 +13,11 @@ namespace previz::test::renderer_agreement_test {
 class RandomSets : public ::testing::TestWithParam<std::uint32_t> {
  protected:
   static View view() {
-    RandomScene options;
-    options.width = 64;
-    options.height = 48;
-    options.lights = GetParam() % 2 == 0 ? 2 : 0;
-    options.lens = GetParam() % 3 == 0;
-    options.removed_objects = GetParam() % 2 == 1 ? 1 : 0;
-    return random_scene(GetParam(), options);
+    return random_scene(GetParam(), {.width = 64,
+                                     .height = 48,
+                                     .removed_objects = GetParam() % 2 == 1 ? 1 : 0,
+                                     .lights = GetParam() % 2 == 0 ? 2 : 0,
+                                     .lens = GetParam() % 3 == 0});
   }
 };
 
@@ -59,22 +51,14 @@ TEST_P(SeparateRenders, ShowWhatOneRunShows) {
   const Worlds pair = gpu_scrambles(view(), 32, true, 1000);
   const Worlds mixed = gpu_scrambles(alone(view(), scene::world_mixed), 32, true, 2000);
   const Worlds real = gpu_scrambles(alone(view(), scene::world_real), 32, true, 3000);
-  const truth::Agreement in_mixed = truth::agreement(pair.mixed, mixed.mixed);
-  EXPECT_TRUE(in_mixed.agree) << "mixed: " << in_mixed.report();
-  const truth::Agreement in_real = truth::agreement(pair.real, real.real);
-  EXPECT_TRUE(in_real.agree) << "real: " << in_real.report();
+  expect_agree(pair, {mixed.mixed, real.real});
 }
 
 // Lamps that are real, dimmed or added, each in a colour of its own when mixed.
 class TintedSets : public RandomSets {
  protected:
   static View view() {
-    RandomScene options;
-    options.width = 64;
-    options.height = 48;
-    options.lights = 3;
-    options.tinted = true;
-    return random_scene(GetParam(), options);
+    return random_scene(GetParam(), {.width = 64, .height = 48, .lights = 3, .tinted = true});
   }
 };
 INSTANTIATE_TEST_SUITE_P(Seeds, TintedSets, ::testing::Values(21u, 22u, 23u));
@@ -89,21 +73,14 @@ TEST_P(TintedSets, HaveTheSameDifferenceByBothEstimators) {
 
 // A limb and a ball that change their shape, one in both worlds and one virtual, on a table.
 View figures() {
-  View view;
+  View view = empty_view({0.3, -2, 1.1}, {0, 0, 0.3}, pinhole(48, 32, 0.9));
   scene::Scene& scene = view.scene;
-  add_instance(scene, add_mesh(scene, rectangle_mesh({3, 3})),
-               add_material(scene, diffuse({0.6f, 0.5f, 0.4f})));
-  glm::dmat4 placed(1);
-  placed[3] = {-0.4, 0.2, 0.05, 1};
-  add_limb(scene, limb_mesh(24, 16, 5), 5, add_material(scene, diffuse({0.8f, 0.3f, 0.2f})), placed,
-           scene::world_mixed);
-  placed[3] = {0.5, -0.1, 0.32, 1};
+  add(scene, rectangle_mesh({3, 3}), diffuse({0.6f, 0.5f, 0.4f}));
+  add_limb(scene, limb_mesh(24, 16, 5), 5, add_material(scene, diffuse({0.8f, 0.3f, 0.2f})),
+           at({-0.4, 0.2, 0.05}), scene::world_mixed);
   add_squeezed_ball(scene, squeezed_ball_mesh(0.3, 32, 16),
-                    add_material(scene, metal({0.3f, 0.5f, 0.7f}, 0.4f)), placed);
-  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
-  for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
-  view.calibration = pinhole(48, 32, 0.9);
-  view.world_from_camera = look_at({0.3, -2, 1.1}, {0, 0, 0.3});
+                    add_material(scene, metal({0.3f, 0.5f, 0.7f}, 0.4f)), at({0.5, -0.1, 0.32}));
+  view.environment = one_sided_sky();
   return view;
 }
 
@@ -141,41 +118,23 @@ TEST_P(CameraSets, HaveTheSameCompositeByTheCamera) {
     if ((instance.presence & scene::world_real) != 0) instance.material = 0;
   view.scene.materials[0] = diffuse(glm::vec3(0.5f, 0.4f, 0.3f));
   constexpr double white = 8;
-  const auto renderer_by = [&](set::RealRadiance radiance) {
-    set::Estimation estimation;
-    estimation.real_radiance = radiance;
-    auto renderer =
-        std::make_unique<render::Renderer>(shared_device(), estimation, view.calibration);
-    renderer->set_scene(view.scene);
-    renderer->set_environment(view.environment, set::LightSampling::importance);
-    return renderer;
-  };
-  Plate plate;
-  plate.width = view.calibration.intrinsics.width;
-  plate.height = view.calibration.intrinsics.height;
-  plate.bits = 16;
-  const auto converged = renderer_by(set::RealRadiance::traced);
-  converged->begin({{}, 1.0, view.world_from_camera, 7});
-  converged->render(1024);
-  for (const glm::vec3& pixel : converged->layers().real)
-    for (int c = 0; c < 3; ++c)
-      plate.samples.push_back(
-          static_cast<std::uint16_t>(std::lround(65535 * std::min(pixel[c] / white, 1.0))));
+  const PinholeIntrinsics& k = view.calibration.intrinsics;
+  const Plate plate =
+      linear_plate(k.width, k.height, SetRenderer(view).rendered(1024, 7).real, white);
   const auto scrambled = [&](set::RealRadiance radiance, std::uint32_t first_seed) {
-    const auto renderer = renderer_by(radiance);
-    truth::Scrambles result{plate.width, plate.height, {}};
+    SetRenderer renderer(view, {.real_radiance = radiance});
+    truth::Scrambles result = no_pictures(view);
     for (std::uint32_t i = 0; i < scrambles; ++i) {
-      renderer->begin({std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera,
-                       first_seed + i});
-      renderer->render(16);
-      expect_clean(renderer->counters());
-      result.pictures.push_back(widen(renderer->layers().composite));
+      renderer.begin({std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera,
+                      first_seed + i});
+      renderer.render(16);
+      expect_clean(renderer.counters());
+      result.pictures.push_back(widen(renderer.layers().composite));
     }
     return result;
   };
-  const truth::Agreement agreement = truth::agreement(scrambled(set::RealRadiance::traced, 100),
-                                                      scrambled(set::RealRadiance::camera, 1001));
-  EXPECT_TRUE(agreement.agree) << agreement.report();
+  expect_agree(scrambled(set::RealRadiance::traced, 100),
+               scrambled(set::RealRadiance::camera, 1001));
 }
 
 // The committed glass set, or one of the others.

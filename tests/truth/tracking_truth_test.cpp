@@ -37,19 +37,23 @@ void expect_bounds(const fs::path& directory, double decimate, const std::set<in
   }
 }
 
+void expect_bounds_every_way(const fs::path& directory, const std::set<int>& hidden = {}) {
+  expect_bounds(directory, 1, hidden);
+  expect_bounds(directory, 2, hidden);
+  expect_bounds(directory, 1, hidden, tracking::Search::parts);
+}
+
+const fs::path committed_set = fs::path(PREVIZ_SOURCE_DIR) / "tests/truth/data/glass";
+
 TEST(TrackingTruth, CommittedSet) {
-  const fs::path set = fs::path(PREVIZ_SOURCE_DIR) / "tests/truth/data/glass";
-  if (!fs::exists(set / "set.json")) GTEST_SKIP() << set << " is not there";
-  expect_bounds(set, 1, {});
-  expect_bounds(set, 2, {});
-  expect_bounds(set, 1, {}, tracking::Search::parts);
+  PREVIZ_NEEDS(committed_set / "set.json");
+  expect_bounds_every_way(committed_set);
 }
 
 // In parts, from frame to frame, the tags and their corners are those of the whole picture.
 TEST(TrackingTruth, PartsShowWhatTheWholeShows) {
-  const fs::path directory = fs::path(PREVIZ_SOURCE_DIR) / "tests/truth/data/glass";
-  if (!fs::exists(directory / "set.json")) GTEST_SKIP() << directory << " is not there";
-  const TruthSet set = load_truth_set(directory);
+  PREVIZ_NEEDS(committed_set / "set.json");
+  const TruthSet set = load_truth_set(committed_set);
   const set::Tracking settings = tracking_settings(set);
   const std::vector<TrackedFrame> whole = measure_tracking(set, settings);
   const std::vector<TrackedFrame> parts = measure_tracking(set, settings, tracking::Search::parts);
@@ -75,9 +79,7 @@ TEST_P(TrackingSharedSets, WithinBounds) {
   PREVIZ_NEEDS(set);
   const std::set<int> hidden =
       std::string(GetParam()) == "desk" ? std::set<int>{15, 16} : std::set<int>{};
-  expect_bounds(set, 1, hidden);
-  expect_bounds(set, 2, hidden);
-  expect_bounds(set, 1, hidden, tracking::Search::parts);
+  expect_bounds_every_way(set, hidden);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sets, TrackingSharedSets, ::testing::Values("desk", "statues", "glass"));

@@ -6,7 +6,6 @@
 
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/truth/truth_take.hpp"
@@ -36,12 +35,7 @@ class ChangedSet : public testing::Test {
     return load_truth_set(directory_);
   }
   std::string refusal() {
-    try {
-      load();
-    } catch (const Error& e) {
-      return e.what();
-    }
-    return "accepted";
+    return test::error_of([&] { load(); });
   }
 
   fs::path directory_;
@@ -77,10 +71,11 @@ TEST(TruthSet, ReadsTruthPicturesAndThePlate) {
   const TruthSet set = load_truth_set(glass);
   const TruthFrame truth = load_truth_frame(set, 12);
   double real = 0, mask = 0, plate = 0;
+  const auto pixels = static_cast<double>(truth.mask.size());
   for (std::size_t i = 0; i < truth.mask.size(); ++i) {
-    real += static_cast<double>(truth.real[i].x) / static_cast<double>(truth.mask.size());
-    plate += static_cast<double>(truth.plate[i].x) / static_cast<double>(truth.mask.size());
-    mask += static_cast<double>(truth.mask[i]) / static_cast<double>(truth.mask.size());
+    real += static_cast<double>(truth.real[i].x) / pixels;
+    plate += static_cast<double>(truth.plate[i].x) / pixels;
+    mask += static_cast<double>(truth.mask[i]) / pixels;
   }
   // set.json's own means; the pictures' mantissas are rounded to 7 bits, at most 0.4 %.
   EXPECT_NEAR(real, 0.24324, 0.004 * 0.24324);
@@ -176,11 +171,10 @@ TEST_F(ChangedSet, ItsSetFileIsOneTheParserTakes) {
       EXPECT_EQ(set.lighting.environment.has_value(), light == LightFrom::truth);
       EXPECT_EQ(set.tracking.enabled, pose == PoseFrom::tracked);
       ASSERT_EQ(set.tracking.tags.size(), 3u);
-      for (int c = 0; c < 4; ++c) {
+      for (int c = 0; c < 4; ++c)
         EXPECT_LT(
             glm::length(set.tracking.tags[2].world_from_tag[c] - truth.tags[2].world_from_tag[c]),
             1e-12);
-      }
       EXPECT_EQ(set.estimation.max_depth, 16);
     }
   }

@@ -2,9 +2,6 @@
 // a view of a test.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"
 #include "tests/truth/agreement.hpp"
@@ -22,28 +19,31 @@ inline std::vector<glm::dvec3> widen(const std::vector<glm::vec3>& layer) {
   return {layer.begin(), layer.end()};
 }
 
-inline Worlds sized(const View& view) {
-  const PinholeIntrinsics& k = view.calibration.intrinsics;
-  return {{k.width, k.height, {}}, {k.width, k.height, {}}};
+inline truth::Scrambles no_pictures(const View& view) {
+  return {view.calibration.intrinsics.width, view.calibration.intrinsics.height, {}};
+}
+
+inline void expect_agree(const truth::Scrambles& a, const truth::Scrambles& b) {
+  const truth::Agreement agreement = truth::agreement(a, b);
+  EXPECT_TRUE(agreement.agree) << agreement.report();
+}
+
+inline void expect_agree(const Worlds& a, const Worlds& b) {
+  const truth::Agreement mixed = truth::agreement(a.mixed, b.mixed);
+  EXPECT_TRUE(mixed.agree) << "mixed: " << mixed.report();
+  const truth::Agreement real = truth::agreement(a.real, b.real);
+  EXPECT_TRUE(real.agree) << "real: " << real.report();
 }
 
 inline Worlds gpu_scrambles(const View& view, int samples, bool caustics, std::uint32_t first_seed,
                             const std::vector<scene::Shape>& shapes = {}) {
-  Worlds worlds = sized(view);
-  set::Estimation estimation;
-  estimation.caustics = caustics ? set::Caustics::traced : set::Caustics::none;
-  render::Renderer renderer(shared_device(), estimation, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, set::LightSampling::importance);
+  Worlds worlds{no_pictures(view), no_pictures(view)};
+  const set::Estimation estimation{.caustics =
+                                       caustics ? set::Caustics::traced : set::Caustics::none};
+  SetRenderer renderer(view, estimation);
   renderer.deform(shapes);
   for (std::uint32_t i = 0; i < scrambles; ++i) {
-    render::FrameInput frame;
-    frame.world_from_camera = view.world_from_camera;
-    frame.seed = first_seed + i;
-    renderer.begin(frame);
-    renderer.render(samples);
-    expect_clean(renderer.counters());
-    const render::Layers layers = renderer.layers();
+    const render::Layers layers = renderer.rendered_clean(samples, first_seed + i);
     worlds.mixed.pictures.push_back(widen(layers.mixed));
     worlds.real.pictures.push_back(widen(layers.real));
   }
@@ -52,7 +52,7 @@ inline Worlds gpu_scrambles(const View& view, int samples, bool caustics, std::u
 
 // The CPU tracer traces each world alone, with seeds of its own.
 inline Worlds cpu_scrambles(const View& view, int samples, bool caustics) {
-  Worlds worlds = sized(view);
+  Worlds worlds{no_pictures(view), no_pictures(view)};
   truth::TraceOptions options;
   options.caustics = caustics;
   truth::CpuTracer tracer(view.scene, view.environment, options);
@@ -76,38 +76,23 @@ inline void expect_agreement(const View& view, int samples, bool caustics,
   const Worlds gpu = gpu_scrambles(view, samples, caustics, 1000, shapes);
   View still = view;
   still.scene = posed(view.scene, shapes);
-  const Worlds cpu = cpu_scrambles(still, samples, caustics);
-  const truth::Agreement mixed = truth::agreement(gpu.mixed, cpu.mixed);
-  EXPECT_TRUE(mixed.agree) << "mixed: " << mixed.report();
-  const truth::Agreement real = truth::agreement(gpu.real, cpu.real);
-  EXPECT_TRUE(real.agree) << "real: " << real.report();
+  expect_agree(gpu, cpu_scrambles(still, samples, caustics));
 }
 
 // The same picture by both estimators.
 inline void expect_same_difference(const View& view, int samples, bool caustics,
                                    const std::vector<scene::Shape>& shapes = {}) {
   const auto scrambled = [&](set::Estimator estimator, std::uint32_t first_seed) {
-    set::Estimation estimation;
-    estimation.estimator = estimator;
+    set::Estimation estimation{.estimator = estimator};
     if (!caustics) estimation.caustics = set::Caustics::none;
-    render::Renderer renderer(shared_device(), estimation, view.calibration);
-    renderer.set_scene(view.scene);
-    renderer.set_environment(view.environment, set::LightSampling::importance);
+    SetRenderer renderer(view, estimation);
     renderer.deform(shapes);
-    truth::Scrambles result;
-    result.width = view.calibration.intrinsics.width;
-    result.height = view.calibration.intrinsics.height;
-    for (std::uint32_t i = 0; i < scrambles; ++i) {
-      renderer.begin({{}, 1.0, view.world_from_camera, first_seed + i});
-      renderer.render(samples);
-      expect_clean(renderer.counters());
-      result.pictures.push_back(widen(renderer.layers().composite));
-    }
+    truth::Scrambles result = no_pictures(view);
+    for (std::uint32_t i = 0; i < scrambles; ++i)
+      result.pictures.push_back(widen(renderer.rendered_clean(samples, first_seed + i).composite));
     return result;
   };
-  const truth::Agreement agreement = truth::agreement(scrambled(set::Estimator::paired, 1),
-                                                      scrambled(set::Estimator::difference, 1001));
-  EXPECT_TRUE(agreement.agree) << agreement.report();
+  expect_agree(scrambled(set::Estimator::paired, 1), scrambled(set::Estimator::difference, 1001));
 }
 
 }  // namespace previz::test

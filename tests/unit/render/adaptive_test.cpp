@@ -1,6 +1,4 @@
 // Adaptive sampling: the estimated error is the true one, and samples go where it is.
-#include <numeric>
-
 #include "daemon/pipeline/refinement.hpp"
 #include "daemon/render/error_estimate.hpp"
 #include "tests/support/render_fixture.hpp"
@@ -8,10 +6,7 @@
 namespace previz::test::adaptive_test {
 
 View small_set() {
-  RandomScene options;
-  options.width = 64;
-  options.height = 48;
-  return random_scene(2, options);
+  return random_scene(2, {.width = 64, .height = 48});
 }
 
 double rms_difference(const render::Layers& a, const render::Layers& b) {
@@ -26,11 +21,13 @@ double rms_difference(const render::Layers& a, const render::Layers& b) {
 }
 
 set::Quality quality(int samples, double error, double seconds = 0) {
-  set::Quality result;
-  result.samples = samples;
-  result.error = error;
-  result.seconds = seconds;
-  return result;
+  return {.samples = samples, .error = error, .seconds = seconds, .steps = {}};
+}
+
+double sum_of(const render::Layers& layers) {
+  double sum = 0;
+  for (const glm::vec3& value : layers.composite) sum += value.r + value.g + value.b;
+  return sum;
 }
 
 // Two runs with other random numbers differ by sqrt(2) times the error of each; stratification
@@ -38,14 +35,9 @@ set::Quality quality(int samples, double error, double seconds = 0) {
 TEST(Adaptive, TheEstimateIsTheTrueErrorOrAbove) {
   const View view = small_set();
   SetRenderer renderer(view);
-  std::vector<render::Layers> layers;
-  for (const std::uint32_t seed : {1u, 2u}) {
-    renderer.begin({{}, 1.0, view.world_from_camera, seed});
-    renderer.render(64);
-    layers.push_back(renderer.layers());
-  }
-  const double truth = rms_difference(layers[0], layers[1]) / std::sqrt(2.0);
-  const double estimate = render::estimate_error(layers[0]).picture;
+  const render::Layers one = renderer.rendered(64, 1), other = renderer.rendered(64, 2);
+  const double truth = rms_difference(one, other) / std::sqrt(2.0);
+  const double estimate = render::estimate_error(one).picture;
   EXPECT_GT(estimate, 0.8 * truth);
   EXPECT_LT(estimate, 3 * truth);
 }
@@ -69,26 +61,17 @@ TEST(Adaptive, ReachesTheErrorWithFewerSamplesThanEvenSampling) {
 // Without photons, which a part of a picture shares among its samples.
 TEST(Adaptive, LeavesTheSamplesOfAPixelAsTheyAre) {
   const View view = small_set();
-  set::Estimation estimation;
-  estimation.caustics = set::Caustics::traced;
-  SetRenderer renderer(view, estimation);
-  renderer.begin({{}, 1.0, view.world_from_camera});
-  renderer.render(8);
-  const render::Layers before = renderer.layers();
+  SetRenderer renderer(view, {.caustics = set::Caustics::traced});
+  const render::Layers before = renderer.rendered(8);
   std::vector<std::uint32_t> limits(8 * 6, 8);
   limits[8 * 3 + 4] = 16;  // x 32..39, y 24..31
   renderer.limit_samples(limits);
   renderer.render(20);
   const render::Layers after = renderer.layers();
-  renderer.begin({{}, 1.0, view.world_from_camera});
-  renderer.render(16);
-  const render::Layers all = renderer.layers();
-  for (int y = 0; y < 48; ++y) {
-    for (int x = 0; x < 64; ++x) {
-      const bool inside = x / 8 == 4 && y / 8 == 3;
-      const std::size_t i = static_cast<std::size_t>(y) * 64 + x;
-      EXPECT_EQ(after.composite[i], (inside ? all : before).composite[i]) << x << ", " << y;
-    }
+  const render::Layers all = renderer.rendered(16);
+  for (const auto& [x, y, i] : pixels_of(64, 48)) {
+    const bool inside = x / 8 == 4 && y / 8 == 3;
+    EXPECT_EQ(after.composite[i], (inside ? all : before).composite[i]) << x << ", " << y;
   }
 }
 
@@ -161,10 +144,9 @@ TEST(Adaptive, NoiseAboveWhiteIsNotSeen) {
   layers.white = 2;
   layers.composite.assign(24 * 8, glm::vec3(1));
   layers.variance.assign(24 * 8, glm::vec3(0.01f));
-  for (int y = 0; y < 8; ++y) {
-    for (int x = 8; x < 16; ++x) layers.composite[24 * y + x] = glm::vec3(2.05f);
-    for (int x = 16; x < 24; ++x) layers.composite[24 * y + x] = glm::vec3(50);
-    for (int x = 16; x < 24; ++x) layers.variance[24 * y + x] = glm::vec3(25);
+  for (const auto& [x, y, i] : pixels_of(24, 8)) {
+    if (x >= 8) layers.composite[i] = glm::vec3(x < 16 ? 2.05f : 50.0f);
+    if (x >= 16) layers.variance[i] = glm::vec3(25);
   }
   const render::ErrorEstimate estimate = render::estimate_error(layers);
   const double rms = std::sqrt(3 * (1 + 4 + 4) / 3.0);
@@ -203,9 +185,7 @@ TEST(Adaptive, ABudgetSpentByNeedMakesTheBetterPictureAndNoOther) {
   const render::Layers reference = picture(256, false, 1000);
   const auto add = [&](Group& group, const render::Layers& layers) {
     group.squared_error += std::pow(rms_difference(layers, reference), 2);
-    double sum = 0;
-    for (const glm::vec3& value : layers.composite) sum += value.r + value.g + value.b;
-    group.sums.push_back(sum);
+    group.sums.push_back(sum_of(layers));
   };
   Group even, adaptive;
   for (std::uint32_t seed = 1; seed <= 6; ++seed) {
@@ -226,32 +206,25 @@ TEST(Adaptive, ABudgetSpentByNeedMakesTheBetterPictureAndNoOther) {
 // the rest a steady glow, to which errors are relative. The truth comes from light samples, whose
 // error is far smaller.
 TEST(Adaptive, StoppingAtAnErrorLosesNoLight) {
-  View view;
-  glm::dmat4 above(1);
-  above[3].z = 0.001;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({4, 4})),
-               add_material(view.scene, emitter(glm::vec3(2))), glm::dmat4(1), scene::world_mixed);
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({0.255, 0.255})),
-               add_material(view.scene, diffuse(glm::vec3(0.5f))), above, scene::world_mixed);
+  View view = empty_view({0, 0, 1}, {0, 0, 0}, pinhole(32, 32, 0.5));
+  add(view.scene, rectangle_mesh({4, 4}), emitter(glm::vec3(2)), glm::dmat4(1), scene::world_mixed);
+  add(view.scene, rectangle_mesh({0.255, 0.255}), diffuse(glm::vec3(0.5f)), at({0, 0, 0.001}),
+      scene::world_mixed);
   view.environment = uniform_environment(glm::vec3(1), 256);
   const glm::vec3 overhead = glm::normalize(glm::vec3(0.01f, 0.01f, 1));
   view.environment.radiance[lighting::texel_index(256, overhead)] = glm::vec3(1000);
-  view.calibration = pinhole(32, 32, 0.5);
-  view.world_from_camera = look_at({0, 0, 1}, {0, 0, 0});
   SetRenderer renderer(view, up_to_depth(1));
-  const auto sum_of = [&](const set::Quality& wish, std::uint32_t seed) {
+  const auto refined_sum = [&](const set::Quality& wish, std::uint32_t seed) {
     constexpr double exposure = 1e-6;  // nothing is clipped
     renderer.begin({{}, exposure, view.world_from_camera, seed});
     EXPECT_TRUE(pipeline::refine(renderer, wish, {}, {}).whole);
-    double sum = 0;
-    for (const glm::vec3& value : renderer.layers().composite) sum += value.r + value.g + value.b;
-    return sum;
+    return sum_of(renderer.layers());
   };
-  const double truth = sum_of(quality(256, 0), 1);
+  const double truth = refined_sum(quality(256, 0), 1);
   renderer.set_environment(view.environment, set::LightSampling::bsdf);
   Group stopped;
   for (std::uint32_t seed = 1; seed <= 200; ++seed)
-    stopped.sums.push_back(sum_of(quality(8, 0.4), seed));
+    stopped.sums.push_back(refined_sum(quality(8, 0.4), seed));
   expect_clean(renderer.counters());
   const double standard_error = std::sqrt(stopped.squared_standard_error());
   RecordProperty("relative_bias", std::to_string(stopped.mean() / truth - 1));

@@ -1,6 +1,4 @@
 // Surfaces that are not there everywhere, against closed forms.
-#include <numbers>
-
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 
@@ -21,9 +19,7 @@ void add_veils(View& view, int count, double height, std::uint32_t presence) {
   const auto square = add_mesh(view.scene, rectangle_mesh({0.2, 0.2}));
   const auto material = add_material(view.scene, veil(emitter(glm::vec3(0))));
   for (int i = 0; i < count; ++i) {
-    glm::dmat4 pose(1);
-    pose[3].z = height + 1e-3 * i;
-    add_instance(view.scene, square, material, pose, presence);
+    add_instance(view.scene, square, material, at({0, 0, height + 1e-3 * i}), presence);
   }
 }
 
@@ -42,13 +38,9 @@ TEST(Alpha, AVeilKeepsItsShareOfALamp) {
 
 // Before the camera, by chance: black with the odds of its alpha.
 TEST(Alpha, AVeilCoversItsShareOfAView) {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({1, 1})),
-               add_material(view.scene, veil(emitter(glm::vec3(0)))), glm::dmat4(1),
-               scene::world_mixed);
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(32, 32, 0.1);
-  view.world_from_camera = look_at({0, 0, 1}, {0, 0, 0});
+  View view = empty_view({0, 0, 1}, {0, 0, 0}, pinhole(32, 32, 0.1), glm::vec3(1));
+  add(view.scene, rectangle_mesh({1, 1}), veil(emitter(glm::vec3(0))), glm::dmat4(1),
+      scene::world_mixed);
   const render::Layers layers = render_clean(view, 16).layers;
   const double tosses = 32 * 32 * 16;
   EXPECT_NEAR(mean(layers.mixed).g, 1 - veil_alpha,
@@ -76,17 +68,12 @@ TEST(Alpha, AMaskIsThereOrNot) {
 TEST(Alpha, IsLeftOutWhereEveryTexelIsOpaque) {
   for (const float alpha : {1.0f, 0.5f}) {
     View view = lit_point(albedo);
-    scene::Texture texture;
-    texture.width = 2;
-    texture.height = 1;
-    texture.texels = {{1, 1, 1, 1}, {1, 1, 1, alpha}};
     scene::Material& material = view.scene.materials.back();
     material.alpha_mode = scene::AlphaMode::blend;
-    material.base_color_texture = add_texture(view.scene, texture);
+    material.base_color_texture =
+        add_texture(view.scene, texture_of(2, 1, {{1, 1, 1, 1}, {1, 1, 1, alpha}}));
     SetRenderer renderer(view);
-    render::FrameInput frame;
-    frame.world_from_camera = view.world_from_camera;
-    renderer.begin(frame);
+    renderer.begin({{}, 1.0, view.world_from_camera});
     EXPECT_EQ((renderer.needed() & gpu::FEATURE_ALPHA) != 0, alpha < 1);
   }
 }

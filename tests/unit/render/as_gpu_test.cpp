@@ -1,9 +1,6 @@
 // A CPU device that is treated as a graphics card: its pictures are those of a CPU device bit for
 // bit, and no access to memory lacks the barrier that a card would need.
-#include <glm/gtc/matrix_transform.hpp>
-
 #include "daemon/render/device.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::as_gpu_test {
@@ -12,32 +9,19 @@ constexpr int width = 48, height = 36;
 
 // A textured floor, and above it a glass ball that only the mixed world has, under a lamp of both.
 View ball_on_texture() {
-  View view;
+  View view = empty_view({0, -0.8, 1}, {0, 0, 0.05}, pinhole(width, height, 0.8), glm::vec3(0.1f));
   scene::Material floor = diffuse(glm::vec3(0.7f));
-  scene::Texture texture;
-  texture.width = texture.height = 2;
-  texture.texels = {
-      {0.9f, 0.2f, 0.2f, 1}, {0.2f, 0.9f, 0.2f, 1}, {0.2f, 0.2f, 0.9f, 1}, {0.9f, 0.9f, 0.9f, 1}};
-  floor.base_color_texture = add_texture(view.scene, std::move(texture));
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
-               add_material(view.scene, floor));
-  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.2, 2)),
-               add_material(view.scene, glass(1.5f)),
-               glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, 0.25)), scene::world_mixed);
-  set::Light light = lamp(set::LightType::sphere, glm::dvec3(2));
-  light.position = {0.3, 0, 1};
-  light.radius_m = 0.1;
-  view.scene.lights.push_back(light);
-  view.environment = uniform_environment(glm::vec3(0.1f));
-  view.calibration = pinhole(width, height, 0.8);
-  view.world_from_camera = look_at({0, -0.8, 1}, {0, 0, 0.05});
+  const glm::vec4 red(0.9f, 0.2f, 0.2f, 1), green(0.2f, 0.9f, 0.2f, 1);
+  const glm::vec4 blue(0.2f, 0.2f, 0.9f, 1), white(0.9f, 0.9f, 0.9f, 1);
+  floor.base_color_texture = add_texture(view.scene, texture_of(2, 2, {red, green, blue, white}));
+  add(view.scene, rectangle_mesh({2, 2}), floor);
+  add(view.scene, icosphere_mesh(0.2, 2), glass(1.5f), at({0, 0, 0.25}), scene::world_mixed);
+  view.scene.lights.push_back(sphere_lamp({0.3, 0, 1}, 0.1, glm::dvec3(2)));
   return view;
 }
 
 set::Estimation many_photons() {
-  set::Estimation estimation;
-  estimation.photons = 4;
-  return estimation;
+  return {.photons = 4};
 }
 
 struct Pictures {
@@ -63,11 +47,9 @@ std::vector<Plate> live_frames(render::Renderer& renderer, int count) {
 
 Pictures pictures_on(const std::shared_ptr<render::Device>& device) {
   const View view = ball_on_texture();
-  SetRenderer renderer(view, many_photons(), device);
+  SetRenderer renderer(view, many_photons(), set::LightSampling::importance, device);
   Pictures result{live_frames(renderer, 3), {}};
-  renderer.begin({.plate = nullptr, .world_from_camera = view.world_from_camera});
-  renderer.render(8);
-  result.offline = renderer.layers();
+  result.offline = renderer.rendered(8);
   EXPECT_EQ(render::validation_messages(*device), 0u);
   return result;
 }
@@ -97,7 +79,7 @@ std::shared_ptr<render::Device> hazards_heard() {
 }
 
 void two_live_frames(const std::shared_ptr<render::Device>& device) {
-  SetRenderer renderer(ball_on_texture(), many_photons(), device);
+  SetRenderer renderer(ball_on_texture(), many_photons(), set::LightSampling::importance, device);
   live_frames(renderer, 2);
 }
 

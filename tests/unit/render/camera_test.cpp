@@ -1,10 +1,6 @@
 // The plate as the radiance of real surfaces: what mirrors and virtual objects take from it, and
 // where it may not be taken.
-#include <initializer_list>
-#include <numbers>
-
 #include "drivers/calibration/pinhole.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::camera_test {
@@ -14,52 +10,35 @@ constexpr double white = 4;  // of the sensor, whose response is linear with 16 
 constexpr float albedo = 0.5f;
 
 set::Estimation by_camera(set::Estimator estimator = set::Estimator::paired) {
-  set::Estimation estimation = up_to_depth(8);
-  estimation.real_radiance = set::RealRadiance::camera;
-  estimation.estimator = estimator;
-  return estimation;
+  return {.estimator = estimator, .real_radiance = set::RealRadiance::camera, .max_depth = 8};
 }
 
 // A matt floor in the lower half of the picture, and a virtual mirror in its upper half that leans
 // over it, so that what it shows of the floor is in the picture, too.
 View floor_and_mirror() {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({8, 8})),
-               add_material(view.scene, diffuse(glm::vec3(albedo))));
+  View view = empty_view({0, -1.5, 1}, {0, 0.6, 0.3}, pinhole(width, height, 0.9));
+  add(view.scene, rectangle_mesh({8, 8}), diffuse(glm::vec3(albedo)));
   glm::dmat4 pose(1);
   // Its back edge at y = 1.5, 0.4 above the floor; it faces the camera and down.
   const double lean = 1.9;
   pose[1] = {0, std::cos(lean), std::sin(lean), 0};
   pose[2] = {0, -std::sin(lean), std::cos(lean), 0};
   pose[3] = {0, 1.5, 0.8, 1};
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({0.8, 0.8})),
-               add_material(view.scene, metal(glm::vec3(1), 0)), pose, scene::world_mixed);
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(width, height, 0.9);
+  add(view.scene, rectangle_mesh({0.8, 0.8}), metal(glm::vec3(1), 0), pose, scene::world_mixed);
   view.calibration.response.kind = ResponseCurve::Kind::linear;
-  view.world_from_camera = look_at({0, -1.5, 1}, {0, 0.6, 0.3});
   return view;
 }
 
 Plate plate_of(const std::function<glm::dvec3(int x, int y)>& radiance) {
-  Plate plate;
-  plate.width = width;
-  plate.height = height;
-  plate.bits = 16;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      for (int c = 0; c < 3; ++c)
-        plate.samples.push_back(
-            static_cast<std::uint16_t>(std::lround(radiance(x, y)[c] / white * 65535)));
-  return plate;
+  std::vector<glm::dvec3> layer;
+  for (const auto& [x, y, i] : pixels_of(width, height)) layer.push_back(radiance(x, y));
+  return linear_plate(width, height, layer, white);
 }
 
 Rendered render_over(const View& view, const Plate& plate, const set::Estimation& estimation,
-                     int samples = 4, std::uint32_t seed = 1) {
-  render::Renderer renderer(shared_device(), estimation, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, set::LightSampling::importance);
-  renderer.begin({std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera, seed});
+                     int samples = 4) {
+  SetRenderer renderer(view, estimation);
+  renderer.begin({std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera, 1});
   renderer.render(samples);
   expect_clean(renderer.counters());
   return {renderer.layers(), renderer.counters()};
@@ -90,29 +69,34 @@ bool is_inside(const glm::dvec2& pixel) {
   return pixel.x > 3 && pixel.y > 3 && pixel.x < width - 4 && pixel.y < height - 4;
 }
 
+// The pixels that show nothing but the floor in the mirror.
+std::vector<std::size_t> mirrored_pixels(const View& view, const render::Layers& layers) {
+  std::vector<std::size_t> pixels;
+  for (const auto& [x, y, i] : pixels_of(width, height))
+    if (is_inside(mirrored_pixel(view, x, y)) && layers.mask[i] == 1) pixels.push_back(i);
+  return pixels;
+}
+
 // The floor is dark in the model, and bright in the plate, rising from left to right: the mirror
 // shows the plate's floor.
 // `where_it_can`: where the floor is seen too flat, the model is traced, which is black.
 void expect_mirror_shows_plate(const View& view, bool where_it_can = false) {
   const auto shade = [](double x) { return 0.2 + x / width; };
   const Plate plate = plate_of([&](int x, int) { return glm::dvec3(1, 0.5, 0.25) * shade(x); });
-  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
+  for (const auto estimator : both_estimators) {
     const Rendered result = render_over(view, plate, by_camera(estimator), 16);
     EXPECT_GT(result.counters.measured, 0u);
     int compared = 0;
-    for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) {
-        const glm::dvec2 seen = mirrored_pixel(view, x, y);
-        const auto i = static_cast<std::size_t>(y) * width + x;
-        if (!is_inside(seen) || result.layers.mask[i] != 1) continue;
-        // Samples are spread over the pixel: its image is less than three pixels wide, of whose
-        // slope of 1/width the 16 stratified samples' mean is off by less than a quarter.
-        const double off = result.layers.composite[i].g - 0.5 * shade(seen.x);
-        const double allowed = 0.25 * 3 * 0.5 / width;
-        if (where_it_can && off < -allowed) continue;
-        EXPECT_NEAR(off, 0, allowed);
-        ++compared;
-      }
+    for (const auto& [x, y, i] : pixels_of(width, height)) {
+      const glm::dvec2 seen = mirrored_pixel(view, x, y);
+      if (!is_inside(seen) || result.layers.mask[i] != 1) continue;
+      // Samples are spread over the pixel: its image is less than three pixels wide, of whose
+      // slope of 1/width the 16 stratified samples' mean is off by less than a quarter.
+      const double off = result.layers.composite[i].g - 0.5 * shade(seen.x);
+      const double allowed = 0.25 * 3 * 0.5 / width;
+      if (where_it_can && off < -allowed) continue;
+      EXPECT_NEAR(off, 0, allowed);
+      ++compared;
     }
     EXPECT_GT(compared, 20) << "the mirror must show the floor";
   }
@@ -146,27 +130,18 @@ TEST(CameraRadiance, OfAPaintedFloorIsWrongByNoMoreThanItsCoat) {
   View view = floor_and_mirror();
   view.scene.materials[0] = plastic(glm::vec3(albedo), 0.5f);
   view.environment = uniform_environment(glm::vec3(1));
-  const View real = [&] {
-    View alone = view;
-    alone.scene.instances.pop_back();
-    return alone;
-  }();
+  View real = view;
+  real.scene.instances.pop_back();
   const render::Layers seen = render_clean(real, 256).layers;
-  const Plate plate = plate_of(
-      [&](int x, int y) { return glm::dvec3(seen.real[static_cast<std::size_t>(y) * width + x]); });
-  set::Estimation traced = by_camera();
-  traced.real_radiance = set::RealRadiance::traced;
+  const Plate plate = linear_plate(width, height, seen.real, white);
+  const set::Estimation traced = up_to_depth(8);
   const render::Layers by_plate = render_over(view, plate, by_camera(), 64).layers;
   const render::Layers by_model = render_over(view, plate, traced, 64).layers;
   render::Layers shown;
   double expected = 0;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      if (!is_inside(mirrored_pixel(view, x, y)) || by_plate.mask[i] != 1) continue;
-      shown.mixed.push_back(by_plate.mixed[i] - by_model.mixed[i]);
-      expected += static_cast<double>(by_model.mixed[i].g);
-    }
+  for (const std::size_t i : mirrored_pixels(view, by_plate)) {
+    shown.mixed.push_back(by_plate.mixed[i] - by_model.mixed[i]);
+    expected += static_cast<double>(by_model.mixed[i].g);
   }
   ASSERT_GT(shown.mixed.size(), 20u);
   EXPECT_LT(std::abs(mean(shown.mixed).g), 0.1 + 4 * standard_error_of_pixels(shown));
@@ -177,27 +152,19 @@ TEST(CameraRadiance, OfAPaintedFloorIsWrongByNoMoreThanItsCoat) {
 // than the plate by what the model says the sun brings.
 TEST(CameraRadiance, AMirrorShowsThePlateWithVirtualShadows) {
   View view = floor_and_mirror();
-  set::Light sun = lamp(set::LightType::directional, glm::dvec3(3));
-  sun.direction = glm::normalize(glm::dvec3(0, 0.5, -1));
+  const set::Light sun = sun_lamp(glm::normalize(glm::dvec3(0, 0.5, -1)), 0, glm::dvec3(3));
   view.scene.lights.push_back(sun);
   // A roof far above that shades all that the mirror shows.
-  glm::dmat4 pose(1);
-  pose[3] = {0, -40, 80, 1};
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({60, 60})),
-               add_material(view.scene, emitter(glm::vec3(0))), pose, scene::world_mixed);
+  add(view.scene, rectangle_mesh({60, 60}), emitter(glm::vec3(0)), at({0, -40, 80}),
+      scene::world_mixed);
   const double brought = albedo / std::numbers::pi * 3 * -sun.direction.z;
   const Plate plate = plate_of([](int, int) { return glm::dvec3(2); });
   set::Estimation estimation = by_camera();
   estimation.max_depth = 2;  // mirror, floor: not what the mirror adds to the floor
   const Rendered result = render_over(view, plate, estimation, 16);
   render::Layers shown;  // the pixels that show the floor in the mirror; all expect the same
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      if (is_inside(mirrored_pixel(view, x, y)) && result.layers.mask[i] == 1)
-        shown.mixed.push_back(result.layers.composite[i]);
-    }
-  }
+  for (const std::size_t i : mirrored_pixels(view, result.layers))
+    shown.mixed.push_back(result.layers.composite[i]);
   ASSERT_GT(shown.mixed.size(), 20u);
   // The difference is followed by chance, so far from the roof.
   EXPECT_NEAR(mean(shown.mixed).g, 2 - brought, 4 * standard_error_of_pixels(shown));
@@ -215,22 +182,20 @@ TEST(CameraRadiance, WhatCannotBeMeasuredIsTracedAndCounted) {
   const Plate gray = plate_of([](int, int) { return glm::dvec3(1); });
   View view = floor_and_mirror();
   expect_traced(view, plate_of([](int, int) { return glm::dvec3(1, white, 1); }));
-  view.scene.materials[0] = plastic(glm::vec3(albedo), 0.3f);
-  expect_traced(view, gray);
-  view.scene.materials[0] = plastic(glm::vec3(albedo), 0.5f);
-  view.scene.materials[0].clearcoat = 1;  // it mirrors what is above the floor
-  expect_traced(view, gray);
-  view.scene.materials[0] = diffuse(glm::vec3(albedo));
-  view.scene.materials[0].sheen_color = glm::vec3(0.5f);  // it shines where seen from the side
-  expect_traced(view, gray);
-  view.scene.materials[0] = plastic(glm::vec3(albedo), 0.5f);
-  view.scene.materials[0].specular_color = glm::vec3(4);
-  expect_traced(view, gray);
-  view.scene.materials[0] = emitter(glm::vec3(0));
-  view.scene.materials[0].emission_texture = scene::no_texture;
-  view.scene.materials[0].specular = 1;
-  view.scene.materials[0].roughness = 0.3f;
-  expect_traced(view, gray);
+  const scene::Material paint = plastic(glm::vec3(albedo), 0.5f);
+  scene::Material lacquered = paint, cloth = diffuse(glm::vec3(albedo)), glossy = paint;
+  lacquered.clearcoat = 1;              // it mirrors what is above the floor
+  cloth.sheen_color = glm::vec3(0.5f);  // it shines where seen from the side
+  glossy.specular_color = glm::vec3(4);
+  scene::Material black = emitter(glm::vec3(0));
+  black.specular = 1;
+  black.roughness = 0.3f;
+  for (const scene::Material& floor :
+       {plastic(glm::vec3(albedo), 0.3f), lacquered, cloth, glossy, black}) {
+    SCOPED_TRACE(floor.name);
+    view.scene.materials[0] = floor;
+    expect_traced(view, gray);
+  }
 }
 
 // A wall before the floor hides what the mirror shows of it.
@@ -240,18 +205,12 @@ TEST(CameraRadiance, WhatIsHiddenIsTraced) {
   pose[1] = {0, 0, 1, 0};
   pose[2] = {0, -1, 0, 0};
   pose[3] = {0, -1.2, 0, 1};
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({4, 2.6})), 0, pose);
-  view.scene.instances.back().presence = scene::world_real;  // the mixed rays pass it
+  // The mixed rays pass it.
+  add(view.scene, rectangle_mesh({4, 2.6}), 0u, pose, scene::world_real);
   const Plate plate = plate_of([](int, int) { return glm::dvec3(1); });
   const Rendered result = render_over(view, plate, by_camera());
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      if (is_inside(mirrored_pixel(view, x, y)) && result.layers.mask[i] == 1) {
-        EXPECT_EQ(result.layers.mixed[i], glm::vec3(0)) << x << ' ' << y;
-      }
-    }
-  }
+  for (const std::size_t i : mirrored_pixels(view, result.layers))
+    EXPECT_EQ(result.layers.mixed[i], glm::vec3(0)) << i;
 }
 
 TEST(CameraRadiance, WithNothingVirtualThePlateIsUntouched) {
@@ -260,10 +219,8 @@ TEST(CameraRadiance, WithNothingVirtualThePlateIsUntouched) {
   view.environment = uniform_environment(glm::vec3(1));
   const Plate plate =
       plate_of([](int x, int y) { return glm::dvec3(0.1 + 0.01 * x, 1, 0.02 * y); });
-  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
-    render::Renderer renderer(shared_device(), by_camera(estimator), view.calibration);
-    renderer.set_scene(view.scene);
-    renderer.set_environment(view.environment, set::LightSampling::importance);
+  for (const auto estimator : both_estimators) {
+    SetRenderer renderer(view, by_camera(estimator));
     renderer.begin({std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera, 1});
     renderer.render(4);
     EXPECT_EQ(renderer.show(false).samples, plate.samples);
@@ -276,21 +233,14 @@ TEST(CameraRadiance, WithNothingVirtualThePlateIsUntouched) {
 // floor that the camera sees. What a batch left in the queue would be added to other samples of the
 // next one.
 TEST(CameraRadiance, APathThatForksTwiceEndsWithItsBatch) {
-  View view;
-  view.world_from_camera = look_at({0, -2, 1.2}, {0, 0, 0});
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({8, 8})),
-               add_material(view.scene, diffuse(glm::vec3(albedo))));
+  View view = empty_view({0, -2, 1.2}, {0, 0, 0}, pinhole(width, height, 0.9), glm::vec3(1));
+  add(view.scene, rectangle_mesh({8, 8}), diffuse(glm::vec3(albedo)));
   // A metre before the camera, over the upper half of its view.
   glm::dmat4 before = view.world_from_camera;
   before[3] += before[2] - 1.45 * before[1];
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({3, 3})), 0, before,
-               scene::world_real);
-  glm::dmat4 above(1);
-  above[3] = {0, 0, 0.5, 1};
-  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.4, 3)),
-               add_material(view.scene, metal(glm::vec3(0.9f), 0)), above, scene::world_mixed);
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(width, height, 0.9);
+  add(view.scene, rectangle_mesh({3, 3}), 0u, before, scene::world_real);
+  add(view.scene, icosphere_mesh(0.4, 3), metal(glm::vec3(0.9f), 0), at({0, 0, 0.5}),
+      scene::world_mixed);
   view.calibration.response.kind = ResponseCurve::Kind::linear;
   set::Estimation estimation = by_camera(set::Estimator::difference);
   estimation.max_depth = 2;
@@ -312,8 +262,7 @@ TEST(CameraRadiance, APathThatForksTwiceEndsWithItsBatch) {
 TEST(CameraRadiance, WithoutAPlateAllIsTraced) {
   View view = floor_and_mirror();
   view.environment = uniform_environment(glm::vec3(1));
-  set::Estimation traced = by_camera();
-  traced.real_radiance = set::RealRadiance::traced;
+  const set::Estimation traced = up_to_depth(8);
   EXPECT_EQ(render_view(view, 4, by_camera()).layers.mixed,
             render_view(view, 4, traced).layers.mixed);
 }

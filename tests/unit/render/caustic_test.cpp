@@ -1,10 +1,5 @@
 // Light that a mirror throws onto a Lambert floor, brought by photons, against closed forms: a
 // plane mirror makes an image of the lamp, so the floor at p receives E(p) + E(p mirrored).
-#include <functional>
-#include <numbers>
-#include <utility>
-#include <vector>
-
 #include "daemon/render/photon_schedule.hpp"
 #include "tests/support/render_fixture.hpp"
 
@@ -16,20 +11,14 @@ constexpr double mirror_x = 1;
 
 // A floor z = 0 around the origin and a mirror x = 1 beside it, 2 m wide and 2 m high.
 View mirror_and_floor(std::uint32_t mirror_presence = scene::world_both, double floor_m = 1) {
-  View view;
-  const auto floor = add_mesh(view.scene, rectangle_mesh({floor_m, floor_m}));
-  add_instance(view.scene, floor, add_material(view.scene, diffuse(glm::vec3(albedo))));
-  const auto mirror = add_mesh(view.scene, rectangle_mesh({2, 2}));
+  View view = empty_view({0, -0.4, 1}, {0, 0, 0}, pinhole(16, 16, 0.3));
+  add(view.scene, rectangle_mesh({floor_m, floor_m}), diffuse(glm::vec3(albedo)));
   glm::dmat4 pose(1);  // its normal towards -X
   pose[0] = {0, 0, 1, 0};
   pose[1] = {0, 1, 0, 0};
   pose[2] = {-1, 0, 0, 0};
   pose[3] = {mirror_x, 0, 1, 1};
-  add_instance(view.scene, mirror, add_material(view.scene, metal(glm::vec3(1), 0)), pose,
-               mirror_presence);
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(16, 16, 0.3);
-  view.world_from_camera = look_at({0, -0.4, 1}, {0, 0, 0});
+  add(view.scene, rectangle_mesh({2, 2}), metal(glm::vec3(1), 0), pose, mirror_presence);
   return view;
 }
 
@@ -47,22 +36,17 @@ glm::dvec3 expected_mean(const View& view, const std::function<glm::dvec3(glm::d
                          bool with_mirror) {
   const PinholeIntrinsics& k = view.calibration.intrinsics;
   glm::dvec3 sum(0);
-  for (int y = 0; y < k.height; ++y) {
-    for (int x = 0; x < k.width; ++x) {
-      const glm::dvec3 p = floor_point(view, x, y);
-      sum += irradiance(p);
-      if (with_mirror) sum += irradiance({2 * mirror_x - p.x, p.y, p.z});
-    }
+  for (const auto& [x, y, i] : pixels_of(k.width, k.height)) {
+    const glm::dvec3 p = floor_point(view, x, y);
+    sum += irradiance(p);
+    if (with_mirror) sum += irradiance({2 * mirror_x - p.x, p.y, p.z});
   }
   return sum * (albedo / pi / (k.width * k.height));
 }
 
 set::Estimation photon_estimation() {
-  set::Estimation estimation;
-  estimation.max_depth = 2;  // the mirror and the floor
-  estimation.photons = 20;
-  estimation.photon_radius_px = 2;
-  return estimation;
+  // The mirror and the floor.
+  return {.max_depth = 2, .photons = 20, .photon_radius_px = 2};
 }
 
 // Both worlds' mean over independent scrambles, with its standard error.
@@ -71,27 +55,15 @@ struct Measured {
 };
 
 Measured measure(const View& view, const set::Estimation& estimation) {
-  constexpr int scrambles = 16;
-  render::Renderer renderer(shared_device(), estimation, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, set::LightSampling::importance);
-  Measured result;
-  glm::dvec3 squares(0);
-  for (std::uint32_t i = 0; i < scrambles; ++i) {
-    render::FrameInput frame;
-    frame.world_from_camera = view.world_from_camera;
-    frame.seed = 100 + i;
-    renderer.begin(frame);
-    renderer.render(8);
-    const render::Layers layers = renderer.layers();
-    const glm::dvec3 mixed = mean(layers.mixed);
-    result.mixed += mixed / static_cast<double>(scrambles);
-    result.real += mean(layers.real) / static_cast<double>(scrambles);
-    squares += mixed * mixed / static_cast<double>(scrambles);
-    expect_clean(renderer.counters());
+  SetRenderer renderer(view, estimation);
+  std::vector<glm::dvec3> mixed, real;
+  for (std::uint32_t i = 0; i < 16; ++i) {
+    const render::Layers layers = renderer.rendered_clean(8, 100 + i);
+    mixed.push_back(mean(layers.mixed));
+    real.push_back(mean(layers.real));
   }
-  result.error = glm::sqrt((squares - result.mixed * result.mixed) / (scrambles - 1.0));
-  return result;
+  const Estimate of_mixed = estimate_of(mixed);
+  return {of_mixed.mean, estimate_of(real).mean, of_mixed.error};
 }
 
 // Within four standard errors, and 0.3 % for the disc over which photons are gathered: 3 cm, so the
@@ -100,23 +72,14 @@ Measured measure(const View& view, const set::Estimation& estimation) {
 void expect_image(const View& view, const std::function<glm::dvec3(glm::dvec3)>& irradiance) {
   const Measured measured = measure(view, photon_estimation());
   const glm::dvec3 expected = expected_mean(view, irradiance, true);
-  for (int c = 0; c < 3; ++c)
-    EXPECT_NEAR(measured.mixed[c], expected[c], 4 * measured.error[c] + 3e-3 * expected[c])
-        << "channel " << c << ", standard error " << measured.error[c];
+  expect_near(measured.mixed, expected, 4.0 * measured.error + 3e-3 * expected);
   EXPECT_EQ(measured.mixed, measured.real);
   // The image is a good part of it, or this would show nothing.
   EXPECT_GT(expected.g, 1.1 * expected_mean(view, irradiance, false).g);
 }
 
-set::Light lamp(set::LightType type) {
-  set::Light light;
-  light.name = "lamp";
-  light.type = type;
-  light.position = {0.2, 0.3, 1.2};
-  light.emission = glm::dvec3(2, 3, 5);
-  light.gain_real = 1;
-  return light;
-}
+const glm::dvec3 colour(2, 3, 5), above_floor(0.2, 0.3, 1.2);
+const set::Light key = point_lamp(above_floor, colour);
 
 glm::dvec3 point_irradiance(const set::Light& light, const glm::dvec3& p) {
   const glm::dvec3 to_light = light.position - p;
@@ -126,14 +89,14 @@ glm::dvec3 point_irradiance(const set::Light& light, const glm::dvec3& p) {
 
 TEST(MirrorCaustic, OfAPoint) {
   View view = mirror_and_floor();
-  const set::Light light = lamp(set::LightType::point);
-  view.scene.lights.push_back(light);
-  expect_image(view, [&](const glm::dvec3& p) { return point_irradiance(light, p); });
+  view.scene.lights = {key};
+  expect_image(view, [&](const glm::dvec3& p) { return point_irradiance(key, p); });
 }
 
 TEST(MirrorCaustic, OfASpot) {
   View view = mirror_and_floor();
-  set::Light light = lamp(set::LightType::spot);
+  set::Light light = key;
+  light.type = set::LightType::spot;
   light.direction = glm::normalize(glm::dvec3(1, -0.2, -1));
   light.inner_cone_rad = 0.3;
   light.outer_cone_rad = 1.2;
@@ -149,9 +112,7 @@ TEST(MirrorCaustic, OfASpot) {
 TEST(MirrorCaustic, OfASunWithoutAndWithADisc) {
   for (const double radius : {0.0, 0.1}) {
     View view = mirror_and_floor();
-    set::Light light = lamp(set::LightType::directional);
-    light.direction = glm::normalize(glm::dvec3(1, 0, -1));
-    light.angular_radius_rad = radius;
+    const set::Light light = sun_lamp(glm::normalize(glm::dvec3(1, 0, -1)), radius, colour);
     view.scene.lights.push_back(light);
     expect_image(view, [&](const glm::dvec3&) { return light.emission * -light.direction.z; });
   }
@@ -159,8 +120,7 @@ TEST(MirrorCaustic, OfASunWithoutAndWithADisc) {
 
 TEST(MirrorCaustic, OfASphere) {
   View view = mirror_and_floor();
-  set::Light light = lamp(set::LightType::sphere);
-  light.radius_m = 0.2;
+  const set::Light light = sphere_lamp(above_floor, 0.2, colour);
   view.scene.lights.push_back(light);
   expect_image(view, [&](const glm::dvec3& p) {
     const glm::dvec3 to_light = light.position - p;
@@ -188,21 +148,14 @@ glm::dvec3 rectangle_irradiance(const set::Light& light, const glm::dvec3& p) {
 }
 
 TEST(MirrorCaustic, OfARectangleAndOfAnEmissiveMesh) {
-  set::Light light = lamp(set::LightType::rectangle);
-  light.direction = {0, 0, -1};
-  light.up = {0, 1, 0};
-  light.width_m = 0.3;
-  light.height_m = 0.5;
+  const set::Light light = panel_lamp(above_floor, {0.3, 0.5}, colour);
   View with_light = mirror_and_floor();
   with_light.scene.lights.push_back(light);
   expect_image(with_light, [&](const glm::dvec3& p) { return rectangle_irradiance(light, p); });
 
   View with_mesh = mirror_and_floor();
-  const auto mesh = add_mesh(with_mesh.scene, rectangle_mesh({light.width_m, light.height_m}));
-  glm::dmat4 pose(1);
-  pose[3] = glm::dvec4(light.position, 1);
-  add_instance(with_mesh.scene, mesh,
-               add_material(with_mesh.scene, emitter(glm::vec3(light.emission))), pose);
+  add(with_mesh.scene, rectangle_mesh({light.width_m, light.height_m}),
+      emitter(glm::vec3(light.emission)), at(light.position));
   expect_image(with_mesh, [&](const glm::dvec3& p) { return rectangle_irradiance(light, p); });
 }
 
@@ -212,17 +165,16 @@ TEST(MirrorCaustic, OfAUniformEnvironment) {
   View view = mirror_and_floor(scene::world_both, 0.7);
   view.environment = uniform_environment({1, 2, 3});
   const Measured measured = measure(view, photon_estimation());
-  for (int c = 0; c < 3; ++c)
-    EXPECT_NEAR(measured.mixed[c], albedo * (c + 1), 4 * measured.error[c] + 2e-3 * (c + 1));
+  const glm::dvec3 sky(1, 2, 3);
+  expect_near(measured.mixed, albedo * sky, 4.0 * measured.error + 2e-3 * sky);
 }
 
 TEST(MirrorCaustic, OfAVirtualMirrorAndOfARemovedOne) {
-  const set::Light light = lamp(set::LightType::point);
   for (const std::uint32_t presence : {scene::world_mixed, scene::world_real}) {
     View view = mirror_and_floor(presence);
-    view.scene.lights.push_back(light);
+    view.scene.lights = {key};
     const Measured measured = measure(view, photon_estimation());
-    const auto irradiance = [&](const glm::dvec3& p) { return point_irradiance(light, p); };
+    const auto irradiance = [&](const glm::dvec3& p) { return point_irradiance(key, p); };
     const bool is_virtual = presence == scene::world_mixed;
     const glm::dvec3 with = expected_mean(view, irradiance, true);
     const glm::dvec3 without = expected_mean(view, irradiance, false);
@@ -234,9 +186,8 @@ TEST(MirrorCaustic, OfAVirtualMirrorAndOfARemovedOne) {
 // A lamp that is dimmed in the mixed world throws a dimmer image there, from the same photons.
 TEST(MirrorCaustic, OfADimmedLamp) {
   View view = mirror_and_floor();
-  set::Light light = lamp(set::LightType::point);
-  light.gain_mixed = 0.25;
-  view.scene.lights.push_back(light);
+  view.scene.lights = {key};
+  view.scene.lights[0].gain_mixed = 0.25;
   const Measured measured = measure(view, photon_estimation());
   EXPECT_NEAR(measured.mixed.g, 0.25 * measured.real.g, 1e-6 * measured.real.g);
 }
@@ -244,12 +195,11 @@ TEST(MirrorCaustic, OfADimmedLamp) {
 // A lamp of another colour throws an image of that colour there, likewise.
 TEST(MirrorCaustic, OfATintedLamp) {
   View view = mirror_and_floor();
-  set::Light light = lamp(set::LightType::point);
+  set::Light light = key;
   light.tint = {2, 0.5, 0};
-  view.scene.lights.push_back(light);
+  view.scene.lights = {light};
   const Measured measured = measure(view, photon_estimation());
-  for (int c = 0; c < 3; ++c)
-    EXPECT_NEAR(measured.mixed[c], light.tint[c] * measured.real[c], 1e-6 * measured.real[c]);
+  expect_near(measured.mixed, light.tint * measured.real, 1e-6 * measured.real);
   // The photons bring a good part of it.
   const auto direct = [&](const glm::dvec3& p) { return point_irradiance(light, p); };
   EXPECT_GT(measured.real.g, 1.1 * expected_mean(view, direct, false).g);
@@ -259,30 +209,14 @@ TEST(MirrorCaustic, OfATintedLamp) {
 // total over the picture. Gathering moves light over a disc, so what the ball hides of the floor
 // weighs on the total with the radius over the ball's, squared: 0.5 % of the caustic, itself 2 %.
 TEST(GlassCaustic, CarriesAsMuchLightAsTracedPaths) {
-  View view;
-  const auto floor = add_mesh(view.scene, rectangle_mesh({1, 1}));
-  add_instance(view.scene, floor, add_material(view.scene, diffuse(glm::vec3(albedo))));
-  glm::dmat4 pose(1);
-  pose[3] = {0, 0, 0.12, 1};
-  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.1, 3)),
-               add_material(view.scene, glass(1.5f)), pose);
-  view.environment = uniform_environment(glm::vec3(0.1f));
-  set::Light light = lamp(set::LightType::sphere);
-  light.position = {0.3, 0, 1};
-  light.radius_m = 0.4;
-  view.scene.lights.push_back(light);
-  view.calibration = pinhole(48, 48, 0.8);
-  view.world_from_camera = look_at({0, -0.8, 1}, {0, 0, 0.05});
-  set::Estimation photons;
-  photons.photons = 4;
-  photons.photon_radius_px = 0.3;  // 7 mm, a fourteenth of the ball
-  set::Estimation traced = photons;
-  traced.caustics = set::Caustics::traced;
-  set::Estimation none = photons;
-  none.caustics = set::Caustics::none;
-  const Measured by_photons = measure(view, photons);
-  const Measured by_paths = measure(view, traced);
-  const Measured without = measure(view, none);
+  View view = empty_view({0, -0.8, 1}, {0, 0, 0.05}, pinhole(48, 48, 0.8), glm::vec3(0.1f));
+  add(view.scene, rectangle_mesh({1, 1}), diffuse(glm::vec3(albedo)));
+  add(view.scene, icosphere_mesh(0.1, 3), glass(1.5f), at({0, 0, 0.12}));
+  view.scene.lights.push_back(sphere_lamp({0.3, 0, 1}, 0.4, colour));
+  // 7 mm, a fourteenth of the ball.
+  const Measured by_photons = measure(view, {.photons = 4, .photon_radius_px = 0.3});
+  const Measured by_paths = measure(view, {.caustics = set::Caustics::traced});
+  const Measured without = measure(view, {.caustics = set::Caustics::none});
   const double error = std::hypot(by_photons.error.g, by_paths.error.g);
   // Photons that are gathered over the edge of the floor or of the ball's foot weigh less than
   // this.
@@ -292,21 +226,13 @@ TEST(GlassCaustic, CarriesAsMuchLightAsTracedPaths) {
 
 // A floor in a block of glass: photons enter it and paths leave it, under the same angles outside.
 void expect_as_much_light_through(const scene::Material& glass_block) {
-  View view;
-  const auto floor = add_mesh(view.scene, rectangle_mesh({2, 2}));
-  add_instance(view.scene, floor, add_material(view.scene, diffuse(glm::vec3(albedo))));
-  add_instance(view.scene, add_mesh(view.scene, box_mesh({0.36, 0.36, 0.1})),
-               add_material(view.scene, glass_block));
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(32, 32, 0.2);  // nothing beside the block
-  view.world_from_camera = look_at({0, -0.2, 1}, {0, 0, 0});
-  set::Estimation photons = up_to_depth(3);  // the glass, the floor, the glass
-  photons.photons = 8;
-  photons.photon_radius_px = 1;
-  set::Estimation traced = photons;
-  traced.caustics = set::Caustics::traced;
-  const Measured by_photons = measure(view, photons);
-  const Measured by_paths = measure(view, traced);
+  // Nothing is seen beside the block.
+  View view = empty_view({0, -0.2, 1}, {0, 0, 0}, pinhole(32, 32, 0.2), glm::vec3(1));
+  add(view.scene, rectangle_mesh({2, 2}), diffuse(glm::vec3(albedo)));
+  add(view.scene, box_mesh({0.36, 0.36, 0.1}), glass_block);
+  // The glass, the floor, the glass.
+  const Measured by_photons = measure(view, {.max_depth = 3, .photons = 8, .photon_radius_px = 1});
+  const Measured by_paths = measure(view, {.max_depth = 3, .caustics = set::Caustics::traced});
   const double error = std::hypot(by_photons.error.g, by_paths.error.g);
   EXPECT_NEAR(by_photons.mixed.g, by_paths.mixed.g, 4 * error);
   EXPECT_LT(error, 7e-3 * by_paths.mixed.g) << "or this would show nothing";
@@ -330,8 +256,7 @@ TEST(SheenedGlass, CarriesAsMuchLightAsTracedPaths) {
 
 TEST(Photons, LeaveNoDifferenceWhereTheWorldsAreEqual) {
   View view = mirror_and_floor();
-  view.scene.lights.push_back(lamp(set::LightType::sphere));
-  view.scene.lights.back().radius_m = 0.2;
+  view.scene.lights = {sphere_lamp(above_floor, 0.2, colour)};
   view.environment = uniform_environment({1, 2, 3});
   const Rendered result = render_view(view, 8);
   for (const glm::vec3& diff : result.layers.diff) EXPECT_EQ(diff, glm::vec3(0));
@@ -339,24 +264,17 @@ TEST(Photons, LeaveNoDifferenceWhereTheWorldsAreEqual) {
 
 TEST(Photons, GiveTheSamePictureHoweverTheSamplesAreSplit) {
   View view = mirror_and_floor();
-  view.scene.lights.push_back(lamp(set::LightType::point));
-  set::Estimation estimation;
-  estimation.photons = 40;  // many in a bucket
-  estimation.photon_radius_px = 10;
-  render::Renderer renderer(shared_device(), estimation, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, set::LightSampling::importance);
-  render::FrameInput frame;
-  frame.world_from_camera = view.world_from_camera;
-  std::vector<std::vector<glm::vec3>> pictures;
-  for (const int first : {1, 3, 5}) {
-    renderer.begin(frame);
+  view.scene.lights = {key};
+  SetRenderer renderer(view, {.photons = 40, .photon_radius_px = 10});  // many in a bucket
+  const auto picture = [&](int first) {
+    renderer.begin({{}, 1.0, view.world_from_camera});
     renderer.render(first);
     renderer.render(6 - first);
-    pictures.push_back(renderer.layers().mixed);
-  }
-  EXPECT_EQ(pictures[0], pictures[1]);
-  EXPECT_EQ(pictures[0], pictures[2]);
+    return renderer.layers().mixed;
+  };
+  const auto expected = picture(1);
+  EXPECT_EQ(picture(3), expected);
+  EXPECT_EQ(picture(5), expected);
 }
 
 // A glass bead close to the lens, where it is not seen and takes hardly a photon: the caustic far
@@ -365,13 +283,11 @@ TEST(Photons, GiveTheSamePictureHoweverTheSamplesAreSplit) {
 TEST(PhotonRadius, OfACausticDoesNotDependOnGlassElsewhere) {
   const auto spread_of = [](bool with_bead) {
     View view = mirror_and_floor();
-    set::Light light = lamp(set::LightType::point);
-    view.scene.lights.push_back(light);
+    view.scene.lights = {key};
     if (with_bead) {
       glm::dmat4 behind = view.world_from_camera;
       behind[3] -= 0.1 * behind[2];
-      add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.002, 2)),
-                   add_material(view.scene, glass(1.5f)), behind);
+      add(view.scene, icosphere_mesh(0.002, 2), glass(1.5f), behind);
     }
     const render::Layers layers = render_clean(view, 4, photon_estimation()).layers;
     return std::pair(mean(layers.mixed).g, standard_error_of_pixels(layers));

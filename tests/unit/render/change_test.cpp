@@ -1,13 +1,9 @@
 // What changes between frames shortens their past by as much as it must, and where it must: light
 // that trembles does not, a lamp that is switched does, and what moves does where it is near.
-#include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
-#include <random>
 
 #include "daemon/render/light_change.hpp"
 #include "daemon/render/moved_instances.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
@@ -21,11 +17,7 @@ render::EncodedEnvironment sky(double brightness) {
 
 // A lamp at infinity that the camera estimates, as a source of both worlds.
 set::Light found_lamp(double angle_rad, double irradiance) {
-  set::Light light = lamp(set::LightType::directional, glm::dvec3(irradiance));
-  light.direction = {std::sin(angle_rad), 0, -std::cos(angle_rad)};
-  light.angular_radius_rad = 0.01;
-  light.gain_mixed = light.gain_real = 1;
-  return light;
+  return sun_lamp({std::sin(angle_rad), 0, -std::cos(angle_rad)}, 0.01, glm::dvec3(irradiance));
 }
 
 TEST(LightChange, OfTheSameLightIsNone) {
@@ -44,10 +36,7 @@ TEST(LightChange, OfTheSameLightIsNone) {
 TEST(LightChange, TremblingDoesNotEndThePast) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> off(-1, 1);
-  lighting::EnvironmentMap with = uniform_environment(glm::vec3(1)), without = with;
-  with.size = without.size = 32;
-  with.radiance.assign(32 * 32, glm::vec3(1));
-  without.radiance = with.radiance;
+  lighting::EnvironmentMap with = uniform_environment(glm::vec3(1), 32), without = with;
   // The lamp as a texel of the environment, 4 pi / 1024 wide, straight up: with as much irradiance.
   const double texel_sr = 4 * std::numbers::pi / 1024;
   for (const int at : {15 * 32 + 15, 15 * 32 + 16, 16 * 32 + 15, 16 * 32 + 16})
@@ -114,7 +103,7 @@ TEST(LightChange, ASteadyChangeIsFollowed) {
 
 render::GpuScene::Stance box_at(const glm::dvec3& place) {
   render::GpuScene::Stance stance;
-  stance.world_from_object = glm::translate(glm::dmat4(1.0), place);
+  stance.world_from_object = at(place);
   stance.low = glm::vec3(-0.5f);
   stance.high = glm::vec3(0.5f);
   stance.presence = scene::world_mixed;
@@ -176,19 +165,16 @@ struct TwoBoxes {
   TwoBoxes() {
     scene::Scene& scene = view.scene;
     const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
-    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
-    still = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.4))), gray,
-                         at({-0.9, 0, 0.2}), scene::world_mixed);
-    walks = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.2))), gray, at({0.9, 0, 0.1}),
-                         scene::world_mixed);
+    add(scene, rectangle_mesh(glm::dvec2(20)), gray);
+    still = add(scene, box_mesh(glm::dvec3(0.4)), gray, at({-0.9, 0, 0.2}), scene::world_mixed);
+    walks = add(scene, box_mesh(glm::dvec3(0.2)), gray, at({0.9, 0, 0.1}), scene::world_mixed);
     see_evenly_lit(view, glm::vec3(0.4f), 1.1);
     view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
   }
-  static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
 };
 
-Plate shown(SetRenderer& renderer, const View& view, int samples, bool accumulates) {
-  return shown_frame(renderer, view.world_from_camera, samples, accumulates, accumulates);
+Plate shown(SetRenderer& renderer, int samples, bool accumulates) {
+  return shown_frame(renderer, samples, accumulates, accumulates);
 }
 
 // Returns the rms of what two pictures are apart over columns [first, last).
@@ -211,18 +197,17 @@ TEST(LocalHistory, EndsWhereSomethingWalksAndNotElsewhere) {
   std::vector<scene::Instance> instances = boxes.view.scene.instances;
   Plate walked, stood;
   for (int frame = 0; frame < 16; ++frame) {
-    instances[boxes.walks].world_from_object =
-        TwoBoxes::at({0.9 - 0.015 * frame, 0.01 * frame, 0.1});
+    instances[boxes.walks].world_from_object = at({0.9 - 0.015 * frame, 0.01 * frame, 0.1});
     walking.move(instances, {});
-    walked = shown(walking, boxes.view, 1, true);
-    stood = shown(standing, boxes.view, 1, true);
+    walked = shown(walking, 1, true);
+    stood = shown(standing, 1, true);
   }
   reference.move(instances, {});
   fresh.move(instances, {});
-  const Plate truth = shown(reference, boxes.view, 1024, false);
+  const Plate truth = shown(reference, 1024, false);
   SetRenderer still_reference(boxes.view);
-  const Plate truth_of_standing = shown(still_reference, boxes.view, 1024, false);
-  const Plate begun = shown(fresh, boxes.view, 1, true);
+  const Plate truth_of_standing = shown(still_reference, 1024, false);
+  const Plate begun = shown(fresh, 1, true);
   EXPECT_LT(apart(walked, truth, 0, 24), 1.5 * apart(stood, truth_of_standing, 0, 24));
   EXPECT_LT(apart(walking.show(false), truth, 0, 24), apart(fresh.show(false), truth, 0, 24) / 4)
       << "it has a past";
@@ -235,18 +220,17 @@ TEST(LocalHistory, EndsWhereSomethingWalksAndNotElsewhere) {
 TEST(LocalHistory, KeepsNothingOfAShadowThatIsGone) {
   TwoBoxes boxes;
   boxes.view.environment = uniform_environment(glm::vec3(0));
-  set::Light key = lamp(set::LightType::point, glm::dvec3(3));
-  key.position = {0.6, 1.2, 0.8};
+  set::Light key = point_lamp({0.6, 1.2, 0.8}, glm::dvec3(3));
   key.gain_real = 0;
   boxes.view.scene.lights = {key};
   SetRenderer renderer(boxes.view, up_to_depth(1)), fresh(boxes.view, up_to_depth(1));
   Plate before;
-  for (int frame = 0; frame < 12; ++frame) before = shown(renderer, boxes.view, 4, true);
+  for (int frame = 0; frame < 12; ++frame) before = shown(renderer, 4, true);
   std::vector<scene::Instance> instances = boxes.view.scene.instances;
-  instances[boxes.walks].world_from_object = TwoBoxes::at({0.1, 0.2, 0.1});
+  instances[boxes.walks].world_from_object = at({0.1, 0.2, 0.1});
   for (SetRenderer* each : {&renderer, &fresh}) each->move(instances, {key});
-  const Plate after = shown(renderer, boxes.view, 4, true);
-  const Plate begun = shown(fresh, boxes.view, 4, true);
+  const Plate after = shown(renderer, 4, true);
+  const Plate begun = shown(fresh, 4, true);
   int changed = 0, off = 0;
   for (std::size_t i = 0; i < after.samples.size(); ++i) {
     const int change = std::abs(before.samples[i] - begun.samples[i]);
@@ -264,13 +248,13 @@ TEST(LocalHistory, ShowsNoGhostOfWhatHasJumped) {
   const TwoBoxes boxes;
   SetRenderer renderer(boxes.view), fresh(boxes.view), reference(boxes.view);
   std::vector<scene::Instance> instances = boxes.view.scene.instances;
-  for (int frame = 0; frame < 12; ++frame) shown(renderer, boxes.view, 1, true);
-  instances[boxes.walks].world_from_object = TwoBoxes::at({0.2, 0.3, 0.1});
+  for (int frame = 0; frame < 12; ++frame) shown(renderer, 1, true);
+  instances[boxes.walks].world_from_object = at({0.2, 0.3, 0.1});
   for (SetRenderer* each : {&renderer, &fresh, &reference}) each->move(instances, {});
-  const Plate truth = shown(reference, boxes.view, 1024, false);
+  const Plate truth = shown(reference, 1024, false);
   for (int frame = 0; frame < 5; ++frame) {
-    const Plate after = shown(renderer, boxes.view, 1, true);
-    const Plate begun = shown(fresh, boxes.view, 1, true);
+    const Plate after = shown(renderer, 1, true);
+    const Plate begun = shown(fresh, 1, true);
     EXPECT_LT(apart(after, truth, 28, 64), 1.5 * apart(begun, truth, 28, 64)) << frame;
   }
 }

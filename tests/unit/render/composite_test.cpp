@@ -1,6 +1,5 @@
 // The composite: untouched plates bit for bit, samples independent of how they are asked for, and
 // the equation itself.
-#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::composite_test {
@@ -14,11 +13,7 @@ Plate show(const View& view, const Plate& plate, int samples) {
 }
 
 View real_set() {
-  RandomScene options;
-  options.width = 70;
-  options.height = 50;
-  options.virtual_objects = 0;
-  return random_scene(3, options);
+  return random_scene(3, {.width = 70, .height = 50, .virtual_objects = 0});
 }
 
 TEST(Composite, WithoutAVirtualObjectThePlateComesBackBitForBit) {
@@ -42,14 +37,9 @@ TEST(Composite, WithoutAVirtualObjectThePlateComesBackBitForBit) {
 }
 
 TEST(Composite, SamplesDoNotDependOnHowTheyAreAskedFor) {
-  RandomScene options;
-  options.width = 45;
-  options.height = 31;
-  const View view = random_scene(2, options);
+  const View view = random_scene(2, {.width = 45, .height = 31});
   SetRenderer renderer(view);
-  renderer.begin({{}, 1.0, view.world_from_camera});
-  renderer.render(7);
-  const render::Layers whole = renderer.layers();
+  const render::Layers whole = renderer.rendered(7);
   renderer.begin({{}, 1.0, view.world_from_camera});
   for (const int part : {1, 4, 2}) renderer.render(part);
   const render::Layers parts = renderer.layers();
@@ -57,6 +47,11 @@ TEST(Composite, SamplesDoNotDependOnHowTheyAreAskedFor) {
   EXPECT_EQ(whole.mixed, parts.mixed);
   EXPECT_EQ(whole.diff, parts.diff);
   EXPECT_EQ(whole.variance, parts.variance);
+}
+
+// A plate of one pixel.
+render::PlateRadiance seen_as(double radiance, double error = 0) {
+  return {std::vector<double>(3, radiance), std::vector<double>(3, error), {}};
 }
 
 // A virtual object of radiance 0.5 covers the white half of a black-and-white pixel: the composite
@@ -68,7 +63,7 @@ TEST(Composite, CoveredPixelsUseMeansNotSamples) {
   pixel.mixed_high = gpu::vec4(0.5f, 0.5f, 0.5f, 1.0f);
   pixel.diff_high = gpu::vec4(-0.5f, -0.5f, -0.5f, 0.0f);
   pixel.square_high.w = 2;
-  const render::PlateRadiance plate{std::vector<double>(3, 0.5), std::vector<double>(3, 0.0), {}};
+  const render::PlateRadiance plate = seen_as(0.5);
   const render::Layers layers = layers_of(std::span(&pixel, 1), 2, plate);
   // 0.25 + (1 - 0.5) (0.5 - 0.5)
   EXPECT_FLOAT_EQ(layers.composite[0].g, 0.25f);
@@ -83,9 +78,7 @@ double composited(double camera, double mixed, double real, const render::Compos
   pixel.mixed_high.w = 0;
   pixel.diff_high = pixel.uncovered_high = gpu::vec4(static_cast<float>(mixed - real));
   pixel.uncovered_high.w = gpu::SAMPLE_FULL;
-  const render::PlateRadiance plate{
-      std::vector<double>(3, camera), std::vector<double>(3, 1e-6), {}};
-  return layers_of(std::span(&pixel, 1), 1, plate, rule).composite[0].g;
+  return layers_of(std::span(&pixel, 1), 1, seen_as(camera, 1e-6), rule).composite[0].g;
 }
 
 // A shadow halves the light on a surface whose albedo the phantom has wrong by a factor of two.
@@ -107,8 +100,7 @@ TEST(Composite, TheSumLightsABlackSurfaceAndTheRatioDoesNot) {
 }
 
 TEST(Composite, AllRulesAreOneWhereTheModelIsRight) {
-  using enum set::Composite;
-  for (const auto kind : {additive, ratio, hybrid})
+  for (const auto kind : all_composites)
     EXPECT_FLOAT_EQ(composited(0.5, 0.2, 0.5, {kind, 0.01}), 0.2);
 }
 
@@ -116,14 +108,13 @@ TEST(Composite, AllRulesAreOneWhereTheModelIsRight) {
 // The rule may forgive that on the real surface, but it must not multiply the object's own light:
 // the true value is 0.5 * 1 + 0.5 * 0.2.
 TEST(Composite, NoRuleMultipliesAnObjectsOwnLight) {
-  using enum set::Composite;
   gpu::GpuPixel pixel{};
   // Two samples: one covered (Lm = 1, Lr = 0.1), one not (Lm = Lr = 0.1).
   pixel.mixed_high = gpu::vec4(1.1f, 1.1f, 1.1f, 1.0f);
   pixel.diff_high = gpu::vec4(0.9f, 0.9f, 0.9f, 0.0f);
   pixel.square_high.w = 2;
-  const render::PlateRadiance plate{std::vector<double>(3, 0.2), std::vector<double>(3, 0.0), {}};
-  for (const auto kind : {additive, ratio, hybrid}) {
+  const render::PlateRadiance plate = seen_as(0.2);
+  for (const auto kind : all_composites) {
     const render::Layers layers = layers_of(std::span(&pixel, 1), 2, plate, {kind, 0.01});
     EXPECT_NEAR(layers.composite[0].g, 0.6, 1e-6);
   }
@@ -137,7 +128,7 @@ TEST(Composite, TheVarianceAtAnEdgeHoldsTheMasks) {
   pixel.mixed_high = n * gpu::vec4(0.6f, 0.6f, 0.6f, 0.5f);
   pixel.diff_high = n * gpu::vec4(0.4f, 0.4f, 0.4f, 0.0f);
   pixel.square_high = n * gpu::vec4(0.5f, 0.5f, 0.5f, 1.0f);
-  const render::PlateRadiance plate{std::vector<double>(3, 0.2), std::vector<double>(3, 0.0), {}};
+  const render::PlateRadiance plate = seen_as(0.2);
   const render::Layers layers = layers_of(std::span(&pixel, 1), 100, plate);
   EXPECT_NEAR(layers.composite[0].g, 0.6, 1e-6);
   EXPECT_NEAR(layers.variance[0].g, 0.64 * 0.25 / (n - 1.0), 1e-8);
@@ -164,8 +155,7 @@ TEST(Composite, AShadowOnAClippedPlateIsNoDarkerThanTheCameraWouldSeeIt) {
       pixels[x].square_high.w = 1;
     }
     const render::PlateRadiance radiance = render::plate_radiance(plate, response, 1);
-    for (const auto kind :
-         {set::Composite::additive, set::Composite::ratio, set::Composite::hybrid}) {
+    for (const auto kind : all_composites) {
       const render::Layers layers = layers_of(pixels, 1, radiance, {kind, 0.01});
       // The plate is off by half a code at most. The sum keeps that as radiance, and in the shadow
       // a code is share^0.58 of the radiance that it is in the light (the exponent of sRGB's
@@ -182,10 +172,8 @@ TEST(Composite, AShadowOnAClippedPlateIsNoDarkerThanTheCameraWouldSeeIt) {
 TEST(Composite, AShadowOnAnOverexposedTableStaysWhiteByBothEstimators) {
   View view = random_scene(4, {.width = 64, .height = 48, .real_objects = 0});
   for (glm::vec3& radiance : view.environment.radiance) radiance *= 8.0f;
-  for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
-    set::Estimation estimation;
-    estimation.estimator = estimator;
-    SetRenderer renderer(view, estimation);
+  for (const auto estimator : both_estimators) {
+    SetRenderer renderer(view, {.estimator = estimator});
     Plate plate{64, 48, 8, std::vector<std::uint16_t>(3 * 64 * 48, 255)};
     renderer.begin({std::make_shared<const Plate>(plate), 1.0, view.world_from_camera});
     renderer.render(64);
@@ -227,27 +215,19 @@ TEST(Composite, AFrameOfAnotherSizeIsRefused) {
 // An out-of-focus point becomes a uniform disc of radius fx R |1/z - 1/focus|, whose variance along
 // one axis is radius^2 / 4; the pixel's box adds 1/12 and the emitter its own width^2 / 12.
 TEST(Lens, DefocusIsTheCircleOfConfusion) {
-  View view;
+  View view = empty_view({0, 0, 0}, {0, 0, -1}, pinhole(64, 64, 0.4));  // looking down
   const double depth = 2.0, width = 0.02;
-  const auto mesh = add_mesh(view.scene, rectangle_mesh({width, width}));
-  glm::dmat4 place(1.0);
-  place[3] = glm::dvec4(0, 0, -depth, 1);
-  add_instance(view.scene, mesh, add_material(view.scene, emitter(glm::vec3(1))), place);
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(64, 64, 0.4);
+  add(view.scene, rectangle_mesh({width, width}), emitter(glm::vec3(1)), at({0, 0, -depth}));
   view.calibration.lens = ThinLens{0.05, 1.0, 1.0};
-  // Looking down -Z from the origin.
-  view.world_from_camera = look_at({0, 0, 0}, {0, 0, -1});
   const int samples = 512;
   const Rendered result = render_view(view, samples);
   double sum = 0, first = 0, second = 0;
-  for (int y = 0; y < 64; ++y)
-    for (int x = 0; x < 64; ++x) {
-      const double value = result.layers.mixed[64 * y + x].g;
-      sum += value;
-      first += value * x;
-      second += value * x * x;
-    }
+  for (const auto& [x, y, i] : pixels_of(64, 64)) {
+    const double value = result.layers.mixed[i].g;
+    sum += value;
+    first += value * x;
+    second += value * x * x;
+  }
   const double fx = view.calibration.intrinsics.fx;
   const double radius = fx * 0.025 * std::abs(1 / depth - 1 / 1.0);
   const double pixels = fx * width / depth;  // the emitter's width

@@ -1,12 +1,8 @@
 // Meshes that deform on the GPU: the vertices are those that the CPU computes, the tree follows
 // them, and the picture is that of the same mesh in the same shape for good.
-#include <algorithm>
-#include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "daemon/render/deformer.hpp"
-#include "drivers/error.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/bvh_decode.hpp"
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"
@@ -215,18 +211,13 @@ TEST(Deforming, BoundsHoldEveryVertexInEveryShape) {
 // A limb that is rolled up crosses itself, where its tree was straight: it is built anew, once, in
 // a thread. What rays hit is the same above either tree.
 TEST(Deforming, ABadTreeIsBuiltAnewAndChangesNoPicture) {
-  View view;
+  View view = empty_view({0.2, -1.6, 0.8}, {0.1, 0, 0.3}, pinhole(64, 48, 0.9), glm::vec3(1));
   view.scene = limb_alone(96, 24);
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(64, 48, 0.9);
-  view.world_from_camera = look_at({0.2, -1.6, 0.8}, {0.1, 0, 0.3});
   SetRenderer renderer(view);
   const scene::Deformation& limb = view.scene.deformations[0];
   const auto picture = [&](double angle) {
     renderer.deform({bent_limb(limb, angle)});
-    renderer.begin({{}, 1.0, view.world_from_camera});
-    renderer.render(2);
-    return renderer.layers();
+    return renderer.rendered(2);
   };
   const render::Layers before = picture(1.3);
   int tries = 0;
@@ -265,23 +256,15 @@ TEST(Deforming, ATreeOfNoSurfaceIsBuiltAnew) {
 // A limb and a ball on a floor between walls, which hold them in every shape, so that the extent of
 // the scene, by which lights are chosen, is the same whoever deforms the meshes.
 View figures(std::uint32_t presence) {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, inside_out(box_mesh({4, 4, 3}))),
-               add_material(view.scene, diffuse(glm::vec3(0.7f, 0.6f, 0.5f))));
-  glm::dmat4 placed(1);
-  placed[3] = {-0.4, 0.1, -1.4, 1};
+  View view = empty_view({0, -1.9, -0.4}, {0, 0, -1.1}, pinhole(48, 36, 0.9));
+  add(view.scene, inside_out(box_mesh({4, 4, 3})), diffuse(glm::vec3(0.7f, 0.6f, 0.5f)));
   add_limb(view.scene, limb_mesh(24, 16, joints), joints,
-           add_material(view.scene, diffuse(glm::vec3(0.8f, 0.2f, 0.1f))), placed, presence);
-  placed[3] = {0.5, -0.2, -1.1, 1};
+           add_material(view.scene, diffuse(glm::vec3(0.8f, 0.2f, 0.1f))), at({-0.4, 0.1, -1.4}),
+           presence);
   add_squeezed_ball(view.scene, squeezed_ball_mesh(0.3, 32, 16),
-                    add_material(view.scene, plastic(glm::vec3(0.1f, 0.4f, 0.7f), 0.4f)), placed,
-                    presence);
-  view.scene.lights.push_back(lamp(set::LightType::sphere, glm::dvec3(20)));
-  view.scene.lights.back().position = {0.3, -1, 1};
-  view.scene.lights.back().radius_m = 0.2;
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(48, 36, 0.9);
-  view.world_from_camera = look_at({0, -1.9, -0.4}, {0, 0, -1.1});
+                    add_material(view.scene, plastic(glm::vec3(0.1f, 0.4f, 0.7f), 0.4f)),
+                    at({0.5, -0.2, -1.1}), presence);
+  view.scene.lights = {sphere_lamp({0.3, -1, 1}, 0.2, glm::dvec3(20))};
   return view;
 }
 
@@ -296,12 +279,7 @@ BothWays pictures(const View& moving, const std::vector<scene::Shape>& shapes,
   still.scene = posed(moving.scene, shapes_for_good);
   SetRenderer by_gpu(moving), for_good(still);
   by_gpu.deform(shapes);
-  by_gpu.begin({{}, 1.0, moving.world_from_camera});
-  for_good.begin({{}, 1.0, moving.world_from_camera});
-  by_gpu.render(4);
-  for_good.render(4);
-  expect_clean(by_gpu.counters());
-  return {by_gpu.layers(), for_good.layers()};
+  return {by_gpu.rendered_clean(4), for_good.rendered(4)};
 }
 
 // What the picture shows of surfaces is the same but for rounding; where a silhouette runs through
@@ -323,17 +301,14 @@ TEST(Deforming, ShowsWhatTheSameMeshesShowInTheirShapeForGood) {
   const auto both = pictures(moving, shapes, shapes);
   expect_same_surfaces(both);
   const render::Layers &a = both.by_gpu, &b = both.for_good;
-  const glm::dvec3 shown = mean(a.mixed), expected = mean(b.mixed);
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(shown[c], expected[c], 2e-3 * expected[c]);
+  expect_near(mean(a.mixed), mean(b.mixed), 2e-3 * mean(b.mixed));
 }
 
 // A mesh whose bounds are past all numbers keeps its shape, at rest already, and moves nothing of
 // the others' joints.
 TEST(Deforming, AShapeThatCannotBeTracedChangesNoOther) {
   View view = figures(scene::world_both);
-  glm::dmat4 placed(1);
-  placed[3] = {0.1, 0.4, -1.4, 1};
-  add_limb(view.scene, limb_mesh(24, 16, joints), joints, 1, placed);
+  add_limb(view.scene, limb_mesh(24, 16, joints), joints, 1, at({0.1, 0.4, -1.4}));
   const scene::Shape upright = bent_limb(view.scene.deformations[0], 0);
   const scene::Shape bent = bent_limb(view.scene.deformations[0], 0.25);
   view.scene.deformations[0].joints[0].file_from_joint[3].x = 1e25;
@@ -352,7 +327,7 @@ TEST(Deforming, NeedsVerticesThatFitIntoAStorageBuffer) {
   large.positions.resize(most / 32, glm::vec3(0));
   large.normals.resize(most / 32, glm::vec3(0, 0, 1));
   large.uvs.clear();
-  add_instance(scene, add_mesh(scene, large), 0);
+  add(scene, large, 0u);
   render::Renderer renderer(shared_device(), {}, pinhole(16, 16, 0.9));
   EXPECT_THROW(renderer.set_scene(scene), Error);
   scene.deformations.clear();
@@ -370,14 +345,8 @@ TEST(Deforming, AGlowingMeshLightsFromItsShape) {
   still.scene = posed(view.scene, shapes);
   SetRenderer by_gpu(view), for_good(still);
   by_gpu.deform(shapes);
-  const auto shown = [&](SetRenderer& renderer) {
-    renderer.begin({{}, 1.0, view.world_from_camera});
-    renderer.render(8);
-    expect_clean(renderer.counters());
-    return mean(renderer.layers().mixed).g;
-  };
-  const double expected = shown(for_good);
-  EXPECT_NEAR(shown(by_gpu), expected, 2e-3 * expected);
+  const double expected = mean(for_good.rendered_clean(8).mixed).g;
+  EXPECT_NEAR(mean(by_gpu.rendered_clean(8).mixed).g, expected, 2e-3 * expected);
 }
 
 // A virtual figure's difference follows it: where it was there is none any more.
@@ -386,15 +355,12 @@ TEST(Deforming, TheDifferenceFollows) {
   SetRenderer renderer(view);
   const auto covered = [&](const scene::Shape& limb) {
     renderer.deform({limb, {{0.0}, {}}});
-    renderer.begin({{}, 1.0, view.world_from_camera});
-    renderer.render(1);
-    return renderer.layers().mask;
+    return renderer.rendered(1).mask;
   };
   const scene::Deformation& limb = view.scene.deformations[0];
   const std::vector<float> upright = covered(bent_limb(limb, 0));
   scene::Shape away = bent_limb(limb, 0);
-  for (glm::dmat4& joint : away.joints)
-    joint = glm::translate(glm::dmat4(1), glm::dvec3(0, 3, 0)) * joint;  // behind the wall
+  for (glm::dmat4& joint : away.joints) joint = at({0, 3, 0}) * joint;  // behind the wall
   const std::vector<float> gone = covered(away);
   EXPECT_GT(std::ranges::count(upright, 1.0f), std::ranges::count(gone, 1.0f) + 20);
   EXPECT_EQ(covered(bent_limb(limb, 0)), upright);

@@ -1,9 +1,6 @@
 // What deforms keeps its past: each of its points moves as its own vertices do.
-#include <cmath>
-
 #include "daemon/render/moved_instances.hpp"
 #include "daemon/scene/bvh_refit.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/figure.hpp"
 
@@ -20,11 +17,11 @@ struct Figure {
   Figure() {
     scene::Scene& scene = view.scene;
     const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
-    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
-    limb = add_limb(scene, limb_mesh(24, 24, joints), joints, gray, placed_at({-0.5, 0, 0}),
+    add(scene, rectangle_mesh(glm::dvec2(20)), gray);
+    limb = add_limb(scene, limb_mesh(24, 24, joints), joints, gray, at({-0.5, 0, 0}),
                     scene::world_mixed);
-    ball = add_squeezed_ball(scene, squeezed_ball_mesh(0.3, 32, 16), gray,
-                             placed_at({0.4, 0, 0.35}), scene::world_mixed);
+    ball = add_squeezed_ball(scene, squeezed_ball_mesh(0.3, 32, 16), gray, at({0.4, 0, 0.35}),
+                             scene::world_mixed);
     see_evenly_lit(view, glm::vec3(0.4f), 0.9);
     view.world_from_camera = look_at({0, -1.8, 1.0}, {0, 0, 0.4});
   }
@@ -48,14 +45,12 @@ TEST(DeformingHistory, StaysWhileAFigureMoves) {
   for (int frame = 0; frame < 12; ++frame) {
     bend = 0.005 * frame;
     moving.deform(figure.shapes(bend));
-    last = shown_frame(moving, figure.view.world_from_camera, 1, true);
+    last = shown_frame(moving, 1, true);
   }
   for (SetRenderer* each : {&alone, &reference}) each->deform(figure.shapes(bend));
-  const Plate truth = shown_frame(reference, figure.view.world_from_camera, many, false);
-  const std::vector<float> mask = reference.layers().mask;
-  EXPECT_LT(apart_where_covered(last, truth, mask),
-            0.7 * apart_where_covered(shown_frame(alone, figure.view.world_from_camera, 1, false),
-                                      truth, mask));
+  const Truth truth = truth_of(reference, figure.view.world_from_camera, many);
+  EXPECT_LT(off_where(is_covered, last, truth),
+            0.7 * off_where(is_covered, shown_frame(alone, 1, false), truth));
 }
 
 // Walking, and after a jump, a frame shows nothing of the shape before, beyond half of what a fresh
@@ -68,12 +63,10 @@ TEST(DeformingHistory, ShowsNoGhostOfAnotherShape) {
     bend += frame < 6 ? 0.03 : frame == 6 ? 0.4 : 0.0;
     SetRenderer fresh(figure.view), reference(figure.view);
     for (SetRenderer* each : {&renderer, &fresh, &reference}) each->deform(figure.shapes(bend));
-    const Plate truth = shown_frame(reference, figure.view.world_from_camera, many, false);
-    const std::vector<float> mask = reference.layers().mask;
-    const Plate after = shown_frame(renderer, figure.view.world_from_camera, 1, true);
-    const Plate begun = shown_frame(fresh, figure.view.world_from_camera, 1, true);
-    EXPECT_LT(apart_where_covered(after, truth, mask),
-              1.5 * apart_where_covered(begun, truth, mask))
+    const Truth truth = truth_of(reference, figure.view.world_from_camera, many);
+    const Plate after = shown_frame(renderer, 1, true);
+    const Plate begun = shown_frame(fresh, 1, true);
+    EXPECT_LT(off_where(is_covered, after, truth), 1.5 * off_where(is_covered, begun, truth))
         << frame;
   }
 }

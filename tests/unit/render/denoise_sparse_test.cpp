@@ -1,6 +1,4 @@
 // Noise taken out of what few samples or few photons have brought, of pixels made by hand.
-#include <random>
-
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::denoise_sparse_test {
@@ -70,27 +68,25 @@ TEST(DenoiseSparse, KeepsAFocusOfPhotonsAndEvensOutFewOfThem) {
   std::vector<glm::vec4> surfaces(side * side, glm::vec4(0, 0, 1, 0)), caustics(side * side);
   std::mt19937 random(3);
   double drawn = 0;
-  for (int y = 0; y < side; ++y)
-    for (int x = 0; x < side; ++x) {
-      glm::vec4& caustic = caustics[static_cast<std::size_t>(y * side + x)];
-      if (in_focus(x, y)) caustic = {2, 2, 2, 4.0 / 1024};
-      if (x < side / 2 || random() % 10 != 0) continue;
-      caustic = {0.1, 0.1, 0.1, 0.01};
-      drawn += 0.1;
-    }
+  for (const auto& [x, y, i] : pixels_of(side, side)) {
+    glm::vec4& caustic = caustics[i];
+    if (in_focus(x, y)) caustic = {2, 2, 2, 4.0 / 1024};
+    if (x < side / 2 || random() % 10 != 0) continue;
+    caustic = {0.1, 0.1, 0.1, 0.01};
+    drawn += 0.1;
+  }
   const std::vector<glm::vec4> clean =
       denoised_by_hand(side, signals, variances, surfaces, false, caustics);
   double sum = 0, square = 0;
-  for (int y = 0; y < side; ++y)
-    for (int x = 0; x < side; ++x) {
-      const float value = clean[static_cast<std::size_t>(y * side + x)].r;
-      const bool is_near = std::hypot(x - 16, y - 32) < 8;
-      if (is_near) {
-        EXPECT_NEAR(value, in_focus(x, y) ? 2 : 0, 4 * 2.0 / 32) << x << ", " << y;
-      }
-      if (x > 24) sum += value;
-      if (x >= side / 2) square += std::pow(value - drawn / half, 2);
+  for (const auto& [x, y, i] : pixels_of(side, side)) {
+    const float value = clean[i].r;
+    const bool is_near = std::hypot(x - 16, y - 32) < 8;
+    if (is_near) {
+      EXPECT_NEAR(value, in_focus(x, y) ? 2 : 0, 4 * 2.0 / 32) << x << ", " << y;
     }
+    if (x > 24) sum += value;
+    if (x >= side / 2) square += std::pow(value - drawn / half, 2);
+  }
   EXPECT_NEAR(sum, drawn, 0.05 * drawn);
   EXPECT_LT(square / half, 0.1 * 0.9 * 0.01 / 10);
 }

@@ -1,22 +1,11 @@
 // Noise taken out of a composite: as much as its variance foretells, and nothing of what is no
 // noise.
-#include <numbers>
-#include <random>
-
-#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::denoise_test {
 
 constexpr int width = 96, height = 80;
-
-render::Layers render_with(SetRenderer& renderer, const View& view, int samples,
-                           std::uint32_t seed) {
-  renderer.begin({{}, 1.0, view.world_from_camera, seed});
-  renderer.render(samples);
-  expect_clean(renderer.counters());
-  return renderer.layers();
-}
+const std::vector<Pixel> all_pixels = pixels_of(width, height);
 
 // A flat wall that covers the whole picture.
 render::Layers wall(const std::function<glm::vec3(int x, int y)>& radiance, double variance = 0,
@@ -26,8 +15,7 @@ render::Layers wall(const std::function<glm::vec3(int x, int y)>& radiance, doub
   layers.height = height;
   layers.samples = 16;
   layers.white = white;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) layers.composite.push_back(radiance(x, y));
+  for (const auto& [x, y, i] : all_pixels) layers.composite.push_back(radiance(x, y));
   const std::size_t pixels = layers.composite.size();
   layers.mixed = layers.real = layers.diff = layers.composite;
   layers.normal.assign(pixels, glm::vec3(0, 0, 1));
@@ -65,16 +53,14 @@ struct Spread {
 Spread spread(const render::Layers& layers, const std::function<bool(int x, int y)>& wanted) {
   Spread s;
   double square = 0;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      if (!wanted(x, y)) continue;
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      const double value = layers.composite[i].r;
-      s.mean += value;
-      square += value * value;
-      s.foretold += layers.variance[i].r;
-      ++s.values;
-    }
+  for (const auto& [x, y, i] : all_pixels) {
+    if (!wanted(x, y)) continue;
+    const double value = layers.composite[i].r;
+    s.mean += value;
+    square += value * value;
+    s.foretold += layers.variance[i].r;
+    ++s.values;
+  }
   const auto n = static_cast<double>(s.values);
   s.mean /= n;
   s.variance = square / n - s.mean * s.mean;
@@ -186,14 +172,13 @@ TEST_P(DenoiseEdges, StayBetweenSurfaces) {
   render::Layers raw =
       wall([&](int x, int y) { return glm::vec3(left(x, y) ? 0.45f : 0.55f) + noise(x, y); },
            sigma * sigma);
-  for (int y = 0; y < height; ++y)
-    for (int x = width / 2; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      if (GetParam() == 0) raw.normal[i] = glm::vec3(1, 0, 0);
-      if (GetParam() == 1) raw.depth[i] = 2.2f;
-      if (GetParam() == 2) raw.mask[i] = 0;   // the difference is as large as the radiance
-      if (GetParam() == 3) raw.depth[i] = 0;  // nothing was met
-    }
+  for (const auto& [x, y, i] : all_pixels) {
+    if (x < width / 2) continue;
+    if (GetParam() == 0) raw.normal[i] = glm::vec3(1, 0, 0);
+    if (GetParam() == 1) raw.depth[i] = 2.2f;
+    if (GetParam() == 2) raw.mask[i] = 0;   // the difference is as large as the radiance
+    if (GetParam() == 3) raw.depth[i] = 0;  // nothing was met
+  }
   const render::Layers clean = denoised(raw);
   // Beside the edge, where the halves would be blended first: to nearly nothing of the 0.1, where
   // this leaves nine tenths of it.
@@ -209,10 +194,8 @@ TEST(Denoise, TakesASlantedPlaneForOneSurface) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> jitter(-0.5f, 0.5f);
   render::Layers raw = wall(noise_around(0.5, sigma), sigma * sigma);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x)
-      raw.depth[static_cast<std::size_t>(y) * width + x] =
-          1.0f / (0.5f + 0.004f * (static_cast<float>(y) + jitter(random)));
+  for (const auto& [x, y, i] : all_pixels)
+    raw.depth[i] = 1.0f / (0.5f + 0.004f * (static_cast<float>(y) + jitter(random)));
   EXPECT_LT(spread(denoised(raw), everywhere).variance, sigma * sigma / 50);
 }
 
@@ -260,9 +243,7 @@ TEST(Denoise, DoesNotDependOnItsBands) {
   for (const int samples : {1, 16}) {
     render::Layers raw = wall(noise_around(0.5, sigma), sigma * sigma);
     raw.samples = samples;
-    for (int y = 0; y < height; ++y)
-      for (int x = 0; x < width; ++x)
-        raw.depth[static_cast<std::size_t>(y) * width + x] = 2.0f + 0.01f * static_cast<float>(y);
+    for (const auto& [x, y, i] : all_pixels) raw.depth[i] = 2.0f + 0.01f * static_cast<float>(y);
     const render::Layers whole = denoised(raw);
     for (const std::size_t most_rows : {1, 60, 79}) {
       const render::Layers bands = denoised(raw, {}, most_rows * width);
@@ -316,14 +297,12 @@ TEST_P(DenoiseRules, KeepThePlatesTexture) {
   render::Denoiser denoiser(*shared_device());
   denoise(denoiser, clean, plate_of(camera), {GetParam(), 0});
   double square = 0;
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      const float plate = camera_at(x, y);
-      const double off =
-          clean.composite[static_cast<std::size_t>(y) * width + x].r -
-          (multiplied ? 0.5 * static_cast<double>(plate) : static_cast<double>(plate) - 0.25);
-      square += off * off / (width * height);
-    }
+  for (const auto& [x, y, i] : all_pixels) {
+    const float plate = camera_at(x, y);
+    const double off = clean.composite[i].r - (multiplied ? 0.5 * static_cast<double>(plate)
+                                                          : static_cast<double>(plate) - 0.25);
+    square += off * off / (width * height);
+  }
   EXPECT_LT(square, 0.01 / 20);
 }
 
@@ -341,19 +320,17 @@ TEST(Denoise, LeavesARealSurfaceBesideAVirtualOneBitForBit) {
         return glm::vec3(glm::dvec3(camera.end()[-3], camera.end()[-2], camera.end()[-1]));
       },
       0.01);
-  for (int y = 0; y < height; ++y)
-    for (int x = width / 3; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      raw.mask[i] = 0;
-      raw.diff[i] = glm::vec3(0);
-      raw.variance[i] = glm::vec3(0);
-    }
+  for (const auto& [x, y, i] : all_pixels) {
+    if (x < width / 3) continue;
+    raw.mask[i] = 0;
+    raw.diff[i] = glm::vec3(0);
+    raw.variance[i] = glm::vec3(0);
+  }
   const render::Layers clean = denoised(raw, plate_of(camera));
-  for (int y = 0; y < height; ++y)
-    for (int x = width / 3; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      EXPECT_EQ(clean.composite[i], raw.composite[i]) << x << ", " << y;
-    }
+  for (const auto& [x, y, i] : all_pixels) {
+    if (x < width / 3) continue;
+    EXPECT_EQ(clean.composite[i], raw.composite[i]) << x << ", " << y;
+  }
   EXPECT_LT(spread(clean, [&](int x, int) { return covered(x); }).variance, 0.01 / 20);
 }
 
@@ -366,14 +343,12 @@ TEST(Denoise, MixesAnEdgeOfItsSidesByItsOwnShare) {
   const auto share = [](int y) { return 0.2f + 0.6f * static_cast<float>(y) / height; };
   auto noise = noise_around(0, sigma);
   render::Layers raw = wall([](int, int) { return glm::vec3(0); }, sigma * sigma);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      const float mask = x < edge ? 1.0f : x > edge ? 0.0f : share(y);
-      raw.mask[i] = mask;
-      raw.mixed[i] = glm::vec3(object) + noise(x, y);
-      raw.diff[i] = glm::vec3(behind) + (x > edge ? noise(x, y) : glm::vec3(0));
-    }
+  for (const auto& [x, y, i] : all_pixels) {
+    const float mask = x < edge ? 1.0f : x > edge ? 0.0f : share(y);
+    raw.mask[i] = mask;
+    raw.mixed[i] = glm::vec3(object) + noise(x, y);
+    raw.diff[i] = glm::vec3(behind) + (x > edge ? noise(x, y) : glm::vec3(0));
+  }
   const std::vector<double> camera(3 * raw.composite.size(), 0.5);
   const render::Layers clean = denoised(raw, plate_of(camera));
   double before = 0, after = 0, bias = 0;
@@ -408,23 +383,21 @@ TEST(Denoise, LeavesAContactShadowWhereItIs) {
     std::mt19937 random(seed);
     render::Layers raw = wall([](int, int) { return glm::vec3(0); });
     raw.samples = samples;
-    for (int y = 0; y < height; ++y)
-      for (int x = foot; x < width; ++x) {
-        const auto i = static_cast<std::size_t>(y) * width + x;
-        std::binomial_distribution<int> hits(samples, 0.6 * std::exp((foot - x) / falls_over));
-        const double n = hits(random), mean = n * shadow / samples;
-        raw.mask[i] = 0;
-        raw.diff[i] = raw.mixed[i] = glm::vec3(mean);
-        raw.variance[i] = glm::vec3((n * shadow * shadow / samples - mean * mean) / (samples - 1));
-      }
+    for (const auto& [x, y, i] : all_pixels) {
+      if (x < foot) continue;
+      std::binomial_distribution<int> hits(samples, 0.6 * std::exp((foot - x) / falls_over));
+      const double n = hits(random), mean = n * shadow / samples;
+      raw.mask[i] = 0;
+      raw.diff[i] = raw.mixed[i] = glm::vec3(mean);
+      raw.variance[i] = glm::vec3((n * shadow * shadow / samples - mean * mean) / (samples - 1));
+    }
     const std::vector<double> camera(3 * raw.composite.size(), 0.5);
     const render::Layers clean = denoised(raw, plate_of(camera));
-    for (int y = 0; y < height; ++y)
-      for (int x = foot + 4; x < width; ++x) {
-        const auto i = static_cast<std::size_t>(y) * width + x;
-        drawn += raw.diff[i].r;
-        shown += clean.composite[i].r - 0.5;
-      }
+    for (const auto& [x, y, i] : all_pixels) {
+      if (x < foot + 4) continue;
+      drawn += raw.diff[i].r;
+      shown += clean.composite[i].r - 0.5;
+    }
   }
   EXPECT_LT(shown / drawn, std::exp(most_blur / (2 * falls_over * falls_over)));
   EXPECT_GT(shown / drawn, 0.97);
@@ -434,13 +407,11 @@ TEST(Denoise, LeavesAContactShadowWhereItIs) {
 TEST(Denoise, LeavesTheRimOfAnEdge) {
   constexpr int edge = width / 2;
   render::Layers raw = wall([](int, int) { return glm::vec3(0); }, 1e-6);
-  for (int y = 0; y < height; ++y)
-    for (int x = 0; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(y) * width + x;
-      raw.mask[i] = x < edge ? 1.0f : x > edge ? 0.0f : 0.5f;
-      raw.mixed[i] = glm::vec3(x == edge ? 0.9f : 0.3f);
-      raw.diff[i] = glm::vec3(0);
-    }
+  for (const auto& [x, y, i] : all_pixels) {
+    raw.mask[i] = x < edge ? 1.0f : x > edge ? 0.0f : 0.5f;
+    raw.mixed[i] = glm::vec3(x == edge ? 0.9f : 0.3f);
+    raw.diff[i] = glm::vec3(0);
+  }
   const render::Layers clean =
       denoised(raw, plate_of(std::vector<double>(3 * raw.composite.size(), 0.5)));
   for (int y = 0; y < height; ++y) {
@@ -451,11 +422,7 @@ TEST(Denoise, LeavesTheRimOfAnEdge) {
 }
 
 TEST(Denoise, ChangesNoOtherLayerAndNoUntouchedPlate) {
-  RandomScene options;
-  options.width = 70;
-  options.height = 50;
-  options.virtual_objects = 0;
-  const View view = random_scene(3, options);
+  const View view = random_scene(3, {.width = 70, .height = 50, .virtual_objects = 0});
   SetRenderer renderer(view);
   for (const int bits : {8, 16}) {
     const Plate plate = random_plate(70, 50, bits);
@@ -484,10 +451,8 @@ TEST(Denoise, KeepsTheTextureOfAnObject) {
   constexpr int columns = 64, rows = 48;
   constexpr double mean_albedo = 0.5, amplitude = 0.4, period_px = 8;
   const auto wall_with = [](bool stripes) {
-    View view;
-    scene::Texture texture;
-    texture.width = 4 * columns;
-    texture.height = 1;
+    View view = empty_view({0, 0, 2}, {0, 0, 0}, pinhole(columns, rows, 2 * std::atan(0.5)));
+    scene::Texture texture = texture_of(4 * columns, 1);
     for (int x = 0; x < texture.width; ++x) {
       const double phase = 2 * std::numbers::pi * (x + 0.5) / 4 / period_px;
       const double albedo = mean_albedo + (stripes ? amplitude * std::sin(phase) : 0);
@@ -496,22 +461,18 @@ TEST(Denoise, KeepsTheTextureOfAnObject) {
     scene::Material paint = diffuse(glm::vec3(1));
     paint.base_color_texture = add_texture(view.scene, texture);
     // Two metres before a camera that sees two metres: the texture is as wide as the picture.
-    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
-                 add_material(view.scene, paint), glm::dmat4(1), scene::world_mixed);
+    add(view.scene, rectangle_mesh({2, 2}), paint, glm::dmat4(1), scene::world_mixed);
     for (const double side : {-1.0, 1.0}) {
       set::Light panel = lamp(set::LightType::rectangle, glm::dvec3(2));
       panel.position = {2 * side, 0, 3};
       view.scene.lights.push_back(panel);
     }
-    view.environment = uniform_environment(glm::vec3(0));
-    view.calibration = pinhole(columns, rows, 2 * std::atan(0.5));
-    view.world_from_camera = look_at({0, 0, 2}, {0, 0, 0});
     return view;
   };
   const auto error_of = [](const View& view) {
     SetRenderer renderer(view, up_to_depth(1));
-    const render::Layers truth = render_with(renderer, view, 128, 9);
-    render::Layers clean = render_with(renderer, view, 1, 1);
+    const render::Layers truth = renderer.rendered_clean(128, 9);
+    render::Layers clean = renderer.rendered_clean(1, 1);
     renderer.show(true, &clean);
     double square = 0;
     for (std::size_t i = 0; i < truth.composite.size(); ++i)
@@ -529,13 +490,10 @@ TEST(Denoise, KeepsTheTextureOfAnObject) {
 // as many more samples would. The limit's own noise, at most 16 / 512 = 3 % of the raw picture's
 // squared error, is in both of the errors that are compared.
 TEST(Denoise, BringsARenderedPictureNearerToItsLimit) {
-  RandomScene options;
-  options.width = 96;
-  options.height = 72;
   for (const unsigned seed : {2u, 3u}) {
-    const View view = random_scene(seed, options);
+    const View view = random_scene(seed, {.width = 96, .height = 72});
     SetRenderer renderer(view);
-    const render::Layers limit = render_with(renderer, view, 512, 99);
+    const render::Layers limit = renderer.rendered_clean(512, 99);
     const auto error = [&](const render::Layers& layers) {
       double sum = 0;
       for (std::size_t i = 0; i < layers.composite.size(); ++i) {
@@ -547,7 +505,7 @@ TEST(Denoise, BringsARenderedPictureNearerToItsLimit) {
     };
     double before = 1e9;
     for (const int samples : {1, 4, 16}) {
-      const render::Layers raw = render_with(renderer, view, samples, 1);
+      const render::Layers raw = renderer.rendered_clean(samples, 1);
       render::Layers clean = raw;
       renderer.show(true, &clean);
       EXPECT_LT(error(clean), std::sqrt(0.9) * error(raw)) << seed << ", " << samples << " samples";

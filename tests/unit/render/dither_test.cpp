@@ -1,11 +1,6 @@
 // Dithering: a difference of the worlds that is less than a code has the right mean, the pattern is
 // of high frequencies, and the plate stays what it is.
-#include <algorithm>
-#include <cmath>
-#include <numbers>
-
 #include "daemon/render/blue_noise.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::dither_test {
@@ -46,17 +41,12 @@ TEST(BlueNoise, HasNoLongWaves) {
 
 // A floor under an even sky, and a virtual box whose shadow fades out over it.
 View shadowed_floor() {
-  View view;
+  View view = empty_view({0, -2, 1.4}, {0, 0, 0}, pinhole(96, 80, 0.9), glm::vec3(0.4f));
   scene::Scene& scene = view.scene;
   const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
-  add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
-  glm::dmat4 pose(1);
-  pose[3] = {3.2, -0.5, 0.5, 1};
-  add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.5))), gray, pose, scene::world_mixed);
-  view.environment = uniform_environment(glm::vec3(0.4f));
-  view.calibration = pinhole(96, 80, 0.9);
+  add(scene, rectangle_mesh(glm::dvec2(20)), gray);
+  add(scene, box_mesh(glm::dvec3(0.5)), gray, at({3.2, -0.5, 0.5}), scene::world_mixed);
   view.calibration.response.kind = ResponseCurve::Kind::linear;
-  view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
   return view;
 }
 

@@ -1,8 +1,5 @@
 // Pixels that are partly covered or defocused (P18): where the plate is the renderer's own
 // converged real world, the composite must be its mixed world, on every pixel.
-#include <algorithm>
-
-#include "drivers/plate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::edge_test {
@@ -19,30 +16,21 @@ struct Picture {
 template <typename Pick>
 Picture converge(const View& view, const Plate& plate, set::Estimator estimator, std::uint32_t seed,
                  Pick pick) {
-  set::Estimation estimation;
-  estimation.estimator = estimator;
-  estimation.max_depth = 3;
-  render::Renderer renderer(shared_device(), estimation, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, set::LightSampling::importance);
+  SetRenderer renderer(view, up_to_depth(3, estimator));
   Picture result;
-  result.mean.resize(width * height);
-  result.error.resize(width * height);
+  std::vector<std::vector<glm::dvec3>> values(width * height);  // by pixel
   for (int i = 0; i < scrambles; ++i) {
     renderer.begin(
         {std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera, seed + i});
     renderer.render(32);
     expect_clean(renderer.counters());
     const std::vector<glm::vec3> layer = pick(renderer.layers());
-    for (std::size_t p = 0; p < layer.size(); ++p) {
-      const glm::dvec3 value(layer[p]);
-      result.mean[p] += value / static_cast<double>(scrambles);
-      result.error[p] += value * value / static_cast<double>(scrambles);
-    }
+    for (std::size_t p = 0; p < layer.size(); ++p) values[p].emplace_back(layer[p]);
   }
-  for (std::size_t p = 0; p < result.mean.size(); ++p) {
-    const glm::dvec3 variance = result.error[p] - result.mean[p] * result.mean[p];
-    result.error[p] = glm::sqrt(glm::max(variance, glm::dvec3(0)) / (scrambles - 1.0));
+  for (const std::vector<glm::dvec3>& of_pixel : values) {
+    const auto [mean, error] = estimate_of(of_pixel);
+    result.mean.push_back(mean);
+    result.error.push_back(error);
   }
   return result;
 }
@@ -50,36 +38,20 @@ Picture converge(const View& view, const Plate& plate, set::Estimator estimator,
 // A black and white floor of stripes as wide as two pixels, so that edges cross the object's; a
 // virtual box on it, and a real one that is taken away.
 View striped_set() {
-  View view;
+  View view =
+      empty_view({0.1, -0.9, 0.8}, {0, 0, 0.05}, pinhole(width, height, 0.8), {1, 1.1f, 1.2f});
   const auto stripe = add_mesh(view.scene, rectangle_mesh({0.05, 2}));
   const auto black = add_material(view.scene, diffuse(glm::vec3(0.02f)));
   const auto bright = add_material(view.scene, diffuse(glm::vec3(0.9f)));
   for (int i = -20; i < 20; ++i) {
-    glm::dmat4 pose(1);
-    pose[3] = {0.05 * i, 0, 0, 1};
-    add_instance(view.scene, stripe, i % 2 == 0 ? black : bright, pose);
+    add_instance(view.scene, stripe, i % 2 == 0 ? black : bright, at({0.05 * i, 0, 0}));
   }
   const auto box = add_mesh(view.scene, box_mesh({0.2, 0.2, 0.2}));
   const auto red = add_material(view.scene, diffuse({0.7f, 0.2f, 0.1f}));
-  glm::dmat4 pose(1);
-  pose[3] = {-0.213, 0.05, 0.1, 1};
-  add_instance(view.scene, box, red, pose, scene::world_mixed);
-  pose[3] = {0.227, -0.03, 0.1, 1};
-  add_instance(view.scene, box, red, pose, scene::world_real);
-  view.environment = uniform_environment({1, 1.1f, 1.2f});
-  view.calibration = pinhole(width, height, 0.8);
+  add_instance(view.scene, box, red, at({-0.213, 0.05, 0.1}), scene::world_mixed);
+  add_instance(view.scene, box, red, at({0.227, -0.03, 0.1}), scene::world_real);
   view.calibration.response.kind = ResponseCurve::Kind::linear;
-  view.world_from_camera = look_at({0.1, -0.9, 0.8}, {0, 0, 0.05});
   return view;
-}
-
-Plate plate_of(const Picture& picture) {
-  Plate plate{width, height, 16, {}};
-  for (const glm::dvec3& radiance : picture.mean)
-    for (int c = 0; c < 3; ++c)
-      plate.samples.push_back(
-          static_cast<std::uint16_t>(std::lround(65535 * std::min(radiance[c] / white, 1.0))));
-  return plate;
 }
 
 void expect_seamless(const View& view, set::Estimator estimator) {
@@ -88,7 +60,8 @@ void expect_seamless(const View& view, set::Estimator estimator) {
   const auto composite = [](const render::Layers& layers) { return layers.composite; };
   const Picture plate_picture = converge(view, {}, set::Estimator::paired, 100, real);
   const Picture truth = converge(view, {}, set::Estimator::paired, 200, mixed);
-  const Picture composited = converge(view, plate_of(plate_picture), estimator, 300, composite);
+  const Picture composited = converge(view, linear_plate(width, height, plate_picture.mean, white),
+                                      estimator, 300, composite);
   int beyond = 0;
   double sum = 0, square = 0;
   for (std::size_t p = 0; p < truth.mean.size(); ++p) {
@@ -107,15 +80,13 @@ void expect_seamless(const View& view, set::Estimator estimator) {
 }
 
 TEST(Edges, AreSeamlessInFocus) {
-  expect_seamless(striped_set(), set::Estimator::paired);
-  expect_seamless(striped_set(), set::Estimator::difference);
+  for (const auto estimator : both_estimators) expect_seamless(striped_set(), estimator);
 }
 
 TEST(Edges, AreSeamlessOutOfFocus) {
   View view = striped_set();
   view.calibration.lens = ThinLens{0.05, 0.8, 0.7};  // objects are 0.4 m behind the focus
-  expect_seamless(view, set::Estimator::paired);
-  expect_seamless(view, set::Estimator::difference);
+  for (const auto estimator : both_estimators) expect_seamless(view, estimator);
 }
 
 }  // namespace previz::test::edge_test

@@ -6,10 +6,12 @@
 
 namespace previz::test::feature_test {
 
-class Features : public ::testing::Test {
- protected:
+using scene::Material;
+
+// A set whose objects are boxes.
+struct Scenario {
   void add(const scene::Material& material, std::uint32_t presence = scene::world_both) {
-    add_instance(scene, mesh, add_material(scene, material), glm::dmat4(1.0), presence);
+    add_instance(scene, mesh, add_material(scene, material), glm::dmat4(1), presence);
   }
 
   bool needs(const std::string& name) const {
@@ -34,6 +36,8 @@ class Features : public ::testing::Test {
   set::Set set;
   std::uint32_t mesh = add_mesh(scene, box_mesh({1, 1, 1}));
 };
+
+class Features : public ::testing::Test, protected Scenario {};
 
 // All FEATURE_* bits that the shaders know.
 std::uint32_t bits_of_shaders() {
@@ -66,6 +70,135 @@ TEST(FeatureTable, HasEachFeatureOnce) {
   EXPECT_EQ(bits, bits_of_shaders());
 }
 
+// A material that differs from another in some ways.
+Material but(Material material, void (*change)(Material&)) {
+  change(material);
+  return material;
+}
+
+Material coloured_glass(const glm::vec3& color) {
+  Material material = glass(1.5f);
+  material.attenuation_distance_m = 0.1f;
+  material.attenuation_color = color;
+  return material;
+}
+
+Material under_sheen(Material material) {
+  material.sheen_color = {0, 0.1f, 0};
+  return material;
+}
+
+Material brushed(Material material) {
+  material.anisotropy = 0.5f;
+  return material;
+}
+
+Material coloured_gloss(float metallic) {
+  Material material = metal({1, 1, 1}, 0.3f);
+  material.metallic = metallic;
+  material.specular_color = {1, 0, 0};
+  return material;
+}
+
+Material see_through(scene::AlphaMode mode, float alpha,
+                     std::uint32_t texture = scene::no_texture) {
+  Material material = diffuse({1, 1, 1});
+  material.alpha_mode = mode;
+  material.alpha = alpha;
+  material.base_color_texture = texture;
+  return material;
+}
+
+// What objects are made of, and some of the features that they do and do not need.
+struct Row {
+  const char* what;
+  std::vector<Material> materials;
+  std::vector<const char*> needed, not_needed = {};
+  std::optional<scene::Texture> texture = {};  // the materials' texture 0
+};
+
+const glm::vec3 white(1), green(0.1f, 0.8f, 0.3f);
+using enum scene::AlphaMode;
+
+const Row rows[] = {
+    {"glass, which has no opaque part", {glass(1.5f)}, {"refraction"}, {"gloss", "metal"}},
+    {"glass and a mirror",
+     {glass(1.5f), metal(white, 0)},
+     {"metal", "gloss"},
+     {"glowing surfaces", "lamps"}},
+    {"twelve triangles that glow, and are found as surfaces",
+     {emitter({1, 0, 0})},
+     {"glowing surfaces", "lamps", "many lamps"},
+     {"lamps in view"}},
+    {"glass that takes nothing away", {coloured_glass(white)}, {}, {"coloured glass"}},
+    {"a coloured pane, which has no inside",
+     {but(coloured_glass(green), [](Material& m) { m.thin_walled = true; })},
+     {},
+     {"coloured glass"}},
+    {"coloured glass", {coloured_glass(green)}, {"coloured glass"}},
+    {"an index of 1, which reflects nothing", {plastic(white, 0.5f, 1)}, {}, {"gloss"}},
+    {"plastic", {plastic(white, 0.3f)}, {"gloss"}, {"cloth", "brushed metal", "coloured gloss"}},
+    {"cloth", {under_sheen(diffuse(white))}, {"cloth"}},
+    {"strokes on what does not reflect", {brushed(diffuse(white))}, {}, {"brushed metal"}},
+    {"strokes on what lets light through", {brushed(glass(1.5f))}, {}, {"brushed metal"}},
+    {"brushed metal", {brushed(metal(white, 0.3f))}, {"brushed metal"}},
+    {"metal, which has no coat", {coloured_gloss(1)}, {}, {"coloured gloss"}},
+    {"coloured gloss", {coloured_gloss(0)}, {"coloured gloss"}},
+    {"a pane that fibres stand on, which is no clear view", {under_sheen(pane())}, {}, {"panes"}},
+    {"a pane", {pane()}, {"panes"}},
+    {"normals of a texture",
+     {but(diffuse(white), [](Material& m) { m.normal_texture = 0; })},
+     {"textures", "normal maps"},
+     {},
+     texture_of(glm::vec4(1))},
+    {"rough glass and rough metal",
+     {but(glass(1.5f), [](Material& m) { m.roughness = 0.3f; }), metal(white, 0.2f)},
+     {},
+     {"photons"}},
+    {"rough metal that a texture makes a mirror somewhere",
+     {but(metal(white, 0.2f), [](Material& m) { m.metallic_roughness_texture = 0; })},
+     {"photons"},
+     {},
+     texture_of(2, 1, {{1, 1, 1, 1}, {1, 0, 1, 1}})},
+    {"metal, which does not transmit",
+     {but(glass(1.5f), [](Material& m) { m.metallic = 1; })},
+     {},
+     {"refraction"}},
+    {"metal that a texture takes away",
+     {but(glass(1.5f),
+          [](Material& m) {
+            m.metallic = 1;
+            m.metallic_roughness_texture = 0;
+          })},
+     {"refraction"},
+     {},
+     texture_of({1, 1, 0, 1})},
+    {"alpha of what is opaque", {see_through(opaque, 0.8f)}, {}, {"alpha"}},
+    {"0.8, above the cut-off of 0.5", {see_through(mask, 0.8f)}, {}, {"alpha"}},
+    {"0.48, below it", {see_through(mask, 0.8f, 0)}, {"alpha"}, {}, texture_of({1, 1, 1, 0.6f})},
+    {"a veil", {see_through(blend, 0.8f)}, {"alpha"}},
+    {"a veil of 1", {see_through(blend, 1)}, {}, {"alpha"}},
+    // The shaders read texels as halves, whose neighbours below 1 are 2^-11 apart.
+    {"1 as a half", {see_through(blend, 1, 0)}, {}, {"alpha"}, texture_of({1, 1, 1, 0.9999f})},
+    {"less than 1", {see_through(blend, 1, 0)}, {"alpha"}, {}, texture_of({1, 1, 1, 0.999f})},
+    {"above the cut-off as a float, and at 0.5, below it, as a half",
+     {but(see_through(mask, 1, 0), [](Material& m) { m.alpha_cutoff = 0.50005f; })},
+     {"alpha"},
+     {},
+     texture_of({1, 1, 1, 0.5001f})},
+};
+
+TEST(FeaturesOf, Materials) {
+  for (const Row& row : rows) {
+    SCOPED_TRACE(row.what);
+    Scenario scenario;
+    if (row.texture) add_texture(scenario.scene, *row.texture);
+    for (const Material& material : row.materials) scenario.add(material);
+    for (const char* feature : row.needed) EXPECT_TRUE(scenario.needs(feature)) << feature;
+    for (const char* feature : row.not_needed) EXPECT_FALSE(scenario.needs(feature)) << feature;
+  }
+}
+
 TEST_F(Features, ADiffuseRealSceneNeedsNothing) {
   set.lighting.from = set::LightFrom::set;
   set.quality.denoise = false;
@@ -87,44 +220,11 @@ TEST_F(Features, ASceneCountsMeshesOnceAndInstancesEach) {
   EXPECT_EQ(size.instanced_triangles, 36u);
 }
 
-TEST_F(Features, ReadMaterials) {
-  add(glass(1.5f));
-  EXPECT_TRUE(needs("refraction"));
-  EXPECT_FALSE(needs("gloss"));  // no opaque part
-  EXPECT_FALSE(needs("metal"));
-  add(metal({1, 1, 1}, 0));
-  EXPECT_TRUE(needs("metal"));
-  EXPECT_TRUE(needs("gloss"));
-  EXPECT_FALSE(needs("glowing surfaces"));
-  EXPECT_FALSE(needs("lamps"));
-  add(emitter({1, 0, 0}));
-  EXPECT_TRUE(needs("glowing surfaces"));
-  EXPECT_TRUE(needs("lamps"));
-  EXPECT_FALSE(needs("lamps in view"));  // found as surfaces
-}
-
-TEST_F(Features, ManyLampsAreFiveOrGlowingTriangles) {
+TEST_F(Features, ManyLampsAreFive) {
   for (int i = 0; i < 4; ++i) scene.lights.push_back(lamp(set::LightType::point));
   EXPECT_FALSE(needs("many lamps"));
   scene.lights.push_back(lamp(set::LightType::point));
   EXPECT_TRUE(needs("many lamps"));
-  scene.lights.clear();
-  add(emitter({1, 1, 1}));  // a box has twelve
-  EXPECT_TRUE(needs("many lamps"));
-}
-
-TEST_F(Features, GlassIsColouredWhereItsInsideTakesLightAway) {
-  scene::Material bottle = glass(1.5f);
-  bottle.attenuation_distance_m = 0.1f;
-  add(bottle);
-  EXPECT_FALSE(needs("coloured glass"));  // white takes nothing away
-  bottle.attenuation_color = {0.1f, 0.8f, 0.3f};
-  bottle.thin_walled = true;
-  add(bottle);
-  EXPECT_FALSE(needs("coloured glass"));  // a pane has no inside
-  bottle.thin_walled = false;
-  add(bottle);
-  EXPECT_TRUE(needs("coloured glass"));
 }
 
 TEST_F(Features, AnAnimatedShapeIsADeformingObject) {
@@ -144,75 +244,21 @@ TEST_F(Features, MaterialsOfWhatCannotBeHitDoNotCount) {
   EXPECT_FALSE(needs("refraction") || needs("photons"));
 }
 
-TEST_F(Features, ThereIsGlossWhereACoatOrMetalReflects) {
-  add(plastic({1, 1, 1}, 0.5f, 1.0f));  // an ior of 1 reflects nothing
-  EXPECT_FALSE(needs("gloss"));
-  add(plastic({1, 1, 1}, 0.3f));
-  EXPECT_TRUE(needs("gloss"));
-}
-
-TEST_F(Features, ReadLayersAndBrushStrokes) {
-  add(plastic({1, 1, 1}, 0.3f));
-  EXPECT_FALSE(needs("cloth") || needs("brushed metal") || needs("coloured gloss"));
-  scene::Material cloth = diffuse({1, 1, 1});
-  cloth.sheen_color = {0, 0.1f, 0};
-  add(cloth);
-  EXPECT_TRUE(needs("cloth"));
-  scene::Material brushed = diffuse({1, 1, 1});
-  brushed.anisotropy = 0.5f;
-  add(brushed);
-  EXPECT_FALSE(needs("brushed metal"));  // it does not reflect
-  brushed = glass(1.5f);
-  brushed.anisotropy = 0.5f;
-  add(brushed);
-  EXPECT_FALSE(needs("brushed metal"));  // what lets light through is left as it is
-  brushed = metal({1, 1, 1}, 0.3f);
-  brushed.anisotropy = 0.5f;
-  add(brushed);
-  EXPECT_TRUE(needs("brushed metal"));
-  scene::Material gloss = metal({1, 1, 1}, 0.3f);
-  gloss.specular_color = {1, 0, 0};
-  add(gloss);
-  EXPECT_FALSE(needs("coloured gloss"));  // metal has no coat
-  gloss.metallic = 0;
-  add(gloss);
-  EXPECT_TRUE(needs("coloured gloss"));
-}
-
-// A pane that fibres stand on is no clear view.
-TEST_F(Features, APaneWithSheenIsNone) {
-  scene::Material pane = glass(1.5f);
-  pane.thin_walled = true;
-  pane.sheen_color = {0.5f, 0.5f, 0.5f};
-  add(pane);
-  EXPECT_FALSE(needs("panes"));
-  pane.sheen_color = {0, 0, 0};
-  add(pane);
-  EXPECT_TRUE(needs("panes"));
-}
-
 TEST_F(Features, TexturesAreThoseOfMaterialsInUse) {
-  scene::Texture texture;
-  texture.width = texture.height = 1;
-  texture.texels = {{1, 1, 1, 1}};
-  scene::Material material = diffuse({1, 1, 1});
-  material.normal_texture = add_texture(scene, texture);
+  Material material = diffuse({1, 1, 1});
+  material.normal_texture = add_texture(scene, texture_of(glm::vec4(1)));
   add_material(scene, material);
   EXPECT_FALSE(needs("textures"));
   add(material);
   EXPECT_TRUE(needs("textures"));
-  EXPECT_TRUE(needs("normal maps"));
 }
 
 TEST_F(Features, TexturesAreFilteredWhereTheSetAsksForIt) {
-  scene::Texture texture;
-  texture.width = texture.height = 1;
-  texture.texels = {{1, 1, 1, 1}};
-  scene::Material material = diffuse({1, 1, 1});
+  Material material = diffuse({1, 1, 1});
   set.estimation.filter_textures = true;
   add(material);
   EXPECT_FALSE(needs("filtered textures"));
-  material.normal_texture = add_texture(scene, texture);
+  material.normal_texture = add_texture(scene, texture_of(glm::vec4(1)));
   add(material);
   EXPECT_FALSE(needs("filtered textures"));  // normals are not filtered
   material.base_color_texture = material.normal_texture;
@@ -220,23 +266,6 @@ TEST_F(Features, TexturesAreFilteredWhereTheSetAsksForIt) {
   EXPECT_TRUE(needs("filtered textures"));
   set.estimation.filter_textures = false;
   EXPECT_FALSE(needs("filtered textures"));
-}
-
-TEST_F(Features, PhotonsNeedAClearInterface) {
-  scene::Material material = glass(1.5f);
-  material.roughness = 0.3f;
-  add(material);
-  add(metal({1, 1, 1}, 0.2f));
-  EXPECT_FALSE(needs("photons"));
-  // Where a texture makes it smooth, a rough metal is a mirror.
-  scene::Texture texture;
-  texture.width = 2;
-  texture.height = 1;
-  texture.texels = {{1, 1, 1, 1}, {1, 0, 1, 1}};
-  scene::Material polished = metal({1, 1, 1}, 0.2f);
-  polished.metallic_roughness_texture = add_texture(scene, texture);
-  add(polished);
-  EXPECT_TRUE(needs("photons"));
 }
 
 TEST_F(Features, AMirrorIsSmoothBelowTheSetsThreshold) {
@@ -260,67 +289,6 @@ TEST_F(Features, PhotonsNeedLightAndTheSetsWish) {
   EXPECT_FALSE(needs("photons"));
   scene.lights = {lamp(set::LightType::point)};
   EXPECT_TRUE(needs("photons"));
-}
-
-TEST_F(Features, AMetalDoesNotTransmit) {
-  scene::Material material = glass(1.5f);
-  material.metallic = 1;
-  add(material);
-  EXPECT_FALSE(needs("refraction"));
-  scene::Texture no_metal;
-  no_metal.width = no_metal.height = 1;
-  no_metal.texels = {{1, 1, 0, 1}};
-  material.metallic_roughness_texture = add_texture(scene, no_metal);
-  add(material);
-  EXPECT_TRUE(needs("refraction"));
-}
-
-TEST_F(Features, AlphaCountsOnlyWhereItCanLetThrough) {
-  scene::Texture texture;
-  texture.width = texture.height = 1;
-  texture.texels = {{1, 1, 1, 0.6f}};
-  scene::Material material = diffuse({1, 1, 1});
-  material.alpha = 0.8f;
-  add(material);
-  EXPECT_FALSE(needs("alpha"));  // opaque
-  material.alpha_mode = scene::AlphaMode::mask;
-  add(material);
-  EXPECT_FALSE(needs("alpha"));  // 0.8 is above the cut-off of 0.5
-  material.base_color_texture = add_texture(scene, texture);
-  add(material);
-  EXPECT_TRUE(needs("alpha"));  // 0.48 is not
-  scene.instances.clear();
-  material.alpha_mode = scene::AlphaMode::blend;
-  material.base_color_texture = scene::no_texture;
-  add(material);
-  EXPECT_TRUE(needs("alpha"));
-  material.alpha = 1;
-  scene.instances.clear();
-  add(material);
-  EXPECT_FALSE(needs("alpha"));
-}
-
-// The shaders read texels as halves, whose neighbours below 1 are 2^-11 apart.
-TEST_F(Features, AlphaIsReadAsTheShadersReadIt) {
-  scene::Texture texture;
-  texture.width = texture.height = 1;
-  scene::Material material = diffuse({1, 1, 1});
-  material.alpha_mode = scene::AlphaMode::blend;
-  for (const float alpha : {0.9999f, 0.999f}) {
-    texture.texels = {{1, 1, 1, alpha}};
-    material.base_color_texture = add_texture(scene, texture);
-    scene.instances.clear();
-    add(material);
-    EXPECT_EQ(needs("alpha"), alpha < 0.9995f) << alpha;
-  }
-  // Above the cut-off as a float, and at 0.5, below it, as a half.
-  texture.texels = {{1, 1, 1, 0.5001f}};
-  material.alpha_mode = scene::AlphaMode::mask;
-  material.alpha_cutoff = 0.50005f;
-  material.base_color_texture = add_texture(scene, texture);
-  scene.instances.clear();
-  add(material);
-  EXPECT_TRUE(needs("alpha"));
 }
 
 TEST_F(Features, ReadPresence) {

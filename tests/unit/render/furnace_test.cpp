@@ -1,22 +1,17 @@
 // White furnaces: where the light around is the same from everywhere, what a surface shows has a
 // closed form.
-#include <numbers>
-
+#include "tests/support/ggx_albedo.hpp"
 #include "tests/support/render_fixture.hpp"
+#include "tests/truth/cpu_bsdf.hpp"
 
 namespace previz::test::furnace_test {
-
-constexpr double pi = std::numbers::pi;
 
 // A large square at the origin in a uniform environment of radiance 1, seen under an angle from its
 // normal by a camera whose picture is so narrow that the angle is the same in all of it.
 View tilted_plane(const scene::Material& material, double angle_rad) {
-  View view;
-  const auto mesh = add_mesh(view.scene, rectangle_mesh({2, 2}));
-  add_instance(view.scene, mesh, add_material(view.scene, material));
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(32, 32, 1e-3);
-  view.world_from_camera = look_at({0, -std::sin(angle_rad), std::cos(angle_rad)}, {0, 0, 0});
+  View view = empty_view({0, -std::sin(angle_rad), std::cos(angle_rad)}, {0, 0, 0},
+                         pinhole(32, 32, 1e-3), glm::vec3(1));
+  add(view.scene, rectangle_mesh({2, 2}), material);
   return view;
 }
 
@@ -35,38 +30,6 @@ TEST(Furnace, AnEmptySceneShowsTheEnvironmentExactly) {
   view.calibration = pinhole(33, 17, 0.9);
   const Rendered result = render_clean(view, 3);
   for (const glm::vec3& pixel : result.layers.mixed) EXPECT_EQ(pixel, glm::vec3(0.25f, 0.5f, 2.0f));
-}
-
-// Directional albedo of GGX with Schlick's reflectance f0, by quadrature over the half vector's
-// hemisphere (Walter et al. 2007; height-correlated Smith, Heitz 2014). Single scattering only.
-double ggx_albedo(double cos_o, double alpha, double f0) {
-  const glm::dvec3 o(std::sqrt(1 - cos_o * cos_o), 0, cos_o);
-  const auto lambda = [&](double z) {
-    return 0.5 * (std::sqrt(1 + alpha * alpha * (1 - z * z) / (z * z)) - 1);
-  };
-  constexpr int steps = 2000;
-  double sum = 0;
-  for (int a = 0; a < steps; ++a) {
-    // The half vector's tangent is alpha tan(pi u / 2): even steps where the lobe is.
-    const double angle = (a + 0.5) / steps * pi / 2;
-    const double tangent = alpha * std::tan(angle);
-    const double z = 1 / std::sqrt(1 + tangent * tangent);
-    const double dtheta = alpha / (std::cos(angle) * std::cos(angle)) * z * z * pi / 2 / steps;
-    const double d = 1 / (pi * alpha * alpha * std::pow(z, 4) *
-                          std::pow(1 + tangent * tangent / (alpha * alpha), 2));
-    for (int b = 0; b < 400; ++b) {
-      const double phi = (b + 0.5) / 400 * 2 * pi;
-      const glm::dvec3 h(z * tangent * std::cos(phi), z * tangent * std::sin(phi), z);
-      const double oh = glm::dot(o, h);
-      const glm::dvec3 i = 2 * oh * h - o;
-      if (oh <= 0 || i.z <= 0) continue;
-      const double masking = 1 / (1 + lambda(cos_o) + lambda(i.z));
-      const double reflectance = f0 + (1 - f0) * std::pow(1 - oh, 5);
-      // dw_i = 4 (o.h) dw_h
-      sum += reflectance * d * masking / (4 * cos_o) * 4 * oh * z * tangent * dtheta * 2 * pi / 400;
-    }
-  }
-  return sum;
 }
 
 // The renderer reads what single scattering loses from a table. Between its nodes bilinear
@@ -103,11 +66,8 @@ scene::Material lacquered(scene::Material below, float roughness) {
 // that nothing is lost but what single scattering loses in rough lacquer.
 TEST(Furnace, LacquerReflectsItsShareAndLeavesTheRest) {
   for (const double angle : {0.1, 1.2}) {
-    const double cosine = std::cos(angle), eta = 1.5;
-    const double behind = std::sqrt(1 - (1 - cosine * cosine) / (eta * eta));
-    const double parallel = (eta * cosine - behind) / (eta * cosine + behind);
-    const double across = (cosine - eta * behind) / (cosine + eta * behind);
-    const double share = 0.8 * 0.5 * (parallel * parallel + across * across);
+    const double cosine = std::cos(angle);
+    const double share = 0.8 * truth::fresnel_dielectric(cosine, 1.5);
     const View black = tilted_plane(lacquered(diffuse(glm::vec3(0)), 0), angle);
     // The angle varies by 5e-4 over the picture; the slope of the reflectance is below 2.
     EXPECT_NEAR(mean_mixed(render_clean(black, 1).layers), share, 1e-3);
@@ -146,15 +106,11 @@ TEST(Furnace, ARoughPaneTakesNothing) {
 TEST(Furnace, ARoughGlassBoxTakesNothing) {
   for (const float ior : {1.0f, 1.0001f, 1.5f, 2.5f}) {
     for (const float roughness : {0.1f, 0.5f, 1.0f}) {
-      View view;
-      const auto mesh = add_mesh(view.scene, box_mesh({1, 1, 1}));
-      add_instance(view.scene, mesh, add_material(view.scene, rough_glass(ior, roughness, false)));
-      view.environment = uniform_environment(glm::vec3(1));
-      view.calibration = pinhole(16, 16, 0.2);
-      view.world_from_camera = look_at({0.3, -3, 0.4}, {0, 0, 0});
-      set::Estimation estimation = up_to_depth(64);
-      estimation.caustics = set::Caustics::traced;  // photons are counted with the paths
-      const Rendered result = render_clean(view, 32, estimation);
+      View view = empty_view({0.3, -3, 0.4}, {0, 0, 0}, pinhole(16, 16, 0.2), glm::vec3(1));
+      add(view.scene, box_mesh({1, 1, 1}), rough_glass(ior, roughness, false));
+      // Photons would be counted with the paths.
+      const Rendered result =
+          render_clean(view, 32, {.max_depth = 64, .caustics = set::Caustics::traced});
       const double samples = 32.0 * 16 * 16;
       const double vertices = static_cast<double>(result.counters.rays) / samples - 1;
       EXPECT_NEAR(mean_mixed(result.layers), 1, tolerance(result.layers) + vertices * table_error)
@@ -167,16 +123,9 @@ TEST(Furnace, ARoughGlassBoxTakesNothing) {
 TEST(Furnace, GlassBelowATextureOfNoMetalTakesNothing) {
   scene::Material material = rough_glass(1.5f, 0.5f, false);
   material.metallic = 1;
-  View view;
-  scene::Texture no_metal;
-  no_metal.width = no_metal.height = 1;
-  no_metal.texels = {{1, 1, 0, 1}};
-  material.metallic_roughness_texture = add_texture(view.scene, no_metal);
-  add_instance(view.scene, add_mesh(view.scene, box_mesh({1, 1, 1})),
-               add_material(view.scene, material));
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(16, 16, 0.2);
-  view.world_from_camera = look_at({0.3, -3, 0.4}, {0, 0, 0});
+  View view = empty_view({0.3, -3, 0.4}, {0, 0, 0}, pinhole(16, 16, 0.2), glm::vec3(1));
+  material.metallic_roughness_texture = add_texture(view.scene, texture_of({1, 1, 0, 1}));
+  add(view.scene, box_mesh({1, 1, 1}), material);
   const Rendered textured = render_clean(view, 8, up_to_depth(64));
   view.scene.materials[0].metallic_roughness_texture = scene::no_texture;
   view.scene.materials[0].metallic = 0;
@@ -196,16 +145,12 @@ TEST(Furnace, ASmoothMirrorShowsSchlickAndTheEnvironmentBehindIt) {
 // which is the same box.
 TEST(Furnace, MirroredGlassIsEnteredFromOutside) {
   const auto seen = [](double side) {
-    View view;
-    const auto box = add_mesh(view.scene, box_mesh({1, 1, 1}));
+    View view = empty_view({1.2, -1.7, 1}, {0, 0, 0}, pinhole(24, 24, 0.6));
     glm::dmat4 placed(1.0);
     placed[0] *= side;
-    add_instance(view.scene, box, add_material(view.scene, glass(1.5f)), placed);
-    view.environment = uniform_environment(glm::vec3(0));
+    add(view.scene, box_mesh({1, 1, 1}), glass(1.5f), placed);
     for (std::size_t i = 0; i < view.environment.radiance.size(); i += 3)
       view.environment.radiance[i] = glm::vec3(1, 2, 3);
-    view.calibration = pinhole(24, 24, 0.6);
-    view.world_from_camera = look_at({1.2, -1.7, 1}, {0, 0, 0});
     return mean(render_view(view, 64).layers.mixed);
   };
   const glm::dvec3 plain = seen(1), mirrored = seen(-1);
@@ -214,7 +159,7 @@ TEST(Furnace, MirroredGlassIsEnteredFromOutside) {
   if (!render::is_gpu(*shared_device())) {
     EXPECT_EQ(plain, mirrored);
   }
-  for (int c = 0; c < 3; ++c) EXPECT_NEAR(mirrored[c] / plain[c], 1, 1e-6);
+  expect_near(mirrored / plain, glm::dvec3(1), 1e-6);
 }
 
 // Lower plane emits 1 and reflects a, upper reflects b: L_lower = 1 + a b L_lower. The squares are
@@ -222,11 +167,8 @@ TEST(Furnace, MirroredGlassIsEnteredFromOutside) {
 TEST(Furnace, TwoFacingPlanesSumTheirInterreflections) {
   scene::Material lower = diffuse(glm::vec3(0.8f));
   lower.emission = glm::vec3(1);
-  View view;
+  View view = empty_view({0, 0, 0.05}, {0.01, 0, 0}, pinhole(24, 24, 0.4));
   view.scene = facing_planes(40, 0.1, lower, diffuse(glm::vec3(0.6f)));
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(24, 24, 0.4);
-  view.world_from_camera = look_at({0, 0, 0.05}, {0.01, 0, 0});
   const Rendered result = render_clean(view, 32, up_to_depth(64));
   EXPECT_NEAR(mean_mixed(result.layers), 1 / (1 - 0.48), tolerance(result.layers) + 1e-4);
 }

@@ -2,9 +2,6 @@
 // where they were, and nothing that has changed is still seen.
 #include "daemon/render/history.hpp"
 
-#include <glm/gtc/matrix_transform.hpp>
-
-#include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
@@ -12,22 +9,7 @@ namespace previz::test::history_test {
 
 constexpr int width = averaged_width, height = averaged_height;
 
-// A floor, and above it a virtual box, seen from the side; codes are linear in radiance.
-struct Stage {
-  View view;
-  std::uint32_t box = 0;
-
-  explicit Stage(const glm::vec3& sky) {
-    scene::Scene& scene = view.scene;
-    const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
-    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
-    box = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.4))), gray, at({0, 0, 0.3}),
-                       scene::world_mixed);
-    see_evenly_lit(view, sky, 0.9);
-    view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
-  }
-  static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
-};
+using Stage = BoxAboveFloor;
 
 // The rms over the picture of what a and b are off each other, over that of what b adds.
 double rms_between(const Plate& a, const Plate& b) {
@@ -44,25 +26,22 @@ double rms_between(const Plate& a, const Plate& b) {
 // values up to four times white, and the rounding of a code: one of 65536 codes at most. Only where
 // an edge is found late is a sample lost; so for nearly all pixels.
 TEST(History, OfAStillCameraHasTheSamplesOfOneLongFrame) {
-  const Stage stage(glm::vec3(0.4f));
+  const Stage stage;
   for (const int samples : {1, 2}) {
     SetRenderer frames(stage.view), whole(stage.view);
     Plate picture;
     const int count = 16 / samples;
-    for (int frame = 0; frame < count; ++frame)
-      picture = shown_frame(frames, stage.view.world_from_camera, samples, true);
-    const Plate expected = shown_frame(whole, stage.view.world_from_camera, 16, false);
-    int others = 0;
-    for (std::size_t i = 0; i < picture.samples.size(); ++i)
-      others += std::abs(picture.samples[i] - expected.samples[i]) > 1 ? 1 : 0;
-    EXPECT_LT(others, 0.02 * 3 * width * height) << samples << " samples per frame";
+    for (int frame = 0; frame < count; ++frame) picture = shown_frame(frames, samples, true);
+    const Plate expected = shown_frame(whole, 16, false);
+    EXPECT_LT(differing_codes(picture, expected), 0.02 * 3 * width * height)
+        << samples << " samples per frame";
   }
 }
 
 // So it is in a picture of 3840x2160, of which no dispatch of 65,535 work groups covers more than
 // half.
 TEST(History, OfA4KPictureHasTheSamplesOfOneLongFrame) {
-  Stage stage(glm::vec3(0.4f));
+  Stage stage;
   constexpr int wide = 3840, high = 2160;
   stage.view.calibration = pinhole(wide, high, 0.9);
   stage.view.calibration.response.kind = ResponseCurve::Kind::linear;
@@ -95,13 +74,12 @@ TEST(History, OfA4KPictureHasTheSamplesOfOneLongFrame) {
 // Of 16 times as many samples noise is at most a quarter: less, because the samples of a sequence
 // are spread evenly. The reference's own noise, of 1024 samples, is an eighth of that.
 TEST(History, TakesNoiseAwayAsItsSamplesAddUp) {
-  const Stage stage(glm::vec3(0.4f));
+  const Stage stage;
   SetRenderer renderer(stage.view), reference(stage.view);
-  const Plate truth = shown_frame(reference, stage.view.world_from_camera, 1024, false);
-  const Plate first = shown_frame(renderer, stage.view.world_from_camera, 1, true);
+  const Plate truth = shown_frame(reference, 1024, false);
+  const Plate first = shown_frame(renderer, 1, true);
   Plate last;
-  for (int frame = 1; frame < 16; ++frame)
-    last = shown_frame(renderer, stage.view.world_from_camera, 1, true);
+  for (int frame = 1; frame < 16; ++frame) last = shown_frame(renderer, 1, true);
   EXPECT_LT(rms_between(last, truth), rms_between(first, truth) / 4);
 }
 
@@ -118,7 +96,7 @@ Plate shown_moving(SetRenderer& renderer, glm::dmat4& pose) {
 // Denoised, too: a moving camera must not add error, and the picture must be better than that of a
 // frame alone.
 TEST(History, OfAMovingCameraIsBetterThanAFrameAlone) {
-  const Stage stage(glm::vec3(0.4f));
+  const Stage stage;
   SetRenderer moving(stage.view), alone(stage.view), reference(stage.view);
   glm::dmat4 pose(1.0);
   const Plate last = shown_moving(moving, pose);
@@ -127,49 +105,35 @@ TEST(History, OfAMovingCameraIsBetterThanAFrameAlone) {
             0.7 * rms_between(shown_frame(alone, pose, 1, false, true), truth));
 }
 
-// Returns the rms of what two pictures are off the truth, over the pixels that are covered in part.
-double off_at_outlines(const Plate& picture, const Plate& truth, const std::vector<float>& mask) {
-  double off = 0;
-  for (std::size_t i = 0; i < truth.samples.size(); ++i)
-    if (mask[i / 3] > 0 && mask[i / 3] < 1)
-      off += std::pow(picture.samples[i] - double(truth.samples[i]), 2);
-  return std::sqrt(off);
-}
-
 // How much of a pixel an object covers is found by 16 rays in each frame: while the camera moves,
 // an outline of one sample a frame is as smooth as that of 16 samples, of which it may keep a tenth
 // more error. The light on both sides has the noise of a dozen frames, which is about as much.
 TEST(History, OfAMovingCameraHasOutlinesAsOfManySamples) {
-  const Stage stage(glm::vec3(0.4f));
+  const Stage stage;
   SetRenderer moving(stage.view), alone(stage.view), reference(stage.view);
   glm::dmat4 pose(1.0);
   const Plate last = shown_moving(moving, pose);
-  const Plate truth = shown_frame(reference, pose, 1024, false);
-  const std::vector<float> mask = reference.layers().mask;
+  const Truth truth = truth_of(reference, pose, 1024);
   const double off_of_many =
-      off_at_outlines(shown_frame(alone, pose, 16, false, true), truth, mask);
+      off_where(is_outline, shown_frame(alone, pose, 16, false, true), truth);
   ASSERT_GT(off_of_many, 0);
-  EXPECT_LT(off_at_outlines(last, truth, mask), 1.1 * off_of_many);
+  EXPECT_LT(off_where(is_outline, last, truth), 1.1 * off_of_many);
 }
 
 // Samples of both sides together do not know the albedo of either, over which light is filtered: it
 // is that of the pixels around. The first frame of four samples then has outlines as good as those
 // of a frame alone, of which it may have a tenth more error.
 TEST(History, KnowsTheAlbedoOfAnOutlineFromAroundIt) {
-  Stage stage(glm::vec3(0.4f));
-  scene::Texture texture;
-  texture.width = texture.height = 1;
-  texture.texels = {{0.2f, 0.2f, 0.2f, 1}};
+  Stage stage;
   scene::Material dark = diffuse(glm::vec3(1));
-  dark.base_color_texture = add_texture(stage.view.scene, std::move(texture));
+  dark.base_color_texture = add_texture(stage.view.scene, texture_of({0.2f, 0.2f, 0.2f, 1}));
   stage.view.scene.instances[stage.box].material = add_material(stage.view.scene, dark);
   SetRenderer first(stage.view), alone(stage.view), reference(stage.view);
   const glm::dmat4 pose = stage.view.world_from_camera;
-  const Plate truth = shown_frame(reference, pose, 1024, false);
-  const std::vector<float> mask = reference.layers().mask;
-  const double off_alone = off_at_outlines(shown_frame(alone, pose, 4, false, true), truth, mask);
+  const Truth truth = truth_of(reference, pose, 1024);
+  const double off_alone = off_where(is_outline, shown_frame(alone, pose, 4, false, true), truth);
   ASSERT_GT(off_alone, 0);
-  EXPECT_LT(off_at_outlines(shown_frame(first, pose, 4, true, true), truth, mask), 1.1 * off_alone);
+  EXPECT_LT(off_where(is_outline, shown_frame(first, pose, 4, true, true), truth), 1.1 * off_alone);
 }
 
 // A rod thinner than a pixel is at the middle of hardly any, so no ray looks for its outline: how
@@ -177,7 +141,7 @@ TEST(History, KnowsTheAlbedoOfAnOutlineFromAroundIt) {
 // as many samples in one frame, of which it may have a tenth more error: what is kept of the rod's
 // light is kept as halves, and what covers a pixel as a mean of all or nothing.
 TEST(History, KeepsHowMuchAThinRodCovers) {
-  Stage stage(glm::vec3(0.4f));
+  Stage stage;
   scene::Scene& scene = stage.view.scene;
   const double pixel = 2.4 / (0.9 * width);
   scene.instances[stage.box].mesh = add_mesh(scene, box_mesh({0.25 * pixel, 0.25 * pixel, 0.6}));
@@ -185,25 +149,11 @@ TEST(History, KeepsHowMuchAThinRodCovers) {
   const glm::dmat4 pose = stage.view.world_from_camera;
   Plate picture;
   for (int frame = 0; frame < 16; ++frame) picture = shown_frame(frames, pose, 1, true, true);
-  const Plate truth = shown_frame(reference, pose, 1024, false);
-  const std::vector<float> mask = reference.layers().mask;
+  const Truth truth = truth_of(reference, pose, 1024);
   const double off_of_many =
-      off_at_outlines(shown_frame(whole, pose, 16, false, true), truth, mask);
+      off_where(is_outline, shown_frame(whole, pose, 16, false, true), truth);
   ASSERT_GT(off_of_many, 0);
-  EXPECT_LT(off_at_outlines(picture, truth, mask), 1.1 * off_of_many);
-}
-
-// A floor, and above it a virtual ball of glass under a small lamp, whose light it gathers.
-Stage glass_under_a_lamp(double radiance) {
-  Stage stage(glm::vec3(0.05f));
-  scene::Scene& scene = stage.view.scene;
-  scene.instances[stage.box].mesh = add_mesh(scene, icosphere_mesh(0.3, 4));
-  scene.instances[stage.box].material = add_material(scene, glass(1.5f));
-  set::Light key = lamp(set::LightType::sphere, glm::dvec3(radiance));
-  key.position = {1, 1, 3};
-  key.radius_m = 0.05;
-  scene.lights = {key};
-  return stage;
+  EXPECT_LT(off_where(is_outline, picture, truth), 1.1 * off_of_many);
 }
 
 // What photons bring has a filter of its own, in the first frame of a history as in a frame alone,
@@ -211,18 +161,13 @@ Stage glass_under_a_lamp(double radiance) {
 // camera, what is off is less than what a frame alone is off, and before the filter less than half
 // of it, as if four samples were left of the twelve.
 TEST(History, KeepsPhotonsLightApart) {
-  const Stage stage = glass_under_a_lamp(60);
+  Stage stage;
+  stage.make_glass(60);
   SetRenderer moving(stage.view), first(stage.view), alone(stage.view), reference(stage.view);
   glm::dmat4 pose(1.0);
   const Plate last = shown_moving(moving, pose);
-  const Plate truth = shown_frame(reference, pose, 256, false);
-  const std::vector<float> mask = reference.layers().mask;
-  const auto off = [&](const Plate& picture) {
-    double squares = 0;
-    for (std::size_t i = 0; i < truth.samples.size(); ++i)
-      if (mask[i / 3] == 0) squares += std::pow(picture.samples[i] - double(truth.samples[i]), 2);
-    return std::sqrt(squares);
-  };
+  const Truth truth = truth_of(reference, pose, 256);
+  const auto off = [&](const Plate& picture) { return off_where(is_uncovered, picture, truth); };
   const double off_alone = off(shown_frame(alone, pose, 1, false, true));
   EXPECT_LT(off(shown_frame(first, pose, 1, true, true)), 1.1 * off_alone);
   EXPECT_LT(off(last), off_alone);
@@ -232,11 +177,12 @@ TEST(History, KeepsPhotonsLightApart) {
 // Photons' light is kept as halves, which hold no more than 65,504 times white. A virtual lamp that
 // brings a million times as much is white in every frame: nothing becomes what is no number.
 TEST(History, OfLightBeyondAllWhiteStaysWhite) {
-  Stage stage = glass_under_a_lamp(6e13);
+  Stage stage;
+  stage.make_glass(6e13);
   stage.view.scene.lights[0].gain_real = 0;
   SetRenderer renderer(stage.view);
   for (int frame = 0; frame < 4; ++frame) {
-    const Plate picture = shown_frame(renderer, stage.view.world_from_camera, 1, true, true);
+    const Plate picture = shown_frame(renderer, 1, true, true);
     const auto at = [&](int x, int y) {
       return picture.samples[static_cast<std::size_t>(3 * (y * width + x))];
     };
@@ -253,12 +199,10 @@ TEST(History, OfLightBeyondAllWhiteStaysWhite) {
 void expect_values_stay_in_their_places(const PinholeIntrinsics& lens) {
   Stage stage(glm::vec3(0));
   stage.view.calibration.intrinsics = lens;
-  set::Light added = lamp(set::LightType::point, glm::dvec3(3));
-  added.position = {0, 0, 3};
-  added.gain_mixed = 1;
+  set::Light added = point_lamp({0, 0, 3}, glm::dvec3(3));
   added.gain_real = 0;
   stage.view.scene.lights = {added};
-  stage.view.scene.instances[stage.box].world_from_object = Stage::at({0, 8, 0.3});
+  stage.view.scene.instances[stage.box].world_from_object = at({0, 8, 0.3});
   SetRenderer moving(stage.view, up_to_depth(1)), alone(stage.view, up_to_depth(1));
   glm::dmat4 pose(1.0);
   Plate last;
@@ -295,11 +239,7 @@ TEST(History, OfAMovingCameraKeepsValuesInTheirPlacesThroughARationalLens) {
 }
 
 TEST(History, LeavesThePlateBitForBitWhereNothingDiffers) {
-  RandomScene options;
-  options.width = 71;
-  options.height = 49;
-  options.virtual_objects = 0;
-  View view = random_scene(3, options);
+  View view = random_scene(3, {.width = 71, .height = 49, .virtual_objects = 0});
   for (const bool denoise : {false, true}) {
     SetRenderer renderer(view);
     for (int frame = 0; frame < 4; ++frame) {
@@ -318,19 +258,19 @@ TEST(History, LeavesThePlateBitForBitWhereNothingDiffers) {
 
 // A frame alone, before, between and after frames that accumulate, is what it is without them.
 TEST(History, IsNotSeenInAFrameThatStandsAlone) {
-  const Stage stage(glm::vec3(0.4f));
+  const Stage stage;
   SetRenderer with(stage.view), without(stage.view);
-  const Plate alone = shown_frame(without, stage.view.world_from_camera, 2, false, true);
-  EXPECT_EQ(shown_frame(with, stage.view.world_from_camera, 2, false, true).samples, alone.samples);
-  shown_frame(with, stage.view.world_from_camera, 2, true, true);
-  shown_frame(with, stage.view.world_from_camera, 2, true, true);
-  EXPECT_EQ(shown_frame(with, stage.view.world_from_camera, 2, false, true).samples, alone.samples);
+  const Plate alone = shown_frame(without, 2, false, true);
+  EXPECT_EQ(shown_frame(with, 2, false, true).samples, alone.samples);
+  shown_frame(with, 2, true, true);
+  shown_frame(with, 2, true, true);
+  EXPECT_EQ(shown_frame(with, 2, false, true).samples, alone.samples);
 }
 
 // A snapshot's frame is that of an offline render, with the same random numbers, and the frames
 // after it are averaged with those before it.
 TEST(History, IsNotEndedByAFrameThatStandsAside) {
-  const Stage stage(glm::vec3(0.4f));
+  const Stage stage;
   SetRenderer with(stage.view), without(stage.view);
   const glm::dmat4 pose = stage.view.world_from_camera;
   const Plate alone = shown_frame(without, pose, 1, false, true);
@@ -349,10 +289,10 @@ TEST(History, IsNotEndedByAFrameThatStandsAside) {
 // The layers are the frame's own, and asking for them changes no picture. Showing a frame again
 // adds nothing to it.
 TEST(History, GivesTheSamePictureWithLayersAndWhenAskedAgain) {
-  const Stage stage(glm::vec3(0.4f));
+  const Stage stage;
   SetRenderer renderer(stage.view);
   for (int frame = 0; frame < 3; ++frame) {
-    const Plate picture = shown_frame(renderer, stage.view.world_from_camera, 1, true, true);
+    const Plate picture = shown_frame(renderer, 1, true, true);
     render::Layers layers = renderer.layers();
     EXPECT_EQ(renderer.show(true, &layers).samples, picture.samples);
     EXPECT_EQ(renderer.show(true).samples, picture.samples);
@@ -369,14 +309,13 @@ INSTANTIATE_TEST_SUITE_P(AChange, HistoryAfter, ::testing::Values(0, 1, 2));
 
 TEST_P(HistoryAfter, AJumpOrASwitchShowsNoGhost) {
   Stage stage(glm::vec3(0.2f));
-  set::Light key = lamp(set::LightType::point, glm::dvec3(3));
-  key.position = {1, 0, 3};
+  set::Light key = point_lamp({1, 0, 3}, glm::dvec3(3));
   stage.view.scene.lights = {key};
   SetRenderer renderer(stage.view, up_to_depth(1));
   const glm::dmat4 pose = stage.view.world_from_camera;
   for (int frame = 0; frame < 8; ++frame) shown_frame(renderer, pose, 4, true);
   std::vector<scene::Instance> instances = stage.view.scene.instances;
-  if (GetParam() == 0) instances[stage.box].world_from_object = Stage::at({-0.5, 0.3, 0.3});
+  if (GetParam() == 0) instances[stage.box].world_from_object = at({-0.5, 0.3, 0.3});
   if (GetParam() == 1) key.gain_mixed = 0.2;
   renderer.move(instances, {key});
   if (GetParam() == 2)

@@ -1,8 +1,5 @@
 // Colours of vertices, textures that lie differently on a surface, and the textures that say where
 // a surface is glass, lacquered, glossy, brushed or cloth: each by its channel (KHR_materials_*).
-#include <algorithm>
-#include <numbers>
-
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 
@@ -12,25 +9,14 @@ using scene::Material;
 
 // A square seen from the side under a sky with a bright quarter.
 View square(const Material& material) {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({1, 1})),
-               add_material(view.scene, material));
-  view.environment = uniform_environment(glm::vec3(0.3f, 0.4f, 0.5f), 8);
-  for (int i = 0; i < 6; ++i) view.environment.radiance[static_cast<std::size_t>(9 + i)] *= 6.0f;
-  view.calibration = pinhole(32, 24, 0.3);
-  view.world_from_camera = look_at({0.6, -1.5, 1.2}, {0, 0, 0});
+  View view = empty_view({0.6, -1.5, 1.2}, {0, 0, 0}, pinhole(32, 24, 0.3));
+  add(view.scene, rectangle_mesh({1, 1}), material);
+  view.environment = one_sided_sky();
   return view;
 }
 
 std::vector<glm::vec3> picture(const View& view) {
   return render_clean(view, 4, up_to_depth(2)).layers.mixed;
-}
-
-scene::Texture texel(const glm::vec4& value) {
-  scene::Texture texture;
-  texture.width = texture.height = 1;
-  texture.texels = {value};
-  return texture;
 }
 
 struct Layer {
@@ -109,7 +95,7 @@ TEST(LayerTextures, MultiplyTheirFactorByTheirChannels) {
     glm::vec4 value(0.125f);
     for (const int channel : layer.channels) value[channel] = 0.5f;
     View textured = square(layer.with(1));
-    textured.scene.materials[0].*layer.texture = add_texture(textured.scene, texel(value));
+    textured.scene.materials[0].*layer.texture = add_texture(textured.scene, texture_of(value));
     const auto shown = picture(textured);
     EXPECT_EQ(shown, picture(square(layer.with(0.5f)))) << layer.name;
     EXPECT_NE(shown, picture(square(layer.with(1)))) << layer.name;
@@ -128,7 +114,7 @@ TEST(LayerTextures, GiveAnAnisotropyItsDirectionAndStrength) {
   };
   const auto expect_same = [&](const glm::vec4& value, const Material& expected) {
     View textured = square(brushed(0.8f, 0.25));
-    textured.scene.materials[0].anisotropy_texture = add_texture(textured.scene, texel(value));
+    textured.scene.materials[0].anisotropy_texture = add_texture(textured.scene, texture_of(value));
     const auto a = picture(textured), b = picture(square(expected));
     // The turn is a product of floats in place of one cosine: a few last places.
     for (std::size_t i = 0; i < a.size(); ++i)
@@ -145,18 +131,18 @@ TEST(LayerTextures, LacquerHasItsOwnNormals) {
   const Material plain = lacquered(1);
   View bumpy = square(plain);
   const glm::vec4 tilted(0.75f, 0.5f, 0.9375f, 1);
-  bumpy.scene.materials[0].clearcoat_normal_texture = add_texture(bumpy.scene, texel(tilted));
+  bumpy.scene.materials[0].clearcoat_normal_texture = add_texture(bumpy.scene, texture_of(tilted));
   EXPECT_NE(picture(bumpy), picture(square(plain)));
   View flat = square(plain);
   flat.scene.materials[0].clearcoat_normal_texture =
-      add_texture(flat.scene, texel({0.5f, 0.5f, 1, 1}));
+      add_texture(flat.scene, texture_of({0.5f, 0.5f, 1, 1}));
   EXPECT_EQ(picture(flat), picture(square(plain)));
   // Where nothing but lacquer reflects, bumps below it change nothing.
   Material lacquer = lacquered(1);
   lacquer.base_color = glm::vec3(0);
   lacquer.specular = 0;
   View below = square(lacquer);
-  below.scene.materials[0].normal_texture = add_texture(below.scene, texel(tilted));
+  below.scene.materials[0].normal_texture = add_texture(below.scene, texture_of(tilted));
   EXPECT_EQ(picture(below), picture(square(lacquer)));
 }
 
@@ -171,18 +157,14 @@ TEST(VertexColors, MultiplyTheBaseColourBetweenTheVertices) {
     mesh.colors.emplace_back(p.x + 0.5f, 0.5f - p.y, 0.5f, 1.0f);
   const auto shown = render_clean(view, 16, up_to_depth(2), set::LightSampling::bsdf).layers.mixed;
   const PinholeIntrinsics& k = view.calibration.intrinsics;
-  for (int y = 0; y < k.height; ++y)
-    for (int x = 0; x < k.width; ++x) {
-      // The middle of the pixel on the square, 2 m away; the camera's up is +Y.
-      const double at_x = 2 * (x - k.cx) / k.fx, at_y = -2 * (y - k.cy) / k.fy;
-      const double half_pixel = 1 / k.fx;  // 2 m times half a pixel; samples lie within
-      const glm::vec3& seen =
-          shown[static_cast<std::size_t>(y) * static_cast<std::size_t>(k.width) +
-                static_cast<std::size_t>(x)];
-      EXPECT_NEAR(seen.r, 0.8 * (at_x + 0.5), 0.8 * half_pixel);
-      EXPECT_NEAR(seen.g, 0.6 * (0.5 - at_y), 0.6 * half_pixel);
-      EXPECT_NEAR(seen.b, 0.4 * 0.5, 1e-4);
-    }
+  for (const auto& [x, y, i] : pixels_of(k.width, k.height)) {
+    // The middle of the pixel on the square, 2 m away; the camera's up is +Y.
+    const double at_x = 2 * (x - k.cx) / k.fx, at_y = -2 * (y - k.cy) / k.fy;
+    const double half_pixel = 1 / k.fx;  // 2 m times half a pixel; samples lie within
+    EXPECT_NEAR(shown[i].r, 0.8 * (at_x + 0.5), 0.8 * half_pixel);
+    EXPECT_NEAR(shown[i].g, 0.6 * (0.5 - at_y), 0.6 * half_pixel);
+    EXPECT_NEAR(shown[i].b, 0.4 * 0.5, 1e-4);
+  }
 }
 
 TEST(VertexColors, OfAnAlphaLetLightThrough) {
@@ -192,9 +174,7 @@ TEST(VertexColors, OfAnAlphaLetLightThrough) {
   veil.alpha_mode = scene::AlphaMode::blend;
   scene::Mesh mesh = rectangle_mesh({0.2, 0.2});
   mesh.colors.assign(mesh.positions.size(), glm::vec4(1, 1, 1, veil_alpha));
-  glm::dmat4 pose(1);
-  pose[3].z = 1;
-  add_instance(view.scene, add_mesh(view.scene, mesh), add_material(view.scene, veil), pose);
+  add(view.scene, mesh, veil, at({0, 0, 1}));
   view.scene.lights.push_back(lamp(set::LightType::directional));
   const render::Layers layers = render_clean(view, 1, up_to_depth(1)).layers;
   // Colours are fractions of 16 bits: 0.25 is off by 1 / 131070 at most.
@@ -204,11 +184,8 @@ TEST(VertexColors, OfAnAlphaLetLightThrough) {
 // The base colour by the first coordinates, the roughness by others: as if its texture were turned.
 TEST(TextureMappings, ReadEachTextureByItsOwn) {
   Material material = metal({0.9f, 0.7f, 0.4f}, 1);
-  scene::Texture stripes;
-  stripes.width = 1;
-  stripes.height = 2;
+  scene::Texture stripes = texture_of(1, 2, {{1, 0.25f, 1, 1}, {1, 0.75f, 1, 1}});
   stripes.nearest = true;
-  stripes.texels = {{1, 0.25f, 1, 1}, {1, 0.75f, 1, 1}};
   scene::Texture turned = stripes;
   std::swap(turned.width, turned.height);
   View by_other = square(material), as_turned = square(material);

@@ -1,7 +1,4 @@
 // The film camera's lens as the shaders have it: a ray for each corner of a pixel.
-#include <cmath>
-#include <limits>
-
 #include "daemon/render/corner_rays.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "tests/support/render_fixture.hpp"
@@ -34,20 +31,10 @@ TEST(LensRays, MeetTheirPixelsThroughARationalLens) {
   }
 }
 
-std::string refusal_of(const PinholeIntrinsics& lens) {
-  try {
-    render::corner_rays(lens);
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
-
 void expect_refused(const PinholeIntrinsics& lens, const std::string& which) {
-  const std::string refusal = refusal_of(lens);
-  EXPECT_TRUE(
-      refusal.starts_with("observer.intrinsics: the distortion cannot be inverted at pixel"))
-      << which << ": " << refusal;
+  EXPECT_THAT(error_of([&] { render::corner_rays(lens); }),
+              StartsWith("observer.intrinsics: the distortion cannot be inverted at pixel"))
+      << which;
 }
 
 // The divisors 1 - 2 r^2 and (with a dividend that cancels it) again reach zero at 0.71.

@@ -7,7 +7,6 @@
 #include "daemon/render/gpu_lights.hpp"
 #include "daemon/render/scene_lights.hpp"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::light_spread_test {
 
@@ -85,14 +84,10 @@ TEST(LightSpread, OfALightIsItsSizeAtTheScenesRadius) {
 
 // A floor and a virtual box on it.
 View box_on_a_floor() {
-  View view;
+  View view = empty_view({0, -2, 1.5}, {0, 0, 0.2}, pinhole(32, 24, 0.9));
   const std::uint32_t grey = add_material(view.scene, diffuse(glm::vec3(0.5f)));
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({3, 3})), grey);
-  add_instance(view.scene, add_mesh(view.scene, box_mesh(glm::dvec3(0.5))), grey,
-               glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 0.25)), scene::world_mixed);
-  view.calibration = pinhole(32, 24, 0.9);
-  view.world_from_camera = look_at({0, -2, 1.5}, {0, 0, 0.2});
-  view.environment = uniform_environment(glm::vec3(0));
+  add(view.scene, rectangle_mesh({3, 3}), grey);
+  add(view.scene, box_mesh(glm::dvec3(0.5)), grey, at({0, 0, 0.25}), scene::world_mixed);
   return view;
 }
 
@@ -103,10 +98,8 @@ struct Rays {
 };
 
 Rays rays_of(const View& view, set::LightSampling sampling = set::LightSampling::importance) {
-  set::Estimation estimation;
-  const Rendered with = render_clean(view, 4, estimation, sampling);
-  estimation.difference_sampling = 0;
-  const Rendered without = render_clean(view, 4, estimation, sampling);
+  const Rendered with = render_clean(view, 4, {}, sampling);
+  const Rendered without = render_clean(view, 4, {.difference_sampling = 0}, sampling);
   return {with.counters.rays, without.counters.rays,
           with.layers.mixed == without.layers.mixed && with.layers.diff == without.layers.diff};
 }
@@ -118,9 +111,7 @@ TEST(DirectionsTowardsWhatDiffers, AreTakenUnderASkyAndNotUnderALamp) {
   EXPECT_GT(sky.with, sky.without);
   EXPECT_FALSE(sky.same_picture);
 
-  set::Light sun = lamp(set::LightType::directional);
-  sun.direction = {0.3, 0.2, -1};
-  sun.angular_radius_rad = 0.0047;
+  set::Light sun = sun_lamp({0.3, 0.2, -1}, 0.0047);
   view.environment = uniform_environment(glm::vec3(0));
   view.scene.lights = {sun};
   EXPECT_TRUE(rays_of(view).same_picture);
@@ -147,41 +138,20 @@ TEST(DirectionsTowardsWhatDiffers, AreTakenWhereALampIsFoundByLuck) {
 
 TEST(DirectionsTowardsWhatDiffers, AreThoseOfTheFrameHoweverOftenItIsBegun) {
   View view = box_on_a_floor();
-  set::Light panel = lamp(set::LightType::rectangle, glm::dvec3(5));
-  panel.position = {0, 0, 3};
-  panel.direction = {0, 0, -1};
-  panel.up = {0, 1, 0};
-  panel.width_m = panel.height_m = 2;
-  view.scene.lights = {panel};
-  render::Renderer renderer(shared_device(), {}, view.calibration);
-  renderer.set_scene(view.scene);
-  renderer.set_environment(view.environment, set::LightSampling::importance);
-  render::FrameInput frame;
-  frame.world_from_camera = view.world_from_camera;
-  std::vector<std::vector<glm::vec3>> pictures;
-  for (int begun = 0; begun < 2; ++begun) {
-    renderer.begin(frame);
-    renderer.render(4);
-    pictures.push_back(renderer.layers().mixed);
-  }
-  EXPECT_EQ(pictures[0], pictures[1]);
+  view.scene.lights = {panel_lamp({0, 0, 3}, {2, 2}, glm::dvec3(5))};
+  SetRenderer renderer(view);
+  const auto first = renderer.rendered(4).mixed;
+  EXPECT_EQ(renderer.rendered(4).mixed, first);
 }
 
 // A virtual ball on a floor of 14 m under an even sky, and a lamp 0.9 m away, of a thousand times
 // the sky's radiance.
 View ball_beside_a_lamp() {
-  View view;
+  View view = empty_view({0, -0.8, 0.6}, {0, 0, 0.05}, pinhole(32, 32, 0.4), glm::vec3(0.1f));
   const std::uint32_t grey = add_material(view.scene, diffuse(glm::vec3(0.5f)));
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({14, 14})), grey);
-  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.1, 3)), grey,
-               glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 0.1)), scene::world_mixed);
-  view.environment = uniform_environment(glm::vec3(0.1f));
-  set::Light light = lamp(set::LightType::sphere, glm::dvec3(100));
-  light.position = {0.6, 0, 0.8};
-  light.radius_m = 0.05;
-  view.scene.lights = {light};
-  view.calibration = pinhole(32, 32, 0.4);
-  view.world_from_camera = look_at({0, -0.8, 0.6}, {0, 0, 0.05});
+  add(view.scene, rectangle_mesh({14, 14}), grey);
+  add(view.scene, icosphere_mesh(0.1, 3), grey, at({0, 0, 0.1}), scene::world_mixed);
+  view.scene.lights = {sphere_lamp({0.6, 0, 0.8}, 0.05, glm::dvec3(100))};
   return view;
 }
 
@@ -216,16 +186,13 @@ TEST(LightShare, IsThatOfTheBoxAroundWhatDiffersAndTheLamps) {
   EXPECT_DOUBLE_EQ(radius_of(scene, lamps), 0.5) << "two at the same distance count as one there";
 
   // A panel that glows counts as a lamp does: 3 m above, it makes a box of 1.6 m, hence sqrt(2).
-  add_instance(scene, add_mesh(scene, rectangle_mesh({0.1, 0.1})),
-               add_material(scene, emitter(glm::vec3(1))),
-               glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 3)));
+  add(scene, rectangle_mesh({0.1, 0.1}), emitter(glm::vec3(1)), at({0, 0, 3}));
   EXPECT_DOUBLE_EQ(radius_of(scene, {}), std::numbers::sqrt2);
   // Each of its two sides of 0.01 m^2 shines with pi, both with 0.063 W, as a point of 0.005 W/sr
   // does. With such a point, whose box has half a diagonal of 0.54 m, R^2 = 2 / (1 / 1.54^2 + 1 /
   // 0.54^2), 0.72 m, hence sqrt(0.5); a panel twice as wide and high has four times the power,
   // hence 5 / (4 / 1.59^2 + 1 / 0.54^2), 1.00 m.
-  set::Light point = lamp(set::LightType::point, glm::dvec3(0.005));
-  point.position = lamps[0].position;
+  set::Light point = point_lamp(lamps[0].position, glm::dvec3(0.005));
   EXPECT_DOUBLE_EQ(radius_of(scene, {point}), std::numbers::sqrt2 / 2);
   glm::dmat4& placed = scene.instances[2].world_from_object;
   placed = glm::scale(placed, glm::dvec3(2));
@@ -261,8 +228,7 @@ Variance variance_of(const render::Layers& layers) {
 TEST(LightShare, LeavesTheLampBesideAnObjectItsSamples) {
   const View near = ball_beside_a_lamp();
   View wide = near;
-  add_instance(wide.scene, add_mesh(wide.scene, icosphere_mesh(0.05, 1)), 0,
-               glm::translate(glm::dmat4(1), glm::dvec3(6.8, 6.8, -0.1)), scene::world_mixed);
+  add(wide.scene, icosphere_mesh(0.05, 1), 0u, at({6.8, 6.8, -0.1}), scene::world_mixed);
   const render::Layers few = render_clean(near, 64, up_to_depth(2)).layers;
   const render::Layers many = render_clean(wide, 64, up_to_depth(2)).layers;
   const Variance by_near = variance_of(few), by_wide = variance_of(many);
@@ -280,9 +246,7 @@ TEST(LightShare, LeavesTheLampBesideAnObjectItsSamples) {
 TEST(LightShare, AFaintLampFarOffTakesNoneFromTheLampBesideAnObject) {
   const View alone = ball_beside_a_lamp();
   View both = alone;
-  set::Light faint = lamp(set::LightType::point, glm::dvec3(1e-3));
-  faint.position = {6.5, 6.5, 1};
-  both.scene.lights.push_back(faint);
+  both.scene.lights.push_back(point_lamp({6.5, 6.5, 1}, glm::dvec3(1e-3)));
   const Variance before = variance_of(render_clean(alone, 64, up_to_depth(2)).layers);
   const Variance after = variance_of(render_clean(both, 64, up_to_depth(2)).layers);
   EXPECT_LT(before.error, 0.1 * before.mean);
@@ -300,25 +264,18 @@ TEST(LightShare, AFaintLampFarOffTakesNoneFromTheLampBesideAnObject) {
 // more, hence half at each vertex; what its parted halves meet brings 1 + 1/2 + 1/4 + ..., and half
 // as much again by light samples, hence three times. So no sample brings more than 10 (8 / 2 + 3).
 TEST(DifferenceRoulette, NeverRaisesAPathAboveTenTimesItsLight) {
-  View view;
+  View view = empty_view({5, 5, 5}, {20, 20, 3}, pinhole(48, 36, 0.9));
   scene::Material wall = diffuse(glm::vec3(0.5f));
   wall.emission = glm::vec3(1);
   view.scene = furnace_box({40, 40, 40}, wall);
-  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.1, 2)),
-               add_material(view.scene, diffuse(glm::vec3(0))), glm::dmat4(1), scene::world_mixed);
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(48, 36, 0.9);
-  view.world_from_camera = look_at({5, 5, 5}, {20, 20, 3});
-  set::Estimation estimation = up_to_depth(8);
-  estimation.estimator = set::Estimator::difference;
+  add(view.scene, icosphere_mesh(0.1, 2), diffuse(glm::vec3(0)), glm::dmat4(1), scene::world_mixed);
+  set::Estimation estimation = up_to_depth(8, set::Estimator::difference);
   estimation.roulette_depth = 64;  // no other roulette
   SetRenderer renderer(view, estimation);
   float most = 0;
   for (std::uint32_t seed = 0; seed < 64; ++seed) {
-    renderer.begin({{}, 1.0, view.world_from_camera, seed});
-    renderer.render(1);
-    expect_clean(renderer.counters());
-    for (const glm::vec3& diff : renderer.layers().diff) most = std::max(most, std::abs(diff.g));
+    for (const glm::vec3& diff : renderer.rendered_clean(1, seed).diff)
+      most = std::max(most, std::abs(diff.g));
   }
   EXPECT_LE(most, 70);
   EXPECT_GT(most, 0);

@@ -3,7 +3,6 @@
 
 #include "daemon/render/emission_weights.hpp"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::many_lamps_test {
 
@@ -79,9 +78,7 @@ Noise noise_of(const View& view, const set::Estimation& estimation, int seeds = 
   SetRenderer renderer(view, estimation);
   std::vector<double> samples;
   for (int seed = 0; seed < seeds; ++seed) {
-    renderer.begin({{}, 1.0, view.world_from_camera, static_cast<std::uint32_t>(seed)});
-    renderer.render(1);
-    const render::Layers layers = renderer.layers();
+    const render::Layers layers = renderer.rendered(1, static_cast<std::uint32_t>(seed));
     for (const glm::vec3& pixel : layers.*layer) samples.push_back(pixel.g);
   }
   expect_clean(renderer.counters());
@@ -147,9 +144,7 @@ TEST(ManyLamps, OfWhichFivePanelsReachAPointInTheirPenumbras) {
   }
   const std::vector<set::Light> far = far_lamps(995);
   const auto under_a_board = [](View view) {
-    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({0.3, 0.3})),
-                 add_material(view.scene, diffuse(glm::vec3(0))),
-                 glm::translate(glm::dmat4(1), glm::dvec3(0, 0.3, 0.7)));
+    add(view.scene, rectangle_mesh({0.3, 0.3}), diffuse(glm::vec3(0)), at({0, 0.3, 0.7}));
     return view;
   };
   const Noise alone = noise_of(under_a_board(lit_by(few)), up_to_depth(1));
@@ -182,13 +177,9 @@ TEST(ManyLamps, MayCoincideBeBlackOrDiffer) {
     diff += (light.gain_mixed - light.gain_real) * closed_form({light});
     lamps.push_back(light);
   }
-  set::Light in_the_surface = lamp(set::LightType::point);
-  in_the_surface.position = {0.5, 0, 0};
-  lamps.push_back(in_the_surface);
-  set::Estimation estimation = up_to_depth(1);
-  estimation.estimator = set::Estimator::paired;
-  const Noise of_mixed = noise_of(lit_by(lamps), estimation);
-  const Noise of_diff = noise_of(lit_by(lamps), estimation, 24, &render::Layers::diff);
+  lamps.push_back(point_lamp({0.5, 0, 0}));  // in the surface
+  const Noise of_mixed = noise_of(lit_by(lamps), up_to_depth(1));
+  const Noise of_diff = noise_of(lit_by(lamps), up_to_depth(1), 24, &render::Layers::diff);
   EXPECT_NEAR(of_mixed.mean, mixed, 4 * of_mixed.error + 1e-3 * mixed);
   EXPECT_NEAR(of_diff.mean, diff, 4 * of_diff.error + 1e-3 * std::abs(diff));
 }
@@ -199,15 +190,15 @@ TEST(ManyLamps, MayCoincideBeBlackOrDiffer) {
 TEST(ManyLamps, AreChosenAlikeAtAnySizeAndPlace) {
   const std::vector<set::Light> lamps = both(near_lamps(), far_lamps(60));
   const Noise here = noise_of(lit_by(lamps), up_to_depth(1), 8);
-  const auto placed = [&](double size, const glm::dvec3& at) {
+  const auto placed = [&](double size, const glm::dvec3& where) {
     View view = lit_by(lamps);
     for (set::Light& light : view.scene.lights) {
-      light.position = at + size * light.position;
+      light.position = where + size * light.position;
       light.width_m *= size;
       light.height_m *= size;
       if (light.type != set::LightType::rectangle) light.emission *= size * size;
     }
-    const glm::dmat4 place = glm::scale(glm::translate(glm::dmat4(1), at), glm::dvec3(size));
+    const glm::dmat4 place = glm::scale(at(where), glm::dvec3(size));
     for (scene::Instance& instance : view.scene.instances)
       instance.world_from_object = place * instance.world_from_object;
     view.world_from_camera[3] = place * view.world_from_camera[3];
@@ -227,11 +218,8 @@ TEST(ManyLamps, AreChosenAlikeAtAnySizeAndPlace) {
 TEST(ManyLamps, BringTheSameByLightSamplesAndByChance) {
   scene::Material wall = diffuse(glm::vec3(0.5f));
   wall.emission = glm::vec3(1);
-  View view;
+  View view = empty_view({0.5, 0, 0.2}, {-1, 0.3, 0}, pinhole(48, 48, 1.2));
   view.scene = furnace_sphere(1, 3, wall);
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(48, 48, 1.2);
-  view.world_from_camera = look_at({0.5, 0, 0.2}, {-1, 0.3, 0});
   for (int depth = 0; depth < 3; ++depth) {
     SCOPED_TRACE(depth);
     const Rendered result = render_clean(view, 16, up_to_depth(depth));
@@ -262,8 +250,7 @@ scene::Mesh wall_mesh(int side) {
 }
 
 scene::Texture one_lit_texel(int side, int column, int row) {
-  scene::Texture texture;
-  texture.width = texture.height = side;
+  scene::Texture texture = texture_of(side, side);
   texture.nearest = true;
   texture.texels.assign(static_cast<std::size_t>(side) * side, glm::vec4(0, 0, 0, 1));
   texture.texels[static_cast<std::size_t>(row * side + column)] = glm::vec4(1);
@@ -278,10 +265,7 @@ TEST(ManyLamps, OfAWallOfScreensAreChosenByTheirPicture) {
   View view = lit_point(albedo);
   scene::Material material = emitter(glm::vec3(100));
   material.emission_texture = add_texture(view.scene, one_lit_texel(side, 20, 9));
-  glm::dmat4 above(1.0);
-  above[3] = glm::dvec4(0, 0, 1, 1);
-  add_instance(view.scene, add_mesh(view.scene, wall_mesh(side)),
-               add_material(view.scene, material), above);
+  add(view.scene, wall_mesh(side), material, at({0, 0, 1}));
   const Noise noise = noise_of(view, up_to_depth(1));
   const glm::dvec3 screen(20.5 * 2 / side - 1, 9.5 * 2 / side - 1, 1);
   const double squared = glm::dot(screen, screen), area = 4.0 / (side * side);
@@ -293,13 +277,11 @@ TEST(ManyLamps, OfAWallOfScreensAreChosenByTheirPicture) {
 
 TEST(ManyLamps, WeighATriangleByTheMeanOfItsTexture) {
   scene::Scene scene;
-  scene::Texture texture;
-  texture.width = 8;
-  texture.height = 1;
+  scene::Texture texture = texture_of(8, 1);
   for (int i = 0; i < 8; ++i) texture.texels.emplace_back(glm::vec3(i < 4 ? 1 : 0), 1);
   scene::Material material = emitter(glm::vec3(3, 2, 1));
   material.emission_texture = add_texture(scene, texture);
-  add_instance(scene, add_mesh(scene, wall_mesh(1)), add_material(scene, material));
+  add(scene, wall_mesh(1), material);
   // Of the triangle below the diagonal a quarter lies left of the middle.
   EXPECT_THAT(
       render::emission_weights(scene, scene.instances[0]),
@@ -314,13 +296,10 @@ TEST(ManyLamps, WeighATriangleByTheMeanOfItsTexture) {
 TEST(ManyLamps, AreEncodedAnewOnlyWhenOneOfThemHasChanged) {
   View view = lit_point(albedo);
   view.scene.lights = near_lamps();
-  glm::dmat4 above(1.0);
-  above[3] = glm::dvec4(0, 0, 3, 1);
-  const std::uint32_t panel = add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({1, 1})),
-                                           add_material(view.scene, emitter(glm::vec3(1))), above);
+  const glm::dmat4 above = at({0, 0, 3});
+  const std::uint32_t panel = add(view.scene, rectangle_mesh({1, 1}), emitter(glm::vec3(1)), above);
   const std::uint32_t box =
-      add_instance(view.scene, add_mesh(view.scene, box_mesh(glm::dvec3(0.1))),
-                   add_material(view.scene, diffuse(glm::vec3(1))), above);
+      add(view.scene, box_mesh(glm::dvec3(0.1)), diffuse(glm::vec3(1)), above);
   SetRenderer renderer(view, up_to_depth(1));
   const auto encoded = [&](double along) {
     glm::dmat4 camera = view.world_from_camera;
@@ -358,14 +337,9 @@ TEST(ManyLamps, AreEncodedAnewOnlyWhenOneOfThemHasChanged) {
 // are weighed anew when it has gone far.
 TEST(ManyLamps, AreNotEncodedAnewForEachMotionOfAVirtualObject) {
   View view = lit_point(albedo, 20);
-  set::Light light = lamp(set::LightType::point);
-  light.position = {2, 0, 1};
-  set::Light sun = lamp(set::LightType::directional);
-  view.scene.lights = {light, sun};
-  const std::uint32_t box =
-      add_instance(view.scene, add_mesh(view.scene, box_mesh(glm::dvec3(0.1))),
-                   add_material(view.scene, diffuse(glm::vec3(1))),
-                   glm::translate(glm::dmat4(1), glm::dvec3(0, 0, 1)), scene::world_mixed);
+  view.scene.lights = {point_lamp({2, 0, 1}), lamp(set::LightType::directional)};
+  const std::uint32_t box = add(view.scene, box_mesh(glm::dvec3(0.1)), diffuse(glm::vec3(1)),
+                                at({0, 0, 1}), scene::world_mixed);
   SetRenderer renderer(view, up_to_depth(1));
   const auto encoded = [&](double along) {
     view.scene.instances[box].world_from_object[3].x = along;
@@ -394,17 +368,10 @@ TEST(ManyLamps, AreSeenAsEachByItself) {
     light.height_m = 0.2;
     lamps.push_back(light);
   }
-  set::Light sun = lamp(set::LightType::directional);
-  sun.direction = {0, -1, -0.2};
-  sun.angular_radius_rad = 0.1;
-  lamps.insert(lamps.begin() + 30, sun);
+  lamps.insert(lamps.begin() + 30, sun_lamp({0, -1, -0.2}, 0.1));
   const auto seen = [&](std::size_t first, std::size_t count) {
-    View view;
-    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({0.1, 0.1})),
-                 add_material(view.scene, diffuse(glm::vec3(0))));
-    view.environment = uniform_environment(glm::vec3(0));
-    view.calibration = pinhole(96, 64, 1.4);
-    view.world_from_camera = look_at({0, -1, 0}, {0, 2, 0});
+    View view = empty_view({0, -1, 0}, {0, 2, 0}, pinhole(96, 64, 1.4));
+    add(view.scene, rectangle_mesh({0.1, 0.1}), diffuse(glm::vec3(0)));
     for (std::size_t i = first; i < std::min(first + count, lamps.size()); ++i)
       view.scene.lights.push_back(lamps[i]);
     return render_clean(view, 4, up_to_depth(0)).layers.mixed;

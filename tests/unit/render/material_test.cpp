@@ -1,11 +1,7 @@
 // Cloth, brushed metal and coloured gloss against closed forms: in the light of one distant lamp,
 // where nothing is left to chance, and in white furnaces.
-#include <cmath>
-#include <numbers>
-#include <utility>
-#include <vector>
-
 #include "tests/support/render_fixture.hpp"
+#include "tests/truth/cpu_bsdf.hpp"
 
 namespace previz::test::material_test {
 
@@ -19,12 +15,8 @@ glm::dvec3 direction(double angle_rad, double azimuth_rad) {
 // A plane z = 0, seen from a direction by so narrow a camera that it is the same in all of the
 // picture, in the dark. Its textures' +X and +Y are the world's.
 View plane_seen_from(const glm::dvec3& o, const scene::Material& material) {
-  View view;
-  const auto mesh = add_mesh(view.scene, rectangle_mesh({2, 2}));
-  add_instance(view.scene, mesh, add_material(view.scene, material));
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(8, 8, 1e-4);
-  view.world_from_camera = look_at(o, {0, 0, 0});
+  View view = empty_view(o, {0, 0, 0}, pinhole(8, 8, 1e-4));
+  add(view.scene, rectangle_mesh({2, 2}), material);
   return view;
 }
 
@@ -44,16 +36,6 @@ Rendered in_white_furnace(View view, int samples) {
 // Four standard errors (one test in 16,000 fails by chance) and single precision.
 double chance(const render::Layers& layers) {
   return 4 * standard_error_of_pixels(layers) + 1e-6;
-}
-
-// Standard error of the mean of each channel, from the spread of the pixels.
-glm::dvec3 errors_of(const render::Layers& layers) {
-  const glm::dvec3 centre = mean(layers.mixed);
-  glm::dvec3 sum(0);
-  for (const glm::vec3& pixel : layers.mixed)
-    sum += (glm::dvec3(pixel) - centre) * (glm::dvec3(pixel) - centre);
-  const auto n = static_cast<double>(layers.mixed.size());
-  return glm::sqrt(sum / (n * (n - 1)));
 }
 
 // Over a picture 1e-4 rad wide the sharpest of these lobes changes by less than this, relatively: a
@@ -110,9 +92,8 @@ TEST(Sheen, ShinesByItsFormula) {
       const glm::dvec3 i = direction(0.9, azimuth);
       const glm::dvec3 expected = glm::dvec3(color) * sheen_formula(o, i, roughness);
       const glm::dvec3 measured = scattered(view, i);
-      for (int c = 0; c < 3; ++c)
-        EXPECT_NEAR(measured[c], expected[c], over_the_picture * expected[c])
-            << "roughness " << roughness << " azimuth " << azimuth;
+      SCOPED_TRACE(testing::Message() << "roughness " << roughness << " azimuth " << azimuth);
+      expect_near(measured, expected, over_the_picture * expected);
     }
   }
 }
@@ -131,10 +112,9 @@ TEST(Sheen, LeavesTheRestToWhatIsBelow) {
     seen[end] = scattered(view, i) / i.z;
     const double shine = sheen_formula(o, i, roughness) / i.z;
     const glm::dvec3 expected = 0.6 / pi * left + glm::dvec3(0.9, 0.1, 0.5) * shine;
-    for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR(seen[end][c], expected[c],
-                  over_the_picture * expected[c] + 0.6 / pi * 0.9 * sheen_table_error)
-          << "end " << end;
+    SCOPED_TRACE(end);
+    expect_near(seen[end], expected,
+                over_the_picture * expected + 0.6 / pi * 0.9 * sheen_table_error);
   }
   EXPECT_NEAR(seen[0].g, seen[1].g, 2 * over_the_picture * seen[0].g);
 }
@@ -189,10 +169,7 @@ TEST(Sheen, LiesBelowLacquer) {
   const glm::dvec3 o = direction(1.1, 0.3), i = direction(0.8, 0.9);
   const double bare = scattered(plane_seen_from(o, coated), i).g;
   coated.clearcoat = 0.8f;  // smooth: it mirrors the dark
-  const double eta = 1.5, behind = std::sqrt(1 - (1 - o.z * o.z) / (eta * eta));
-  const double parallel = (eta * o.z - behind) / (eta * o.z + behind);
-  const double across = (o.z - eta * behind) / (o.z + eta * behind);
-  const double share = 0.8 * 0.5 * (parallel * parallel + across * across);
+  const double share = 0.8 * truth::fresnel_dielectric(o.z, 1.5);
   EXPECT_NEAR(scattered(plane_seen_from(o, coated), i).g, (1 - share) * bare,
               over_the_picture * bare);
 }
@@ -215,11 +192,8 @@ double coat_formula(const glm::dvec3& o, const glm::dvec3& i, const glm::dvec3& 
   const glm::dvec3 h = glm::normalize(o + i);
   const double d =
       std::pow(glm::dot(h, t) / along, 2) + std::pow(glm::dot(h, b) / across, 2) + h.z * h.z;
-  const double behind = std::sqrt(1 - (1 - o.z * o.z) / 2.25);
-  const double parallel = (1.5 * o.z - behind) / (1.5 * o.z + behind);
-  const double perpendicular = (o.z - 1.5 * behind) / (o.z + 1.5 * behind);
-  return 0.5 * (parallel * parallel + perpendicular * perpendicular) /
-         (pi * along * across * d * d) / (1 + lambda(o) + lambda(i)) / (4 * o.z);
+  return truth::fresnel_dielectric(o.z, 1.5) / (pi * along * across * d * d) /
+         (1 + lambda(o) + lambda(i)) / (4 * o.z);
 }
 
 // The wider direction follows the texture coordinates, also where the instance is a mirror image,
@@ -285,17 +259,13 @@ TEST(ColouredGloss, FadesTowardsGrazing) {
   gloss.specular = 0.9f;
   gloss.specular_color = {1, 0.25f, 0};
   for (const double angle : {0.0, 0.9, 1.4}) {
-    const double cosine = std::cos(angle), behind = std::sqrt(1 - (1 - cosine * cosine) / 2.25);
-    const double parallel = (1.5 * cosine - behind) / (1.5 * cosine + behind);
-    const double across = (cosine - 1.5 * behind) / (cosine + 1.5 * behind);
-    const double fresnel = 0.5 * (parallel * parallel + across * across);
+    const double fresnel = truth::fresnel_dielectric(std::cos(angle), 1.5);
     const glm::dvec3 f0 = 0.04 * glm::dvec3(gloss.specular_color);
     const glm::dvec3 coat = 0.9 * (f0 + (1.0 - f0) * ((fresnel - 0.04) / 0.96));
     const Rendered result = in_white_furnace(plane_seen_from(direction(angle, 0.2), gloss), 32);
-    for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR(mean(result.layers.mixed)[c], 1 - coat.r + coat[c],
-                  4 * errors_of(result.layers)[c] + over_the_picture * coat.r + 1e-6)
-          << "angle " << angle << " channel " << c;
+    SCOPED_TRACE(angle);
+    expect_near(mean(result.layers.mixed), 1 - coat.r + coat,
+                4.0 * standard_errors_of_pixels(result.layers) + over_the_picture * coat.r + 1e-6);
   }
 }
 
@@ -305,9 +275,7 @@ TEST(ColouredGloss, TakesColoursAboveOne) {
   gloss.specular_color = {100, 10, 0};
   const View view = plane_seen_from({0, 0, 1}, gloss);
   const glm::dvec3 seen = mean(in_white_furnace(view, 1).layers.mixed);
-  EXPECT_NEAR(seen.r, 1, 1e-5);
-  EXPECT_NEAR(seen.g, 0.4, 1e-5);
-  EXPECT_NEAR(seen.b, 0, 1e-5);
+  expect_near(seen, {1, 0.4, 0}, 1e-5);
 }
 
 }  // namespace previz::test::material_test

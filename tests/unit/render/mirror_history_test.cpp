@@ -1,8 +1,5 @@
 // What mirrors and glass show keeps its past while the camera moves: it moves as the place that is
 // seen in them does, and not as their own surface.
-#include <cmath>
-
-#include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 
 namespace previz::test::mirror_history_test {
@@ -19,12 +16,11 @@ struct Room {
     scene::Scene& scene = view.scene;
     const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
     const std::uint32_t red = add_material(scene, diffuse(glm::vec3(0.6f, 0.1f, 0.1f)));
-    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
+    add(scene, rectangle_mesh(glm::dvec2(20)), gray);
     const std::uint32_t boxes = add_mesh(scene, box_mesh(glm::dvec3(0.3)));
-    add_instance(scene, boxes, red, placed_at({-0.8, 0.3, 0.15}));
-    box = add_instance(scene, boxes, red, placed_at({0.7, -0.3, 0.15}), scene::world_mixed);
-    mirror = add_instance(scene, add_mesh(scene, std::move(mesh)), add_material(scene, material),
-                          placed_at({0, 0, 0.5}), scene::world_mixed);
+    add_instance(scene, boxes, red, at({-0.8, 0.3, 0.15}));
+    box = add_instance(scene, boxes, red, at({0.7, -0.3, 0.15}), scene::world_mixed);
+    mirror = add(scene, std::move(mesh), material, at({0, 0, 0.5}), scene::world_mixed);
     see_evenly_lit(view, glm::vec3(0.4f), 0.9);
     view.world_from_camera = look_at({0, -2, 1.2}, {0, 0, 0.4});
   }
@@ -55,10 +51,9 @@ TEST_P(MirrorHistory, StaysWhileTheCameraMoves) {
     pose = moving_pose(frame);
     last = shown_frame(moving, pose, 1, true);
   }
-  const Plate truth = shown_frame(reference, pose, many, false);
-  const std::vector<float> mask = reference.layers().mask;
-  const double off_alone = apart_where_covered(shown_frame(alone, pose, 1, false), truth, mask);
-  const double off = apart_where_covered(last, truth, mask);
+  const Truth truth = truth_of(reference, pose, many);
+  const double off_alone = off_where(is_covered, shown_frame(alone, pose, 1, false), truth);
+  const double off = off_where(is_covered, last, truth);
   EXPECT_LT(off, 1.5 / std::sqrt(12.0) * off_alone);
 }
 
@@ -72,15 +67,14 @@ TEST_P(MirrorHistory, StaysWhileSomethingWalksBesideIt) {
   Plate last;
   for (int frame = 0; frame < 12; ++frame) {
     pose = moving_pose(frame);
-    instances[room.box].world_from_object = placed_at({0.8 - 0.01 * frame, -0.4, 0.15});
+    instances[room.box].world_from_object = at({0.8 - 0.01 * frame, -0.4, 0.15});
     walking.move(instances, {});
     last = shown_frame(walking, pose, 1, true);
   }
   for (SetRenderer* each : {&alone, &reference}) each->move(instances, {});
-  const Plate truth = shown_frame(reference, pose, many, false);
-  const std::vector<float> mask = reference.layers().mask;
-  EXPECT_LT(apart_where_covered(last, truth, mask),
-            0.6 * apart_where_covered(shown_frame(alone, pose, 1, false), truth, mask));
+  const Truth truth = truth_of(reference, pose, many);
+  EXPECT_LT(off_where(is_covered, last, truth),
+            0.6 * off_where(is_covered, shown_frame(alone, pose, 1, false), truth));
 }
 
 // Nothing is seen in it of where a box has been that has jumped, beyond half of what a fresh start
@@ -91,15 +85,13 @@ TEST_P(MirrorHistory, ShowsNoGhostOfWhatHasJumped) {
   const glm::dmat4& pose = room.view.world_from_camera;
   std::vector<scene::Instance> instances = room.view.scene.instances;
   for (int frame = 0; frame < 12; ++frame) shown_frame(renderer, pose, 1, true);
-  instances[room.box].world_from_object = placed_at({-0.7, -0.5, 0.15});
+  instances[room.box].world_from_object = at({-0.7, -0.5, 0.15});
   for (SetRenderer* each : {&renderer, &fresh, &reference}) each->move(instances, {});
-  const Plate truth = shown_frame(reference, pose, many, false);
-  const std::vector<float> mask = reference.layers().mask;
+  const Truth truth = truth_of(reference, pose, many);
   for (int frame = 0; frame < 5; ++frame) {
     const Plate after = shown_frame(renderer, pose, 1, true);
     const Plate begun = shown_frame(fresh, pose, 1, true);
-    EXPECT_LT(apart_where_covered(after, truth, mask),
-              1.5 * apart_where_covered(begun, truth, mask))
+    EXPECT_LT(off_where(is_covered, after, truth), 1.5 * off_where(is_covered, begun, truth))
         << frame;
   }
 }

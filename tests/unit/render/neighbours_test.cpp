@@ -2,13 +2,6 @@
 // in a neighbour is seen, and the picture depends on these frames alone.
 #include "daemon/render/neighbours.hpp"
 
-#include <cmath>
-#include <cstdlib>
-#include <glm/gtc/matrix_transform.hpp>
-#include <map>
-#include <set>
-
-#include "drivers/plate.hpp"
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
@@ -29,36 +22,8 @@ TEST(Neighbours, AreVisitedOnceInHopsOfAtMostTwoFrames) {
 }
 
 constexpr int width = averaged_width, height = averaged_height;
-constexpr double plate_code = 20000;
 
-// A floor, and above it a virtual box, seen from the side; codes are linear in radiance.
-struct Stage {
-  View view;
-  std::uint32_t box = 0;
-
-  Stage() {
-    scene::Scene& scene = view.scene;
-    const std::uint32_t gray = add_material(scene, diffuse(glm::vec3(0.5f)));
-    add_instance(scene, add_mesh(scene, rectangle_mesh(glm::dvec2(20))), gray);
-    box = add_instance(scene, add_mesh(scene, box_mesh(glm::dvec3(0.4))), gray, at({0, 0, 0.3}),
-                       scene::world_mixed);
-    see_evenly_lit(view, glm::vec3(0.4f), 0.9);
-    view.world_from_camera = look_at({0, -2, 1.4}, {0, 0, 0});
-  }
-  static glm::dmat4 at(const glm::dvec3& place) { return glm::translate(glm::dmat4(1.0), place); }
-
-  // Puts a virtual ball of glass in the place of the box, and a lamp above, whose light it gathers.
-  void make_glass() {
-    scene::Scene& scene = view.scene;
-    view.environment = uniform_environment(glm::vec3(0.05f));
-    scene.instances[box].mesh = add_mesh(scene, icosphere_mesh(0.3, 4));
-    scene.instances[box].material = add_material(scene, glass(1.5f));
-    set::Light key = lamp(set::LightType::sphere, glm::dvec3(60));
-    key.position = {1, 1, 3};
-    key.radius_m = 0.05;
-    scene.lights = {key};
-  }
-};
+using Stage = BoxAboveFloor;
 
 // A frame of a take: where the camera and the box are.
 struct Moment {
@@ -69,14 +34,9 @@ struct Moment {
 
 void begin(SetRenderer& renderer, const Stage& stage, const Moment& moment, std::uint32_t seed) {
   std::vector<scene::Instance> instances = stage.view.scene.instances;
-  instances[stage.box].world_from_object = Stage::at(moment.box);
+  instances[stage.box].world_from_object = at(moment.box);
   renderer.move(instances, stage.view.scene.lights);
-  renderer.begin(
-      {.plate = std::make_shared<const Plate>(
-           Plate{width, height, 16, std::vector<std::uint16_t>(3 * width * height, plate_code)}),
-       .exposure = 0.5,
-       .world_from_camera = moment.world_from_camera,
-       .seed = seed});
+  renderer.begin({gray_plate(), 0.5, moment.world_from_camera, seed});
 }
 
 render::KeptFramePtr kept(SetRenderer& renderer, const Stage& stage, const Moment& moment,
@@ -114,11 +74,6 @@ Take moving_box() {
     take[i] = {look_at({0, -2, 1.4}, {0, 0, 0}), {0.004 * i, 0.002 * i, 0.3}};
   return take;
 }
-
-struct Truth {
-  Plate picture;
-  std::vector<float> mask;
-};
 
 Truth truth_of(const Stage& stage, const Moment& moment, int samples = 512,
                const set::Estimation& estimation = {}) {
@@ -167,15 +122,9 @@ TEST_P(FrameAmongNeighbours, IsBetterDenoisedThanAlone) {
   const auto frames = chain(renderer, stage, take);
   const Plate alone = renderer.show_among({frames.back()}, true);
   const Plate among = renderer.show_among(frames, true);
-  const auto off = [&](const Plate& picture, bool of_outlines) {
-    double squares = 0;
-    for (std::size_t i = 0; i < picture.samples.size(); ++i)
-      if ((truth.mask[i / 3] > 0 && truth.mask[i / 3] < 1) == of_outlines)
-        squares += std::pow(picture.samples[i] - double(truth.picture.samples[i]), 2);
-    return std::sqrt(squares);
-  };
-  for (const bool of_outlines : {false, true})
-    EXPECT_LT(off(among, of_outlines), 0.72 * off(alone, of_outlines)) << of_outlines;
+  const auto is_elsewhere = [](float mask) { return !is_outline(mask); };
+  EXPECT_LT(off_where(is_outline, among, truth), 0.72 * off_where(is_outline, alone, truth));
+  EXPECT_LT(off_where(is_elsewhere, among, truth), 0.72 * off_where(is_elsewhere, alone, truth));
 }
 
 // Returns whether the 5x5 pixels around show the same world at all of their samples.
@@ -225,7 +174,7 @@ TEST_P(FrameAmongNeighbours, IsNotBiased) {
 // other work, and from one that has rendered none of them. With glass there is light of photons.
 TEST_P(FrameAmongNeighbours, IsTheSameWhoeverRenderedThem) {
   for (const bool of_glass : {false, true}) {
-    if (of_glass) stage.make_glass();
+    if (of_glass) stage.make_glass(60);
     SetRenderer first(stage.view), second(stage.view), idle(stage.view);
     const auto frames = chain(first, stage, take);
     for (int i = 0; i < 3; ++i) {
@@ -251,21 +200,14 @@ TEST_P(FrameAmongNeighbours, IsTheSameWhoeverRenderedThem) {
 // The floor and the light of photons on it, denoised, must be better for the neighbours, too.
 TEST(NeighboursOfGlass, TakeNoiseFromPhotonsLight) {
   Stage stage;
-  stage.make_glass();
+  stage.make_glass(60);
   Take take = moving_camera();
   const Truth truth = truth_of(stage, take[0], 256);
   SetRenderer renderer(stage.view);
   const auto frames = chain(renderer, stage, take);
-  const auto off = [&](const Plate& picture) {
-    double squares = 0;
-    for (std::size_t i = 0; i < picture.samples.size(); ++i)
-      if (truth.mask[i / 3] == 0)
-        squares += std::pow(picture.samples[i] - double(truth.picture.samples[i]), 2);
-    return std::sqrt(squares);
-  };
-  const double alone = off(renderer.show_among({frames.back()}, true));
-  const double among = off(renderer.show_among(frames, true));
-  EXPECT_LT(among, 0.8 * alone);
+  const Plate alone = renderer.show_among({frames.back()}, true);
+  const Plate among = renderer.show_among(frames, true);
+  EXPECT_LT(off_where(is_uncovered, among, truth), 0.8 * off_where(is_uncovered, alone, truth));
 }
 
 // A frame alone is what show() makes of it, and layers are what show() makes of them. Nothing of it
@@ -370,9 +312,7 @@ INSTANTIATE_TEST_SUITE_P(AJump, NeighboursAfter, ::testing::Values(0, 1, 2));
 TEST_P(NeighboursAfter, ShowNoGhost) {
   Stage stage;
   stage.view.environment = uniform_environment(glm::vec3(0.2f));
-  set::Light key = lamp(set::LightType::point, glm::dvec3(3));
-  key.position = {1, 0, 3};
-  stage.view.scene.lights = {key};
+  stage.view.scene.lights = {point_lamp({1, 0, 3}, glm::dvec3(3))};
   Take take;
   for (int i = -2; i <= 2; ++i) {
     const bool is_here = GetParam() == 0 ? i >= 0 : GetParam() == 1 ? i <= 0 : i == 0;

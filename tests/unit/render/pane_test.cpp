@@ -1,7 +1,6 @@
 // Smooth thin panes: light goes straight through them, in shadow rays, paths and photons alike.
-#include <numbers>
-
 #include "tests/support/render_fixture.hpp"
+#include "tests/truth/cpu_bsdf.hpp"
 
 namespace previz::test::pane_test {
 
@@ -11,21 +10,22 @@ constexpr double albedo = 0.6;
 const glm::dvec3 colour(2, 3, 5);
 const glm::dvec3 tint(0.9, 0.6, 0.2);
 
-scene::Material pane(float ior, const glm::dvec3& tint_of_pane) {
-  scene::Material material = glass(ior);
-  material.thin_walled = true;
-  material.base_color = glm::vec3(tint_of_pane);
-  return material;
-}
-
 // What a clear pane lets through: the unpolarised reflectance R of one side, and between both sides
 // R' = 2 R / (1 + R).
 double transmittance(double cosine, double ior) {
-  const double behind = std::sqrt(1 - (1 - cosine * cosine) / (ior * ior));
-  const double p = (ior * cosine - behind) / (ior * cosine + behind);
-  const double s = (cosine - ior * behind) / (cosine + ior * behind);
-  const double once = 0.5 * (p * p + s * s);
+  const double once = truth::fresnel_dielectric(cosine, ior);
   return 1 - 2 * once / (1 + once);
+}
+
+// Of an even light: 2 times the integral of T(c) c over the cosine.
+double mean_transmittance() {
+  constexpr int steps = 1000;
+  double sum = 0;
+  for (int i = 0; i < steps; ++i) {
+    const double cosine = (i + 0.5) / steps;
+    sum += 2 * transmittance(cosine, 1.5) * cosine / steps;
+  }
+  return sum;
 }
 
 // A pane 5 cm above the lit point, wider than all that light comes by; the camera looks under it.
@@ -35,33 +35,23 @@ double transmittance(double cosine, double ior) {
 View under_a_pane(const scene::Material& material, std::uint32_t presence = scene::world_both) {
   View view = lit_point(albedo);
   view.world_from_camera = look_at({0, -1, 0.03}, {0, 0, 0});
-  glm::dmat4 above(1);
-  above[3] = {300, 0, 0.05, 1};
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2000, 2000})),
-               add_material(view.scene, material), above, presence);
+  add(view.scene, rectangle_mesh({2000, 2000}), material, at({300, 0, 0.05}), presence);
   return view;
 }
 
-set::Light point_lamp() {
-  set::Light light = lamp(set::LightType::point, colour);
-  light.position = {1, 1, 2};
-  return light;
-}
+const set::Light key = point_lamp({1, 1, 2}, colour);
 
 // The lamp through the pane, however caustics are brought, and by either estimator. One bounce, so
 // that the pane mirrors nothing of the floor.
 TEST(Pane, LetsALampThroughByItsTransmittance) {
-  View view = under_a_pane(pane(1.5f, tint));
-  view.scene.lights.push_back(point_lamp());
+  View view = under_a_pane(pane(tint));
+  view.scene.lights.push_back(key);
   const double d2 = 6, cosine = 2 / std::sqrt(d2);
   const glm::dvec3 expected =
       albedo / pi * colour * tint * (transmittance(cosine, 1.5) * cosine / d2);
   for (const auto caustics : {set::Caustics::none, set::Caustics::photons, set::Caustics::traced}) {
-    set::Estimation estimation = up_to_depth(1);
-    estimation.caustics = caustics;
-    const Rendered result = render_clean(view, 4, estimation);
-    for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR(mean(result.layers.mixed)[c] / expected[c], 1, 1e-3) << "channel " << c;
+    const Rendered result = render_clean(view, 4, {.max_depth = 1, .caustics = caustics});
+    expect_near(mean(result.layers.mixed) / expected, glm::dvec3(1), 1e-3);
     EXPECT_EQ(mean(result.layers.diff), glm::dvec3(0));
   }
 }
@@ -71,61 +61,42 @@ TEST(Pane, OfOneWorldMakesTheDifferenceThatItKeeps) {
   const double d2 = 6, cosine = 2 / std::sqrt(d2);
   const glm::dvec3 clear = albedo / pi * colour * (cosine / d2);
   for (const std::uint32_t presence : {scene::world_mixed, scene::world_real}) {
-    View view = under_a_pane(pane(1.5f, tint), presence);
-    view.scene.lights.push_back(point_lamp());
+    View view = under_a_pane(pane(tint), presence);
+    view.scene.lights.push_back(key);
     const double sign = presence == scene::world_mixed ? 1 : -1;
-    for (const auto estimator : {set::Estimator::paired, set::Estimator::difference}) {
-      set::Estimation estimation = up_to_depth(1);
-      estimation.estimator = estimator;
-      const Rendered result = render_clean(view, 4, estimation);
-      for (int c = 0; c < 3; ++c) {
-        const double kept = tint[c] * transmittance(cosine, 1.5) - 1;
-        EXPECT_NEAR(mean(result.layers.diff)[c] / clear[c], sign * kept, 1e-3) << "channel " << c;
-      }
+    for (const auto estimator : both_estimators) {
+      const Rendered result = render_clean(view, 4, up_to_depth(1, estimator));
+      const glm::dvec3 kept = tint * transmittance(cosine, 1.5) - 1.0;
+      expect_near(mean(result.layers.diff) / clear, sign * kept, 1e-3);
     }
   }
 }
 
 // An even sky of 1 through a pane: by light samples, by the BSDF alone, and whether caustics are
-// traced or left out, 2 times the integral of T(c) c over the cosine.
+// traced or left out.
 TEST(Pane, LetsAnEvenSkyThroughByItsTransmittance) {
-  View view = under_a_pane(pane(1.5f, tint));
+  View view = under_a_pane(pane(tint));
   view.environment = uniform_environment(glm::vec3(1));
-  double through = 0;
-  constexpr int steps = 1000;
-  for (int i = 0; i < steps; ++i) {
-    const double cosine = (i + 0.5) / steps;
-    through += 2 * transmittance(cosine, 1.5) * cosine / steps;
-  }
+  const double through = mean_transmittance();
   for (const auto sampling : {set::LightSampling::importance, set::LightSampling::bsdf}) {
     for (const auto caustics :
          {set::Caustics::none, set::Caustics::photons, set::Caustics::traced}) {
-      set::Estimation estimation = up_to_depth(1);
-      estimation.caustics = caustics;
-      const Rendered result = render_clean(view, 64, estimation, sampling);
+      const Rendered result =
+          render_clean(view, 64, {.max_depth = 1, .caustics = caustics}, sampling);
       const double error = standard_error_of_pixels(result.layers) / (albedo * through * tint.g);
-      for (int c = 0; c < 3; ++c)
-        EXPECT_NEAR(mean(result.layers.mixed)[c] / (albedo * through * tint[c]), 1,
-                    4 * error + 1e-3)
-            << "channel " << c;
+      expect_near(mean(result.layers.mixed) / (albedo * through * tint), glm::dvec3(1),
+                  4 * error + 1e-3);
     }
   }
 }
 
 // What the floor sees of itself in a pane comes by paths, and is there once: floor, pane, floor.
 TEST(Pane, MirrorsTheFloorBelowIt) {
-  View view = under_a_pane(pane(1.5f, glm::dvec3(1)));
+  View view = under_a_pane(pane());
   view.environment = uniform_environment(glm::vec3(1));
-  set::Estimation estimation = up_to_depth(3);
-  estimation.caustics = set::Caustics::none;
-  const Rendered result = render_clean(view, 256, estimation);
-  double through = 0, mirrored = 0;
-  constexpr int steps = 1000;
-  for (int i = 0; i < steps; ++i) {
-    const double cosine = (i + 0.5) / steps;
-    through += 2 * transmittance(cosine, 1.5) * cosine / steps;
-    mirrored += 2 * (1 - transmittance(cosine, 1.5)) * cosine / steps;
-  }
+  const Rendered result =
+      render_clean(view, 256, {.max_depth = 3, .caustics = set::Caustics::none});
+  const double through = mean_transmittance(), mirrored = 1 - through;
   // The pane's mirror image of the floor, lit by the sky through the pane; all of the floor that is
   // seen in it at less than 89.7 degrees is within its 10 m.
   const double expected = albedo * through * (1 + albedo * mirrored);
@@ -136,74 +107,46 @@ TEST(Pane, MirrorsTheFloorBelowIt) {
 // A virtual wall close behind a pane takes nothing of the real world: a ray that forks at the wall
 // goes on behind the pane, through which it has passed already.
 TEST(Pane, IsPassedOnceByARayThatForksCloseBehindIt) {
-  View view;
-  view.environment = uniform_environment(glm::vec3(1));
-  view.calibration = pinhole(16, 16, 0.3);
-  view.world_from_camera = look_at({0, 0, 1}, {0, 0, 0});
+  View view = empty_view({0, 0, 1}, {0, 0, 0}, pinhole(16, 16, 0.3), glm::vec3(1));
   const auto wall = add_mesh(view.scene, rectangle_mesh({4, 4}));
-  add_instance(view.scene, wall, add_material(view.scene, pane(1.5f, tint)));
-  glm::dmat4 behind(1);
-  behind[3].z = -5e-5;  // of the ray's length, which is 1
-  add_instance(view.scene, wall, add_material(view.scene, diffuse(glm::vec3(0))), behind,
+  add_instance(view.scene, wall, add_material(view.scene, pane(tint)));
+  // The ray's length is 1.
+  add_instance(view.scene, wall, add_material(view.scene, diffuse(glm::vec3(0))), at({0, 0, -5e-5}),
                scene::world_mixed);
   const Rendered result = render_clean(view, 64, up_to_depth(1));
   const double through = transmittance(1, 1.5);
   const double error = standard_error_of_pixels(result.layers) + 2e-3;
-  for (int c = 0; c < 3; ++c) {
-    EXPECT_NEAR(mean(result.layers.real)[c], tint[c] * through + 1 - through, 4 * error);
-    EXPECT_NEAR(mean(result.layers.mixed)[c], 1 - through, 4 * error);
-  }
+  expect_near(mean(result.layers.real), tint * through + 1.0 - through, 4 * error);
+  expect_near(mean(result.layers.mixed), glm::dvec3(1 - through), 4 * error);
 }
 
 // A mirror beside the floor, and the lamp in a bubble of tinted air that bends nothing: direct
 // light and the mirror's image, which photons bring, are dimmed by the tint to the last photon's
 // noise.
 TEST(Pane, LetsPhotonsThroughByItsTint) {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({1, 1})),
-               add_material(view.scene, diffuse(glm::vec3(albedo))));
+  View view = empty_view({0, -0.4, 1}, {0, 0, 0}, pinhole(16, 16, 0.3));
+  add(view.scene, rectangle_mesh({1, 1}), diffuse(glm::vec3(albedo)));
   glm::dmat4 pose(1);
   pose[0] = {0, 0, 1, 0};
   pose[2] = {-1, 0, 0, 0};
   pose[3] = {1, 0, 1, 1};
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
-               add_material(view.scene, metal(glm::vec3(1), 0)), pose);
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(16, 16, 0.3);
-  view.world_from_camera = look_at({0, -0.4, 1}, {0, 0, 0});
-  set::Light light = lamp(set::LightType::sphere, colour);
-  light.position = {0.2, 0.3, 1.2};
-  light.radius_m = 0.1;
+  add(view.scene, rectangle_mesh({2, 2}), metal(glm::vec3(1), 0), pose);
+  set::Light light = sphere_lamp({0.2, 0.3, 1.2}, 0.1, colour);
   view.scene.lights.push_back(light);
-  set::Estimation estimation = up_to_depth(2);
-  estimation.photons = 20;
-  estimation.photon_radius_px = 2;
+  const set::Estimation estimation{.max_depth = 2, .photons = 20, .photon_radius_px = 2};
   const auto of = [&](const View& lit) {
-    glm::dvec3 sum(0), squares(0);
-    constexpr int scrambles = 16;
     SetRenderer renderer(lit, estimation);
-    for (std::uint32_t i = 0; i < scrambles; ++i) {
-      renderer.begin({{}, 1.0, lit.world_from_camera, 100 + i});
-      renderer.render(8);
-      expect_clean(renderer.counters());
-      const glm::dvec3 picture = mean(renderer.layers().mixed);
-      sum += picture / static_cast<double>(scrambles);
-      squares += picture * picture / static_cast<double>(scrambles);
-    }
-    return std::pair(sum, glm::sqrt(glm::max(squares - sum * sum, 0.0) / (scrambles - 1.0)));
+    std::vector<glm::dvec3> means;
+    for (std::uint32_t i = 0; i < 16; ++i)
+      means.push_back(mean(renderer.rendered_clean(8, 100 + i).mixed));
+    return estimate_of(means);
   };
   const auto [clear, clear_error] = of(view);
-  glm::dmat4 around(1);
-  around[3] = glm::dvec4(light.position, 1);
   for (const glm::dvec3& bubble_tint : {glm::dvec3(0.5), tint}) {
     View tinted = view;
-    add_instance(tinted.scene, add_mesh(tinted.scene, icosphere_mesh(0.15, 3)),
-                 add_material(tinted.scene, pane(1.0f, bubble_tint)), around);
+    add(tinted.scene, icosphere_mesh(0.15, 3), pane(bubble_tint, 1.0f), at(light.position));
     const auto [dimmed, error] = of(tinted);
-    for (int c = 0; c < 3; ++c)
-      EXPECT_NEAR(dimmed[c], bubble_tint[c] * clear[c],
-                  4 * (error[c] + bubble_tint[c] * clear_error[c]))
-          << "channel " << c;
+    expect_near(dimmed, bubble_tint * clear, 4.0 * (error + bubble_tint * clear_error));
   }
 }
 

@@ -1,6 +1,4 @@
 // The device's own clock: what it times is what ran, and it is silent where nobody asked.
-#include <algorithm>
-
 #include "daemon/render/device.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
@@ -9,12 +7,8 @@ namespace previz::test::pass_clock_test {
 constexpr int width = 32, height = 24, bounces = 2;
 
 View floor_under_sky() {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
-               add_material(view.scene, diffuse(glm::vec3(0.5f))));
-  view.environment = uniform_environment(glm::vec3(0.2f));
-  view.calibration = pinhole(width, height, 0.8);
-  view.world_from_camera = look_at({0, -0.8, 1}, {0, 0, 0});
+  View view = empty_view({0, -0.8, 1}, {0, 0, 0}, pinhole(width, height, 0.8), glm::vec3(0.2f));
+  add(view.scene, rectangle_mesh({2, 2}), diffuse(glm::vec3(0.5f)));
   return view;
 }
 
@@ -24,9 +18,7 @@ render::DeviceTimes times_of_a_frame(bool times_passes) {
   options.times_passes = times_passes;
   const auto device = render::open_device(options);
   const View view = floor_under_sky();
-  set::Estimation estimation;
-  estimation.max_depth = bounces;
-  SetRenderer renderer(view, estimation, device);
+  SetRenderer renderer(view, up_to_depth(bounces), set::LightSampling::importance, device);
   render::take_times(*device);
   const std::uint64_t before = device->submissions();
   renderer.begin({.plate = nullptr, .world_from_camera = view.world_from_camera});

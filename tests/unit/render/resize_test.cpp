@@ -1,9 +1,6 @@
 // A renderer that changes the size of its picture, as the frame rate asks: nothing is made anew,
 // and the pictures are those of a renderer that was made for the size.
-#include <cmath>
-
 #include "daemon/render/device.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::resize_test {
@@ -40,13 +37,9 @@ INSTANTIATE_TEST_SUITE_P(RealRadiance, ResizeOf,
                          ::testing::Values(set::RealRadiance::traced, set::RealRadiance::camera));
 
 TEST_P(ResizeOf, MakesNothingAnewAndChangesNoBit) {
-  RandomScene options;
-  options.width = 401;  // more slots than a CPU has in flight: several tiles
-  options.height = 352;
-  const View view = random_scene(3, options);
-  set::Estimation estimation;
-  estimation.real_radiance = GetParam();
-  estimation.max_depth = 3;
+  // More slots than a CPU has in flight: several tiles.
+  const View view = random_scene(3, {.width = 401, .height = 352});
+  const set::Estimation estimation{.real_radiance = GetParam(), .max_depth = 3};
   SetRenderer renderer(view, estimation);
   pictures_of(renderer, view, view.calibration.intrinsics);
   render::Device::Made before = shared_device()->made();
@@ -59,9 +52,9 @@ TEST_P(ResizeOf, MakesNothingAnewAndChangesNoBit) {
     const Pictures pictures = pictures_of(renderer, view, calibration.intrinsics);
     EXPECT_EQ(shared_device()->made(), before);
 
-    render::Renderer fresh(shared_device(), estimation, calibration);
-    fresh.set_scene(view.scene);
-    fresh.set_environment(view.environment, set::LightSampling::importance);
+    View resized = view;
+    resized.calibration = calibration;
+    SetRenderer fresh(resized, estimation);
     const Pictures expected = pictures_of(fresh, view, calibration.intrinsics);
     EXPECT_EQ(pictures.shown.samples, expected.shown.samples);
     EXPECT_EQ(pictures.denoised.samples, expected.denoised.samples);

@@ -20,11 +20,8 @@ View half_lit_point() {
 }
 
 std::vector<double> rendered(int samples) {
-  set::Estimation estimation;
-  estimation.max_depth = 1;
   const Rendered result =
-      render_view(half_lit_point(), samples, estimation, set::LightSampling::bsdf);
-  expect_clean(result.counters);
+      render_clean(half_lit_point(), samples, up_to_depth(1), set::LightSampling::bsdf);
   std::vector<double> values;
   for (const glm::vec3& pixel : result.layers.mixed) values.push_back(pixel.g);
   return values;

@@ -1,7 +1,4 @@
 // The picture made on the device is that of the layers, whatever they are composited by.
-#include <random>
-
-#include "drivers/plate.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::show_test {
@@ -46,15 +43,10 @@ INSTANTIATE_TEST_SUITE_P(Composites, ShowOf,
                                            set::Composite::hybrid));
 
 TEST_P(ShowOf, ASetIsThePictureOfItsLayers) {
-  RandomScene options;
-  options.width = 71;  // an odd number of pixels
-  options.height = 49;
-  set::Estimation estimation;
-  estimation.composite = GetParam();
-  View view = random_scene(3, options);
+  View view = random_scene(3, {.width = 71, .height = 49});  // an odd number of pixels
   // The denoiser keeps photons' light apart and divides by the albedo of a scene with textures:
   // both are in no layer.
-  estimation.caustics = set::Caustics::traced;
+  const set::Estimation estimation{.composite = GetParam(), .caustics = set::Caustics::traced};
   for (scene::Material& material : view.scene.materials)
     material.base_color_texture = material.metallic_roughness_texture = material.emission_texture =
         scene::no_texture;
@@ -90,16 +82,9 @@ TEST_P(ShowOf, ASetIsThePictureOfItsLayers) {
 }
 
 TEST(Show, WithoutAVirtualObjectIsThePlateBitForBit) {
-  RandomScene options;
-  options.width = 71;
-  options.height = 49;
-  options.virtual_objects = 0;
-  const View view = random_scene(3, options);
-  for (const auto composite :
-       {set::Composite::additive, set::Composite::ratio, set::Composite::hybrid}) {
-    set::Estimation estimation;
-    estimation.composite = composite;
-    SetRenderer renderer(view, estimation);
+  const View view = random_scene(3, {.width = 71, .height = 49, .virtual_objects = 0});
+  for (const auto composite : all_composites) {
+    SetRenderer renderer(view, {.composite = composite});
     for (const int bits : {8, 16}) {
       const Plate plate = random_plate(71, 49, bits);
       renderer.begin({std::make_shared<const Plate>(plate), 0.85, view.world_from_camera});
@@ -111,26 +96,16 @@ TEST(Show, WithoutAVirtualObjectIsThePlateBitForBit) {
 }
 
 TEST_P(ShowOf, ASetIsOverBlackWhereThereIsNoPlate) {
-  RandomScene options;
-  options.width = 40;
-  options.height = 30;
-  set::Estimation estimation;
-  estimation.composite = GetParam();
-  const View view = random_scene(4, options);
-  SetRenderer renderer(view, estimation);
-  renderer.begin({{}, 1.0, view.world_from_camera});
-  renderer.render(3);
-  render::Layers layers = renderer.layers();
+  const View view = random_scene(4, {.width = 40, .height = 30});
+  SetRenderer renderer(view, {.composite = GetParam()});
+  render::Layers layers = renderer.rendered(3);
   expect_same_but_for_rounding(renderer.show(false), reference(layers, {}, 8, 1));
   const Plate shown = renderer.show(true, &layers);  // which denoises the layers
   expect_same_but_for_rounding(shown, reference(layers, {}, 8, 1));
 }
 
 TEST(Show, FollowsThePicturesSize) {
-  RandomScene options;
-  options.width = 40;
-  options.height = 30;
-  View view = random_scene(4, options);
+  View view = random_scene(4, {.width = 40, .height = 30});
   SetRenderer renderer(view);
   for (const auto& [width, height] : {std::pair(40, 30), std::pair(61, 47), std::pair(7, 5)}) {
     view.calibration.intrinsics.width = width;

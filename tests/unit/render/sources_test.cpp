@@ -24,15 +24,10 @@ lighting::EnvironmentMap lamp_and_sky() {
 
 // A real floor and a virtual ball that stands on it.
 View ball_on_floor() {
-  View view;
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({2, 2})),
-               add_material(view.scene, diffuse(glm::vec3(0.6))));
-  glm::dmat4 up(1.0);
-  up[3].z = 0.2;
-  add_instance(view.scene, add_mesh(view.scene, icosphere_mesh(0.2, 3)),
-               add_material(view.scene, diffuse(glm::vec3(0.8))), up, scene::world_mixed);
-  view.calibration = pinhole(32, 24, 0.7);
-  view.world_from_camera = look_at({0, -1.2, 0.8}, {0, 0, 0.1});
+  View view = empty_view({0, -1.2, 0.8}, {0, 0, 0.1}, pinhole(32, 24, 0.7));
+  add(view.scene, rectangle_mesh({2, 2}), diffuse(glm::vec3(0.6)));
+  add(view.scene, icosphere_mesh(0.2, 3), diffuse(glm::vec3(0.8)), at({0, 0, 0.2}),
+      scene::world_mixed);
   view.environment = lamp_and_sky();
   return view;
 }
@@ -56,24 +51,15 @@ Lit split(const lighting::EnvironmentMap& map, set::LightMode mode,
 
 class SourceLight : public ::testing::Test {
  protected:
-  explicit SourceLight(const View& view = ball_on_floor())
-      : view_(view), renderer_(shared_device(), set::Estimation{}, view.calibration) {
-    renderer_.set_scene(view.scene);
-  }
+  explicit SourceLight(const View& view = ball_on_floor()) : view_(view), renderer_(view) {}
   render::Layers rendered(const Lit& lit, int samples, std::uint32_t seed = 1) {
     renderer_.set_environment(lit.environment, set::LightSampling::importance);
     renderer_.set_sources(lit.lamps);
-    render::FrameInput frame;
-    frame.world_from_camera = view_.world_from_camera;
-    frame.seed = seed;
-    renderer_.begin(frame);
-    renderer_.render(samples);
-    expect_clean(renderer_.counters());
-    return renderer_.layers();
+    return renderer_.rendered_clean(samples, seed);
   }
 
   const View view_;
-  render::Renderer renderer_;
+  SetRenderer renderer_;
 };
 
 // Means over the picture of 8 independent renderings each, within 4 standard errors of their
@@ -81,31 +67,29 @@ class SourceLight : public ::testing::Test {
 // bilinear interpolation, against a disc. Neither moves the picture's mean of light or shadow by
 // more than a share of the penumbra's own size, 6 degrees of a radian: 0.5 % of the mean.
 TEST_F(SourceLight, LightsAsTheImageItWasTakenOutOf) {
-  constexpr int runs = 8;
-  const auto means = [&](const Lit& lit) {
-    std::vector<std::array<double, 2>> result;
-    for (std::uint32_t run = 0; run < runs; ++run) {
-      const render::Layers layers = rendered(lit, 32, 100 + run);
-      result.push_back({mean(layers.mixed).g, mean(layers.diff).g});
-    }
-    return result;
+  struct Means {
+    Estimate mixed, difference;
   };
-  const auto image = means({view_.environment, {}});
-  for (const set::LightMode mode : {set::LightMode::hybrid, set::LightMode::sources}) {
-    const auto split_up = means(split(view_.environment, mode));
-    for (std::size_t layer = 0; layer < 2; ++layer) {
-      const auto of = [&](const auto& values) {
-        double sum = 0, squares = 0;
-        for (const auto& value : values) sum += value[layer] / runs;
-        for (const auto& value : values) squares += (value[layer] - sum) * (value[layer] - sum);
-        return std::pair(sum, squares / (runs * (runs - 1)));
-      };
-      const auto [expected, variance] = of(image);
-      const auto [found, other_variance] = of(split_up);
-      EXPECT_NEAR(found, expected,
-                  4 * std::sqrt(variance + other_variance) + 0.005 * std::abs(expected))
-          << (layer == 0 ? "mixed" : "difference");
+  const auto means = [&](const Lit& lit) {
+    std::vector<glm::dvec3> mixed, difference;
+    for (std::uint32_t run = 0; run < 8; ++run) {
+      const render::Layers layers = rendered(lit, 32, 100 + run);
+      mixed.push_back(mean(layers.mixed));
+      difference.push_back(mean(layers.diff));
     }
+    return Means{estimate_of(mixed), estimate_of(difference)};
+  };
+  const auto expect_same = [](const Estimate& found, const Estimate& expected) {
+    EXPECT_NEAR(
+        found.mean.g, expected.mean.g,
+        4 * std::hypot(found.error.g, expected.error.g) + 0.005 * std::abs(expected.mean.g));
+  };
+  const Means image = means({view_.environment, {}});
+  for (const set::LightMode mode : {set::LightMode::hybrid, set::LightMode::sources}) {
+    const Means split_up = means(split(view_.environment, mode));
+    SCOPED_TRACE(mode == set::LightMode::hybrid ? "hybrid" : "sources");
+    expect_same(split_up.mixed, image.mixed);
+    expect_same(split_up.difference, image.difference);
   }
 }
 

@@ -10,7 +10,6 @@
 #include "shaders/refit_nodes.spv.h"
 #include "shaders/shade.spv.h"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::spirv_test {
 
@@ -81,23 +80,17 @@ TEST(Spirv, TheLastPassOfASampleAsksOnlyWhetherThereAreACameraTexturesOrPhotons)
 // that can be carried. What is carried is multiplied by nothing and adds no random number, so that
 // the pictures are equal bit for bit (daemon/render/feature.hpp).
 TEST(Spirv, NoPixelDependsOnAFeatureThatIsOnlyCompiledIn) {
-  View view;
-  view.environment = uniform_environment(glm::vec3(0.3f));
-  view.calibration = pinhole(12, 8, 0.8);
-  view.world_from_camera = look_at({0, -2, 1.2}, {0, 0, 0.2});
-  add_instance(view.scene, add_mesh(view.scene, box_mesh(glm::dvec3(0.5))),
-               add_material(view.scene, diffuse(glm::vec3(0.5))));
+  View view = empty_view({0, -2, 1.2}, {0, 0, 0.2}, pinhole(12, 8, 0.8), glm::vec3(0.3f));
+  add(view.scene, box_mesh(glm::dvec3(0.5)), diffuse(glm::vec3(0.5)));
   std::uint32_t carried = 0;
   for (const render::Feature& feature : render::features())
     if (feature.can_be_carried) carried |= feature.bit;
   const auto layers_with = [&](std::uint32_t features) {
     SetRenderer renderer(view, up_to_depth(3));
     renderer.carry(features);
-    renderer.begin({{}, 1.0, view.world_from_camera});
+    const render::Layers layers = renderer.rendered_clean(2);
     EXPECT_NE(carried & ~renderer.needed(), 0u);
-    renderer.render(2);
-    expect_clean(renderer.counters());
-    return renderer.layers();
+    return layers;
   };
   const render::Layers masked = layers_with(0), whole = layers_with(carried);
   EXPECT_EQ(masked.mixed, whole.mixed);

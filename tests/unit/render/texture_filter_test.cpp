@@ -2,21 +2,17 @@
 // footprint covers, and that pictures converge to those of textures looked up at points.
 #include "daemon/render/mip_levels.hpp"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::texture_filter_test {
 
 set::Estimation filtered(int depth = 1) {
-  set::Estimation estimation = up_to_depth(depth);
-  estimation.filter_textures = true;
-  return estimation;
+  return {.max_depth = depth, .filter_textures = true};
 }
 
 // Each texel is black or white by chance, or by turns.
 scene::Texture patches(int side, bool by_turns, std::uint32_t seed = 1) {
   std::mt19937 random(seed);
-  scene::Texture texture;
-  texture.width = texture.height = side;
+  scene::Texture texture = texture_of(side, side);
   for (int y = 0; y < side; ++y)
     for (int x = 0; x < side; ++x)
       texture.texels.emplace_back(
@@ -29,17 +25,13 @@ constexpr int picture_side = 16;
 // Looks straight down at a square of 1 m with the texture on it, of which a pixel shows 1/64 m. A
 // distant lamp without a size lights it, so that no sample has any noise but that of the texture.
 View seen_from_above(scene::Texture texture) {
-  View view;
+  View view =
+      empty_view({0, 0, 1}, {0, 0, 0}, pinhole(picture_side, picture_side, 2 * std::atan(0.125)));
   scene::Material material = diffuse(glm::vec3(1));
   material.base_color_texture = add_texture(view.scene, std::move(texture));
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({1, 1})),
-               add_material(view.scene, material));
-  set::Light sun = lamp(set::LightType::directional);
-  sun.emission = glm::dvec3(std::numbers::pi);  // a white surface has a radiance of 1
-  view.scene.lights = {sun};
-  view.environment = uniform_environment(glm::vec3(0));
-  view.calibration = pinhole(picture_side, picture_side, 2 * std::atan(0.125));
-  view.world_from_camera = look_at({0, 0, 1}, {0, 0, 0});
+  add(view.scene, rectangle_mesh({1, 1}), material);
+  // A white surface has a radiance of 1.
+  view.scene.lights = {lamp(set::LightType::directional, glm::dvec3(std::numbers::pi))};
   return view;
 }
 
@@ -58,9 +50,7 @@ double rms_error(const std::vector<double>& picture, const std::vector<double>& 
 }
 
 TEST(MipLevels, AreMeansOfAreasOfAnySize) {
-  scene::Texture texture;
-  texture.width = 5;
-  texture.height = 3;
+  scene::Texture texture = texture_of(5, 3);
   glm::dvec4 sum(0);
   for (int i = 0; i < 15; ++i) {
     texture.texels.emplace_back(i, i * i, 1.0f / (1.0f + static_cast<float>(i)), 1);
@@ -151,22 +141,11 @@ TEST(FilteredTextures, AreReadAsTheyAreWhereATexelDecidesWhatASurfaceIs) {
             render_clean(view, 4, up_to_depth(2)).layers.mixed);
 }
 
-// The mean of a number of independent renders, and its standard error.
-struct Estimate {
-  double mean = 0, error = 0;
-};
-
-Estimate estimate_of(const View& view, set::Estimation estimation) {
-  constexpr int renders = 8;
-  double sum = 0, squares = 0;
-  for (int seed = 1; seed <= renders; ++seed) {
-    estimation.seed = static_cast<std::uint32_t>(seed);
-    const double value = mean(render_clean(view, 64, estimation).layers.mixed).g;
-    sum += value;
-    squares += value * value;
-  }
-  const double variance = (squares - sum * sum / renders) / (renders - 1);
-  return {sum / renders, std::sqrt(variance / renders)};
+Estimate mean_of_renders(const View& view, set::Estimation estimation) {
+  std::vector<glm::dvec3> means;
+  for (estimation.seed = 1; estimation.seed <= 8; ++estimation.seed)
+    means.push_back(mean(render_clean(view, 64, estimation).layers.mixed));
+  return estimate_of(means);
 }
 
 // A floor in the light of a wall with a fine pattern, which its lobes see over wide footprints.
@@ -180,12 +159,11 @@ TEST(FilteredTextures, LightWhatIsAroundThemAlike) {
   upright[1] = glm::dvec4(0, 0, 1, 0);
   upright[2] = glm::dvec4(0, -1, 0, 0);
   upright[3] = glm::dvec4(0, 0.3, 0.5, 1);
-  add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({1, 1})),
-               add_material(view.scene, wall), upright);
+  add(view.scene, rectangle_mesh({1, 1}), wall, upright);
   view.scene.lights.clear();
-  const Estimate with = estimate_of(view, filtered(2));
-  const Estimate without = estimate_of(view, up_to_depth(2));
-  EXPECT_NEAR(with.mean, without.mean, 4 * std::hypot(with.error, without.error));
+  const Estimate with = mean_of_renders(view, filtered(2));
+  const Estimate without = mean_of_renders(view, up_to_depth(2));
+  EXPECT_NEAR(with.mean.g, without.mean.g, 4 * std::hypot(with.error.g, without.error.g));
 }
 
 }  // namespace previz::test::texture_filter_test

@@ -2,7 +2,6 @@
 // that, and that the picture is that of a scene which was made so.
 #include "daemon/render/feature.hpp"
 #include "tests/support/render_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::test::variants_test {
 
@@ -14,18 +13,15 @@ struct Stage {
     view.environment = uniform_environment(glm::vec3(0.2f));
     view.calibration = pinhole(32, 24, 0.8);
     view.world_from_camera = look_at({0, -2, 1.2}, {0, 0, 0.2});
-    add_instance(view.scene, add_mesh(view.scene, rectangle_mesh({4, 4})),
-                 add_material(view.scene, diffuse(glm::vec3(0.5))));
+    add(view.scene, rectangle_mesh({4, 4}), diffuse(glm::vec3(0.5)));
     const std::uint32_t mesh = add_mesh(view.scene, box_mesh(glm::dvec3(0.4)));
-    glm::dmat4 above(1.0);
-    above[3] = glm::dvec4(0, 0, 0.4, 1);
     scene::Variants variants;
     variants.names = {"mirror", "lamp"};
     variants.parts.resize(1);
     for (const scene::Material& material :
          {diffuse(glm::vec3(0.3)), metal(glm::vec3(0.9), 0), emitter(glm::vec3(3))})
       variants.parts[0].looks.push_back({mesh, add_material(view.scene, material)});
-    box = add_instance(view.scene, mesh, variants.parts[0].looks[0].material, above,
+    box = add_instance(view.scene, mesh, variants.parts[0].looks[0].material, at({0, 0, 0.4}),
                        scene::world_mixed);
     variants.parts[0].instance = box;
     variants.object = view.scene.instances[box].object;
@@ -43,11 +39,9 @@ struct Picture {
   render::Counters counters;
 };
 
-Picture picture_of(render::Renderer& renderer, const View& view) {
-  renderer.begin({{}, 1.0, view.world_from_camera});
-  renderer.render(4);
-  expect_clean(renderer.counters());
-  return {renderer.layers().mixed, renderer.counters()};
+Picture picture_of(SetRenderer& renderer) {
+  const render::Layers layers = renderer.rendered_clean(4);
+  return {layers.mixed, renderer.counters()};
 }
 
 // Switching builds no tree, uploads no material and no texture, compiles no pipeline, and encodes
@@ -55,7 +49,7 @@ Picture picture_of(render::Renderer& renderer, const View& view) {
 TEST(Variants, AreShownWithoutATreeAnUploadOrAPipeline) {
   const Stage stage;
   SetRenderer renderer(stage.view, up_to_depth(4));
-  const Picture grey = picture_of(renderer, stage.view);
+  const Picture grey = picture_of(renderer);
   EXPECT_EQ(grey.counters.built_trees, 2u);
   EXPECT_EQ(grey.counters.uploaded_materials, 1u);
   EXPECT_EQ(grey.counters.encoded_lights, 1u);
@@ -68,14 +62,14 @@ TEST(Variants, AreShownWithoutATreeAnUploadOrAPipeline) {
     View as_made = stage.view;
     as_made.scene.instances = stage.shown_as(variant);
     renderer.move(as_made.scene.instances, stage.view.scene.lights);
-    const Picture shown = picture_of(renderer, stage.view);
+    const Picture shown = picture_of(renderer);
     EXPECT_EQ(shown.counters.built_trees, 2u) << variant;
     EXPECT_EQ(shown.counters.uploaded_materials, 1u) << variant;
     EXPECT_EQ(shown.counters.uploaded_textures, 1u) << variant;
     EXPECT_EQ(shown.counters.encoded_lights, encoded) << variant;
     EXPECT_EQ(renderer.needed(), needed) << variant;
     SetRenderer fresh(as_made, up_to_depth(4));
-    EXPECT_EQ(picture_of(fresh, as_made).mixed, shown.mixed) << variant;
+    EXPECT_EQ(picture_of(fresh).mixed, shown.mixed) << variant;
   }
 }
 
@@ -84,14 +78,14 @@ TEST(Variants, AreShownWithoutATreeAnUploadOrAPipeline) {
 TEST(Variants, ASceneWithOtherMaterialsKeepsItsTrees) {
   Stage stage;
   SetRenderer renderer(stage.view, up_to_depth(4));
-  picture_of(renderer, stage.view);
+  picture_of(renderer);
   const auto set_again = [&](const View& view) {
     renderer.begin_set(up_to_depth(4), view.calibration);
     renderer.set_scene(view.scene);
     renderer.set_environment(view.environment, set::LightSampling::importance);
-    const Picture again = picture_of(renderer, view);
+    const Picture again = picture_of(renderer);
     SetRenderer fresh(view, up_to_depth(4));
-    EXPECT_EQ(picture_of(fresh, view).mixed, again.mixed);
+    EXPECT_EQ(picture_of(fresh).mixed, again.mixed);
     return again.counters;
   };
   View repainted = stage.view;
@@ -105,10 +99,8 @@ TEST(Variants, ASceneWithOtherMaterialsKeepsItsTrees) {
   repainted.scene.materials[0].emission = {1, 2, 3};  // the table is a lamp
   EXPECT_EQ(set_again(repainted).built_trees, 2u);
 
-  scene::Texture texture;
-  texture.width = texture.height = 1;
-  texture.texels = {glm::vec4(0.5f)};
-  repainted.scene.materials[0].base_color_texture = add_texture(repainted.scene, texture);
+  repainted.scene.materials[0].base_color_texture =
+      add_texture(repainted.scene, texture_of(glm::vec4(0.5f)));
   counters = set_again(repainted);
   EXPECT_EQ(counters.built_trees, 2u);
   EXPECT_EQ(counters.uploaded_textures, 2u);
