@@ -179,7 +179,7 @@ TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
   };
   recorder.start();
   offer();
-  ASSERT_TRUE(wait_until("the take is begun", [&] { return recorder.status().frames == 1; }));
+  ASSERT_TRUE(wait_for_frames(recorder, 1));
   disk.lock();
   ASSERT_TRUE(wait_until("frames are dropped", [&] {
     offer();

@@ -101,12 +101,8 @@ TEST(OsdPainter, NoticesBeyondTheScreenAreCounted) {
 }
 
 TEST(OsdPainter, AFontThatIsMissingIsNamed) {
-  try {
-    const OsdPainter painter(64, 64, 0.1, "/no/such/font.ttf");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("/no/such/font.ttf"));
-  }
+  const std::string font = "/no/such/font.ttf";
+  EXPECT_THAT(test::error_of([&] { OsdPainter(64, 64, 0.1, font); }), HasSubstr(font));
 }
 
 TEST(Font, WidthGrowsWithTheTextAndAnyBytesAreDrawn) {

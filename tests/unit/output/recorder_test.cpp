@@ -15,7 +15,6 @@
 
 namespace previz::output::recorder_test {
 
-using session::is_frame;
 using session::mentions;
 using session::noise_frame;
 using session::TemporaryDirectory;
@@ -28,27 +27,6 @@ RecorderOptions options_in(const std::filesystem::path& directory) {
   options.take.info.take->notes = "rain";
   options.reserve_bytes = 0;
   return options;
-}
-
-// What the take has: positions of its frames in the stream of noise, each compared bit for bit.
-std::vector<std::uint64_t> frames_of(const std::filesystem::path& take,
-                                     const std::string& source = "observer") {
-  session::Session session = session::open_session(take);
-  const auto stream = session::open_stream(session, source);
-  std::vector<std::uint64_t> indices;
-  if (!stream) return indices;
-  for (std::size_t i = 0; i < stream->records().size(); ++i) {
-    const std::uint64_t index = stream->records()[i].sequence - 100;
-    EXPECT_TRUE(is_frame(*stream->read(i), index)) << index;
-    indices.push_back(index);
-  }
-  return indices;
-}
-
-std::vector<std::uint64_t> count_from(std::uint64_t first, std::uint64_t last) {
-  std::vector<std::uint64_t> numbers;
-  for (; first <= last; ++first) numbers.push_back(first);
-  return numbers;
 }
 
 // Whoever takes the disk out after "recording ended" must be able to see that the take is whole.
@@ -188,7 +166,7 @@ TEST(Recorder, TellsTheTimeOfATakeAndTheRoomThatIsLeft) {
   for (const std::uint64_t i : {10, 11, 12, 13}) recorder.offer(picture(i));
   recorder.offer(picture(20, "light"));
   recorder.offer(picture(14));
-  ASSERT_TRUE(wait_until("five frames are written", [&] { return recorder.status().frames == 5; }));
+  ASSERT_TRUE(wait_for_frames(recorder, 5));
   EXPECT_DOUBLE_EQ(recorder.status().seconds, 4e-9 * interval_ns);
 }
 
@@ -211,9 +189,7 @@ TEST(Recorder, TheTrackOfTheLastFrameMayComeAfterTheButton) {
   const TemporaryDirectory directory;
   {
     Recorder recorder(options_in(directory.path()));
-    recorder.start();
-    recorder.offer(picture(0));
-    recorder.stop();
+    record_take(recorder);
     recorder.offer(picture(1));
     recorder.offer(track_of(0));
     recorder.offer(track_of(1));
@@ -241,9 +217,7 @@ TEST(Recorder, MarksTheRunningTakeOrTheLast) {
     recorder.offer(picture(0));
     recorder.mark_good();
     recorder.stop();
-    recorder.start();
-    recorder.offer(picture(1));
-    recorder.stop();
+    record_take(recorder, 1);
     recorder.mark_good();
   }
   EXPECT_TRUE(session::open_session(directory / "12A_take001").info.take->good);
@@ -301,8 +275,7 @@ TEST(Recorder, ASlowDiskCostsFramesThatAreCounted) {
     recorder.start();
     for (const FramePtr& frame : pictures) recorder.offer(frame);
     recorder.stop();
-    ASSERT_TRUE(
-        wait_until("the take is finished", [&] { return recorder.status().finished_takes == 1; }));
+    ASSERT_TRUE(wait_for_finished(recorder, 1));
     status = recorder.status();
   }
   EXPECT_EQ(frames_of(directory / "12A_take001").size(), status.frames);
@@ -323,7 +296,7 @@ TEST(Recorder, AnAlmostFullDiskEndsTheTakeInOrder) {
   recorder.start();
   std::uint64_t next = 0;
   for (; next < 5; ++next) recorder.offer(picture(next));
-  ASSERT_TRUE(wait_until("five frames are written", [&] { return recorder.status().frames == 5; }));
+  ASSERT_TRUE(wait_for_frames(recorder, 5));
   free = 50;
   ASSERT_TRUE(wait_until("the take has ended", [&] {
     recorder.offer(picture(next++));
@@ -337,7 +310,7 @@ TEST(Recorder, AnAlmostFullDiskEndsTheTakeInOrder) {
   EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, status.frames - 1));
 
   recorder.start();  // refused by the same disk
-  ASSERT_TRUE(wait_until("the start is refused", [&] { return recorder.status().failures == 2; }));
+  ASSERT_TRUE(wait_for_failures(recorder, 2));
   EXPECT_FALSE(recorder.status().recording);
   free = 1000;
   recorder.start();
@@ -375,8 +348,7 @@ TEST(Recorder, AFileThatCannotGrowEndsTheTakeWithEverythingSoFarReadable) {
   recorder.start();  // and it goes on when there is room again
   recorder.offer(picture(next));
   recorder.stop();
-  ASSERT_TRUE(wait_until("the next take is finished",
-                         [&] { return recorder.status().finished_takes == 2; }));
+  ASSERT_TRUE(wait_for_finished(recorder, 2));
   // With the frame the ring held.
   EXPECT_EQ(frames_of(directory / "12A_take002").back(), next);
 }
@@ -476,7 +448,7 @@ TEST(RecorderDeath, AKilledProcessKeepsEveryFrameThatItCounted) {
 // Returns the take that the recorder of a new process finds cut off, if any.
 std::optional<std::string> interrupted_in(const std::filesystem::path& directory) {
   const Recorder recorder(options_in(directory));
-  EXPECT_TRUE(wait_until("it has looked", [&] { return recorder.free_bytes().has_value(); }));
+  EXPECT_TRUE(wait_for_its_look(recorder));
   EXPECT_THAT(recorder.status().salvaged, testing::IsEmpty());
   return recorder.status().interrupted;
 }
@@ -493,9 +465,7 @@ TEST(Recorder, RemembersThatItWasRecordingUntilSomebodyEndsIt) {
   EXPECT_EQ(interrupted_in(directory.path()), "12A_take001");
   {
     Recorder recorder(options_in(directory.path()));
-    recorder.start();
-    recorder.offer(picture(0));
-    recorder.stop();
+    record_take(recorder);
   }
   EXPECT_EQ(interrupted_in(directory.path()), std::nullopt);
 }
@@ -537,9 +507,7 @@ TEST(Recorder, OfADiskThatHangsKeepsAQueueOfBoundedSizeAndSaysSo) {
   session::Losses lost;
   {
     Recorder recorder(std::move(options));
-    recorder.start();
-    recorder.offer(picture(0));
-    ASSERT_TRUE(wait_until("the take is begun", [&] { return recorder.status().frames == 1; }));
+    ASSERT_TRUE(begin_take(recorder));
     hangs.lock();
     for (std::uint64_t i = 1; recorder.status().disk_silent_s < 2.5; ++i) {
       recorder.offer(picture(i));

@@ -20,20 +20,11 @@ using test::wait_until;
 constexpr char hash_of_a_model[] =
     "97ff8a35544dcf40ad84047074439dd6aa3a0be469ea578a1b1c017d939ec61c";
 
-// A recorder of two folders whose disks have as much room as a test says.
-struct Rig {
-  const test::TemporaryDirectory directory;
-  const std::filesystem::path first = directory / "first", second = directory / "second";
-  std::atomic<std::uint64_t> free_on_first = plenty, free_on_second = plenty;
-  Heard heard;
-
+// Two disks, and a set with one file.
+struct Rig : TwoDisks {
   RecorderOptions options() {
-    RecorderOptions options = recorder_options({first, second});
+    RecorderOptions options = TwoDisks::options();
     options.asset_patience = std::chrono::milliseconds(500);
-    options.free_bytes = [this](const std::filesystem::path& folder) {
-      return folder.filename() == "first" ? free_on_first.load() : free_on_second.load();
-    };
-    heard.listen(options);
     return options;
   }
   RecorderOptions options_with_asset() {
@@ -48,20 +39,6 @@ std::filesystem::path kept_in(const std::filesystem::path& folder) {
   return folder / ".assets" / (std::string(hash_of_a_model) + ".glb");
 }
 
-std::size_t frames_of(const std::filesystem::path& take, const std::string& source = "observer") {
-  session::Session session = session::open_session(take);
-  const auto stream = session::open_stream(session, source);
-  return stream ? stream->records().size() : 0;
-}
-
-bool wait_for_frames(const Recorder& recorder, std::uint64_t frames) {
-  return wait_until("they are written", [&] { return recorder.status().frames == frames; });
-}
-
-bool wait_for_take(const Recorder& recorder, int number) {
-  return wait_until("the take runs", [&] { return recorder.status().number == number; });
-}
-
 // ---- files of the set
 
 TEST(Recorder, OfTwoDisksHasTheAssetsOnBothBeforeTheyAreNeeded) {
@@ -71,9 +48,7 @@ TEST(Recorder, OfTwoDisksHasTheAssetsOnBothBeforeTheyAreNeeded) {
     return std::filesystem::exists(kept_in(rig.first)) &&
            std::filesystem::exists(kept_in(rig.second));
   }));
-  recorder.start();
-  recorder.offer(picture(0));
-  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  ASSERT_TRUE(begin_take(recorder));
   // The first disk is gone with what it kept, and so is the disk of the set.
   rig.free_on_first = 0;
   std::filesystem::remove_all(rig.first / ".assets");
@@ -95,9 +70,7 @@ TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
       wait_until("it is kept", [&] { return std::filesystem::exists(kept_in(rig.first)); }));
   std::filesystem::remove_all(rig.first / ".assets");
   std::filesystem::remove_all(rig.directory / "set");
-  recorder.start();
-  recorder.offer(picture(0));
-  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  ASSERT_TRUE(begin_take(recorder));
   recorder.stop();
   recorder.finish();
   EXPECT_EQ(recorder.status().failures, 0u);
@@ -122,11 +95,8 @@ TEST(Recorder, OfAStoreThatWasDeletedTakesTheFileOfTheSetIfItIsTheSame) {
     std::filesystem::remove_all(rig.first / ".assets");
     write_content(rig.directory / "set/a.glb", content);
     const std::uint64_t takes = recorder.status().finished_takes;
-    recorder.start();
-    recorder.offer(picture(takes));
-    recorder.stop();
-    ASSERT_TRUE(wait_until("the take is finished",
-                           [&] { return recorder.status().finished_takes == takes + 1; }));
+    record_take(recorder, takes);
+    ASSERT_TRUE(wait_for_finished(recorder, takes + 1));
   }
   const session::Session same = session::open_session(rig.first / "12A_take001");
   EXPECT_EQ(session::read_file(same.directory / same.info.assets.at("a.glb")), "a model");
@@ -142,9 +112,7 @@ TEST(Recorder, LeavesTheReserveToTakesAndNotToTheFilesOfTheSet) {
   ASSERT_TRUE(
       wait_until("it is said", [&] { return rig.heard.said("a.glb will be missing from takes"); }));
   EXPECT_FALSE(std::filesystem::exists(kept_in(rig.first)));
-  recorder.start();
-  recorder.offer(picture(0));
-  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  ASSERT_TRUE(begin_take(recorder));
   recorder.stop();
   recorder.finish();
   EXPECT_EQ(recorder.status().failures, 0u);
@@ -160,11 +128,8 @@ TEST(Recorder, EndsATakeAndItselfWhileAFileOfTheSetCannotBeRead) {
   options.take.assets = {{"dead.glb", pipe}};
   {
     Recorder recorder(std::move(options));
-    recorder.start();
-    recorder.offer(picture(0));
-    recorder.stop();
-    ASSERT_TRUE(
-        wait_until("the take is finished", [&] { return recorder.status().finished_takes == 1; }));
+    record_take(recorder);
+    ASSERT_TRUE(wait_for_finished(recorder, 1));
     recorder.start();
     recorder.offer(picture(1));
     ASSERT_TRUE(wait_for_take(recorder, 2));
@@ -181,16 +146,12 @@ TEST(Recorder, EndsATakeAndItselfWhileAFileOfTheSetCannotBeRead) {
 TEST(Recorder, NumbersTakesOnWhereTheFirstDiskCannotBeListed) {
   Rig rig;
   Recorder recorder(rig.options());
-  recorder.start();
-  recorder.offer(picture(0));
-  recorder.stop();
-  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+  record_take(recorder);
+  ASSERT_TRUE(wait_for_finished(recorder, 1));
   std::filesystem::rename(rig.first, rig.directory / "elsewhere");
   write_content(rig.first, "no folder");
-  recorder.start();
-  recorder.offer(picture(1));
-  recorder.stop();
-  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 2; }));
+  record_take(recorder, 1);
+  ASSERT_TRUE(wait_for_finished(recorder, 2));
   EXPECT_EQ(recorder.status().directory, rig.second / "12A_take002");
 }
 
@@ -201,13 +162,9 @@ TEST(Recorder, GivesNoTakeTheNameOfOneOnADiskThatIsNotThere) {
     session::make_folders(folder);
   const auto record_once = [&] {
     Recorder recorder(rig.options());
-    recorder.start();
-    recorder.offer(picture(0));
-    recorder.stop();
-    EXPECT_TRUE(
-        wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
-    EXPECT_TRUE(wait_until("the folders were looked at",
-                           [&] { return recorder.free_bytes().has_value(); }));
+    record_take(recorder);
+    EXPECT_TRUE(wait_for_finished(recorder, 1));
+    EXPECT_TRUE(wait_for_its_look(recorder));
     return recorder.status().directory;
   };
   EXPECT_EQ(record_once(), rig.first / "12A_take001");
@@ -231,11 +188,9 @@ TEST(Recorder, NumbersTakesByWhatIsThereWhereAllDisksAre) {
   }
   session::make_folders(rig.second / "12A_take004");
   Recorder recorder(rig.options());
-  EXPECT_TRUE(wait_until("both were looked at", [&] { return recorder.free_bytes().has_value(); }));
-  recorder.start();
-  recorder.offer(picture(0));
-  recorder.stop();
-  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+  EXPECT_TRUE(wait_for_its_look(recorder));
+  record_take(recorder);
+  ASSERT_TRUE(wait_for_finished(recorder, 1));
   EXPECT_EQ(recorder.status().directory, rig.first / "12A_take005");
 }
 
@@ -261,7 +216,7 @@ TEST(Recorder, LeavesOutWhatCannotBeRecordedAndGoesOn) {
   EXPECT_EQ(status.directory, rig.first / "12A_take001");
   EXPECT_EQ(status.lost, (session::Losses{1, 0, 2}));
   EXPECT_EQ(rig.heard.left_out(), (Causes{{"cannot be recorded", 1}}));
-  EXPECT_EQ(frames_of(rig.first / "12A_take001"), 3u);
+  EXPECT_EQ(frame_count(rig.first / "12A_take001"), 3u);
   const session::Session session = session::open_session(rig.first / "12A_take001");
   EXPECT_EQ(session.track.size(), 2u);
   EXPECT_EQ(session.missing.size(), 2u);
@@ -285,9 +240,7 @@ TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
   const auto wait_for_the_disk_to_hang = [&] {
     return wait_until("the disk hangs", [&] { return recorder.status().disk_silent_s > 0.1; });
   };
-  recorder.start();
-  recorder.offer(picture(0));
-  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  ASSERT_TRUE(begin_take(recorder));
   disk.lock();
   ASSERT_TRUE(wait_for_the_disk_to_hang());
   for (std::uint64_t i = 1; i <= 10; ++i) recorder.offer(picture(i));  // 4 of them fit
@@ -351,9 +304,9 @@ TEST(Recorder, FromOneDiskToTheNextKeepsTheTracksOfTheLastFramesAndTheLight) {
   for (const std::filesystem::path& take : takes) {
     const session::Session session = session::open_session(take);
     EXPECT_TRUE(session.missing.empty()) << session.missing.front();
-    EXPECT_EQ(session.track.size(), frames_of(take));
-    EXPECT_EQ(frames_of(take, "light"), 1u);
-    frames += frames_of(take);
+    EXPECT_EQ(session.track.size(), frame_count(take));
+    EXPECT_EQ(frame_count(take, "light"), 1u);
+    frames += frame_count(take);
     tracks += session.track.size();
   }
   EXPECT_EQ(frames, offered);
@@ -374,9 +327,7 @@ TEST(Recorder, NearTheReserveDoesNotFallApartIntoShortTakes) {
   };
   Recorder recorder(std::move(options));
   std::uint64_t next = 0;
-  recorder.start();
-  recorder.offer(picture(next++));
-  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  ASSERT_TRUE(begin_take(recorder, next++));
   is_near = true;
   ASSERT_TRUE(wait_until("it ends", [&] {
     recorder.offer(picture(next++));
@@ -410,7 +361,7 @@ TEST(Recorder, WhoseFirstFolderCannotBeReadFindsWhatIsInTheSecond) {
   write_content(rig.first, "no folder");
   leave_a_cut_off_take(rig.second);
   const Recorder recorder(rig.options());
-  ASSERT_TRUE(wait_until("it has looked", [&] { return recorder.free_bytes().has_value(); }));
+  ASSERT_TRUE(wait_for_its_look(recorder));
   EXPECT_EQ(recorder.status().salvaged,
             std::vector<std::string>{"12A_take007 was cut off; it has 3 frames"});
   EXPECT_EQ(recorder.status().interrupted, "12A_take007");
@@ -421,7 +372,7 @@ TEST(Recorder, FindsWhatIsOnADiskThatIsMountedLater) {
   Rig rig;
   std::filesystem::create_directory(rig.first);
   const Recorder recorder(rig.options());
-  ASSERT_TRUE(wait_until("it has looked", [&] { return recorder.free_bytes().has_value(); }));
+  ASSERT_TRUE(wait_for_its_look(recorder));
   EXPECT_EQ(recorder.status().interrupted, std::nullopt);
   leave_a_cut_off_take(rig.directory / "mounted");
   std::filesystem::rename(rig.directory / "mounted", rig.second);
@@ -432,10 +383,8 @@ TEST(Recorder, FindsWhatIsOnADiskThatIsMountedLater) {
 TEST(Recorder, ThatHasRecordedTakesNoOldWishForOne) {
   Rig rig;
   Recorder recorder(rig.options());
-  recorder.start();
-  recorder.offer(picture(0));
-  recorder.stop();
-  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+  record_take(recorder);
+  ASSERT_TRUE(wait_for_finished(recorder, 1));
   leave_a_cut_off_take(rig.directory / "mounted");
   std::filesystem::rename(rig.directory / "mounted", rig.second);
   ASSERT_TRUE(wait_until("it is found", [&] { return !recorder.status().salvaged.empty(); }));
