@@ -102,9 +102,7 @@ TEST(LightStage, ASwitchedOffLightIsGoneWithinOneFrameInAnyPhaseOfTheBracket) {
 }
 
 bool says_blinded(const LightPtr& light) {
-  return std::ranges::any_of(light->lighting.report.notes, [](const std::string& note) {
-    return note.find("blinded") != std::string::npos;
-  });
+  return testing::Value(light->lighting.report.notes, Contains(HasSubstr("blinded")));
 }
 
 // A bracket that begins with an exposure so long that it clips the whole picture: by itself that
