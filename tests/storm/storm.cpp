@@ -2,13 +2,6 @@
 
 #include <systemd/sd-bus.h>
 
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <stdexcept>
-#include <thread>
-
 #include "daemon/control/bus.hpp"
 #include "daemon/set/actions.hpp"
 #include "drivers/session/files.hpp"
@@ -190,7 +183,7 @@ void Storm::blow(const std::vector<Gust>& gusts) {
 // The sky clears: the rig shows pictures again.
 void Storm::clear_up() {
   std::ofstream(directory_ / "set.toml") << text_;
-  const int before = until([](const Shown&) { return true; }).count;
+  const int before = shown_now().count;
   test::must_come("pictures are shown again", [&] {
     push("live");
     std::this_thread::sleep_for(std::chrono::milliseconds(500));  // two presses a second
@@ -220,7 +213,7 @@ void Storm::weather(const std::vector<Gust>& gusts) {
   throw_in_every_stage();
   options_.bus = true;
   run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+    until_samples(2);
     std::vector<Gust> all = everyday(bus);
     all.insert(all.end(), gusts.begin(), gusts.end());
     blow(all);
