@@ -9,7 +9,6 @@
 #include "daemon/post/take_copy.hpp"
 #include "daemon/post/takes.hpp"
 #include "daemon/rig/set_keeper.hpp"
-#include "drivers/error.hpp"
 #include "tests/durability/cut_off_take.hpp"
 #include "tests/durability/still_disk.hpp"
 #include "tests/support/session_fixture.hpp"

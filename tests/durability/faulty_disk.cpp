@@ -159,12 +159,13 @@ std::optional<DiskFault> next_fault() {
   return d.fault->fault;
 }
 
-// Returns the error of the next call, which is then counted as one that changes nothing; 0: none.
-int refusal() {
+// Returns whether the next call fails, which is then counted as one that changes nothing.
+bool is_refused() {
   const std::optional<DiskFault> fault = next_fault();
-  if (!fault || *fault == DiskFault::short_write) return 0;
+  if (!fault || *fault == DiskFault::short_write) return false;
   disk().calls.push_back({.kind = Call::Kind::refused});
-  return *fault == DiskFault::io_error ? EIO : ENOSPC;
+  errno = *fault == DiskFault::io_error ? EIO : ENOSPC;
+  return true;
 }
 
 void note(Call call) {
@@ -191,12 +192,7 @@ int open_noted(const char* path, int flags, mode_t mode) {
   }
   const bool makes = (flags & O_CREAT) != 0 && !place->node;
   const bool empties = (flags & O_TRUNC) != 0 && place->node;
-  if (makes || empties) {
-    if (const int error = refusal()) {
-      errno = error;
-      return -1;
-    }
-  }
+  if ((makes || empties) && is_refused()) return -1;
   const int descriptor = call(path, flags, mode);
   if (descriptor < 0) return descriptor;
   std::size_t node = place->node.value_or(0);
@@ -227,10 +223,7 @@ ssize_t write_noted(int descriptor, const void* bytes, std::size_t count, off_t 
   const std::unique_lock lock(disk().mutex);
   const std::optional<std::size_t> node = node_of(descriptor);
   if (!node) return forward(count);
-  if (const int error = refusal()) {
-    errno = error;
-    return -1;
-  }
+  if (is_refused()) return -1;
   if (next_fault() == DiskFault::short_write && count > 1) count /= 2;
   off_t at = offset;
   if (offset < 0)
@@ -258,10 +251,7 @@ int sync_noted(const char* name, int descriptor) {
     errno = EIO;
     return -1;
   }
-  if (const int error = refusal()) {
-    errno = error;
-    return -1;
-  }
+  if (is_refused()) return -1;
   note({.kind = Call::Kind::sync, .node = *node, .name = name_of(*node)});
   return 0;  // the medium behind the folder may forget, too: nobody asks it
 }
@@ -272,10 +262,7 @@ int change_noted(const char* path, const Forward& forward, const auto& call_of) 
   const std::lock_guard lock(disk().mutex);
   const std::optional<Place> place = place_of(path);
   if (!place) return forward();
-  if (const int error = refusal()) {
-    errno = error;
-    return -1;
-  }
+  if (is_refused()) return -1;
   const int result = forward();
   if (result == 0) note(call_of(*place));
   return result;

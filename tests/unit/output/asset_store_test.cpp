@@ -6,12 +6,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "daemon/output/recorder.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::asset_store_test {
 

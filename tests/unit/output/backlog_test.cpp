@@ -1,8 +1,6 @@
 // How far a recording may be behind the cameras.
-#include "daemon/output/recorder.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::backlog_test {
 

@@ -1,7 +1,6 @@
 // The overlay as pixels: boxes that fit, do not overlap, and can be read on any picture.
 #include "daemon/output/osd_painter.hpp"
 
-#include "drivers/error.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::output::osd_test {

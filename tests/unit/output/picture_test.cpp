@@ -2,7 +2,6 @@
 #include "daemon/output/png.hpp"
 #include "daemon/output/video.hpp"
 #include "drivers/av.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

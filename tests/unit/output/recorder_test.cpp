@@ -7,11 +7,9 @@
 #include <csignal>
 
 #include "drivers/bracket.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::recorder_test {
 

@@ -3,12 +3,9 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
-#include "daemon/output/recorder.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::take_ends_test {
 

@@ -2,12 +2,9 @@
 #include "daemon/output/take_folders.hpp"
 
 #include "daemon/output/folder_watch.hpp"
-#include "daemon/output/recorder.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::take_folders_test {
 

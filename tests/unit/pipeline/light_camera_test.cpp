@@ -3,7 +3,6 @@
 #include "daemon/pipeline/light_feed.hpp"
 #include "daemon/pipeline/light_stage.hpp"
 #include "drivers/bracket.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/lighting_pictures.hpp"

@@ -1,6 +1,5 @@
 // The tracked and lit shots of a recorded take.
 #include "daemon/pipeline/take_shots.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
