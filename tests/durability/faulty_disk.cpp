@@ -268,6 +268,13 @@ int change_noted(const char* path, const Forward& forward, const auto& call_of) 
   return result;
 }
 
+int remove_noted(const char* name, const char* path) {
+  const auto forward = [&] { return real<int(const char*)>(name)(path); };
+  return change_noted(path, forward, [](const Place& place) {
+    return Call{.kind = Call::Kind::remove, .folder = place.folder, .name = place.name};
+  });
+}
+
 }  // namespace
 
 FaultyDisk::FaultyDisk(const Path& folder) {
@@ -345,6 +352,7 @@ using previz::test::disk;
 using previz::test::note;
 using previz::test::Place;
 using previz::test::real;
+using previz::test::remove_noted;
 
 int open(const char* path, int flags, ...) {
   va_list rest;
@@ -353,13 +361,7 @@ int open(const char* path, int flags, ...) {
   va_end(rest);
   return previz::test::open_noted(path, flags, mode);
 }
-int open64(const char* path, int flags, ...) {
-  va_list rest;
-  va_start(rest, flags);
-  const auto mode = static_cast<mode_t>(va_arg(rest, int));
-  va_end(rest);
-  return previz::test::open_noted(path, flags, mode);
-}
+[[gnu::alias("open")]] int open64(const char* path, int flags, ...);
 
 // A stream's descriptor is opened here, so that it is known to the calls below.
 FILE* fopen(const char* path, const char* mode) {
@@ -373,9 +375,7 @@ FILE* fopen(const char* path, const char* mode) {
   const int descriptor = previz::test::open_noted(path, flags, 0666);
   return descriptor < 0 ? nullptr : ::fdopen(descriptor, mode);
 }
-FILE* fopen64(const char* path, const char* mode) {
-  return fopen(path, mode);
-}
+[[gnu::alias("fopen")]] FILE* fopen64(const char* path, const char* mode);
 
 int close(int descriptor) {
   {
@@ -391,9 +391,8 @@ ssize_t write(int descriptor, const void* bytes, size_t count) {
 ssize_t pwrite(int descriptor, const void* bytes, size_t count, off_t offset) {
   return previz::test::write_noted(descriptor, bytes, count, offset);
 }
-ssize_t pwrite64(int descriptor, const void* bytes, size_t count, off64_t offset) {
-  return previz::test::write_noted(descriptor, bytes, count, offset);
-}
+[[gnu::alias("pwrite")]] ssize_t pwrite64(int descriptor, const void* bytes, size_t count,
+                                          off64_t offset);
 ssize_t writev(int descriptor, const iovec* parts, int count) {
   {
     const std::lock_guard lock(disk().mutex);
@@ -411,10 +410,7 @@ ssize_t sendfile(int, int, off_t*, size_t) {
   errno = EINVAL;
   return -1;
 }
-ssize_t sendfile64(int, int, off64_t*, size_t) {
-  errno = EINVAL;
-  return -1;
-}
+[[gnu::alias("sendfile")]] ssize_t sendfile64(int, int, off64_t*, size_t);
 ssize_t copy_file_range(int, off64_t*, int, off64_t*, size_t, unsigned) {
   errno = EINVAL;
   return -1;
@@ -461,16 +457,10 @@ int mkdir(const char* path, mode_t mode) noexcept {
 }
 
 int unlink(const char* path) noexcept {
-  const auto forward = [&] { return real<int(const char*)>("unlink")(path); };
-  return change_noted(path, forward, [](const Place& place) {
-    return Call{.kind = Call::Kind::remove, .folder = place.folder, .name = place.name};
-  });
+  return remove_noted("unlink", path);
 }
 int remove(const char* path) noexcept {
-  const auto forward = [&] { return real<int(const char*)>("remove")(path); };
-  return change_noted(path, forward, [](const Place& place) {
-    return Call{.kind = Call::Kind::remove, .folder = place.folder, .name = place.name};
-  });
+  return remove_noted("remove", path);
 }
 
 int ftruncate(int descriptor, off_t size) noexcept {

@@ -71,18 +71,14 @@ class SimulatedDay : public testing::Test {
         "[lighting]\nfrom = \"set\"\n[recording]\nslate = \"12A\"\nreserve_mb = 1\n"
         "directory = \"takes\"\n" +
             test::button_for_every_action());
-    without_light_camera();
-  }
-  ~SimulatedDay() override {
-    for (const char* name : {"STATE_DIRECTORY", "VK_DRIVER_FILES", "VK_ICD_FILENAMES"})
-      ::unsetenv(name);
-  }
-
-  void without_light_camera() const {
     std::string text = session::read_file(directory_ / "set.toml");
     const std::string before = "[light_camera]\ndriver = \"replay\"\ndevice = \"session\"\n";
     text.replace(text.find(before), before.size(), "[light_camera]\ndriver = \"none\"\n");
     std::ofstream(directory_ / "set.toml") << text;
+  }
+  ~SimulatedDay() override {
+    for (const char* name : {"STATE_DIRECTORY", "VK_DRIVER_FILES", "VK_ICD_FILENAMES"})
+      ::unsetenv(name);
   }
 
   // Runs the rig until the crew's script has ended.

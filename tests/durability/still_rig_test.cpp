@@ -155,7 +155,7 @@ TEST(SetKeeperOnAStillDisk, ReadsOnAThreadOfItsOwnAndGivesUp) {
     EXPECT_TRUE(sets.is_reading());
     const std::optional<SetKeeper::Ended> ended = sets.finish(std::chrono::milliseconds(0));
     ASSERT_TRUE(ended && ended->why_not);
-    EXPECT_NE(ended->why_not->find("the disk does not respond"), std::string::npos);
+    EXPECT_THAT(*ended->why_not, HasSubstr("the disk does not respond"));
     EXPECT_FALSE(sets.is_reading());
     EXPECT_EQ(sets.running().set.name, "old");
     EXPECT_FALSE(sets.look_at_file());

@@ -72,7 +72,7 @@ void expect_whole(const fs::path& take) {
       EXPECT_NO_THROW(stream->read(i));
   }
   for (const std::string& missing : session.missing)
-    EXPECT_NE(missing.find("did not reach the disk in time"), std::string::npos) << missing;
+    EXPECT_THAT(missing, HasSubstr("did not reach the disk in time"));
 }
 
 std::size_t count_whole_takes(const fs::path& takes) {

@@ -48,6 +48,11 @@ inline std::vector<std::uint64_t> frames_of(const std::filesystem::path& take,
   return indices;
 }
 
+// Returns what a take says that it lacks.
+inline std::vector<std::string> missing_of(const std::filesystem::path& take) {
+  return session::open_session(take).missing;
+}
+
 // Returns the numbers from the first to the last.
 inline std::vector<std::uint64_t> count_from(std::uint64_t first, std::uint64_t last) {
   std::vector<std::uint64_t> numbers(last + 1 - first);
@@ -83,6 +88,12 @@ inline std::vector<std::uint64_t> count_from(std::uint64_t first, std::uint64_t 
 [[nodiscard]] inline testing::AssertionResult wait_for_its_look(const Recorder& recorder) {
   return test::wait_until("the folders were looked at",
                           [&] { return recorder.free_bytes().has_value(); });
+}
+
+// Ends the take and waits until all of it is on the disk.
+inline void end_take(Recorder& recorder) {
+  recorder.stop();
+  recorder.finish();
 }
 
 // Begins a take with the picture of this index, and waits until it is written.

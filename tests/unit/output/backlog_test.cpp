@@ -187,8 +187,7 @@ TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
   EXPECT_LE(recorder.status().backlog.seconds, 0.3);
   EXPECT_GT(recorder.status().backlog.bytes, 0u);
   disk.unlock();
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   EXPECT_EQ(recorder.status().backlog.seconds, 0);
   session::Session session = session::open_session(directory / "takes/12A_take001");
   const auto stream = session::open_stream(session, "observer");

@@ -42,7 +42,7 @@ TEST(Recorder, SaysForHowLongATakeIsBeingWritten) {
   EXPECT_TRUE(wait_until("the take is whole", [&] { return !recorder.status().writing; }));
   const RecorderStatus status = recorder.status();
   EXPECT_EQ(status.finished_takes, 1u);
-  EXPECT_TRUE(session::open_session(status.directory).missing.empty());
+  EXPECT_THAT(missing_of(status.directory), testing::IsEmpty());
 }
 
 TEST(Timecode, CountsFramesOfTheNearestWholeRate) {
@@ -195,18 +195,6 @@ TEST(Recorder, TheTrackOfTheLastFrameMayComeAfterTheButton) {
   EXPECT_EQ(session::open_session(directory / "12A_take001").track.size(), 1u);
 }
 
-TEST(Recorder, TakesAreNumberedOnFromWhatIsThere) {
-  const TemporaryDirectory directory;
-  for (const char* name : {"12A_take041", "12A_take009", "12A_takeover", "12B_take100"})
-    std::filesystem::create_directory(directory / name);
-  {
-    Recorder recorder(options_in(directory.path()));
-    recorder.start();
-    recorder.offer(picture(0));
-  }
-  EXPECT_EQ(frames_of(directory / "12A_take042"), count_from(0, 0));
-}
-
 TEST(Recorder, MarksTheRunningTakeOrTheLast) {
   const TemporaryDirectory directory;
   {
@@ -304,7 +292,7 @@ TEST(Recorder, AnAlmostFullDiskEndsTheTakeInOrder) {
   EXPECT_THAT(status.fault, HasSubstr("almost full"));
   EXPECT_EQ(status.failures, 1u);
   EXPECT_EQ(status.finished_takes, 1u);
-  EXPECT_TRUE(session::open_session(directory / "12A_take001").missing.empty());  // closed
+  EXPECT_THAT(missing_of(directory / "12A_take001"), testing::IsEmpty());  // closed
   EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, status.frames - 1));
 
   recorder.start();  // refused by the same disk
@@ -423,7 +411,7 @@ TEST(RecorderDeath, AKilledProcessKeepsEveryFrameThatItCounted) {
   EXPECT_GT(report.counted, 0u);
   EXPECT_GE(there.size(), report.counted);
   EXPECT_GE(there.back() + 25, report.offered);
-  EXPECT_TRUE(mentions(session::open_session(directory / "12A_take001").missing, "not closed"));
+  EXPECT_TRUE(mentions(missing_of(directory / "12A_take001"), "not closed"));
 
   // The next process knows that it was recording, and brings the take into order.
   {
@@ -438,7 +426,7 @@ TEST(RecorderDeath, AKilledProcessKeepsEveryFrameThatItCounted) {
     recorder.start();
     recorder.offer(picture(0));
   }
-  EXPECT_TRUE(mentions(session::open_session(directory / "12A_take001").missing, "was cut off"));
+  EXPECT_TRUE(mentions(missing_of(directory / "12A_take001"), "was cut off"));
   EXPECT_EQ(frames_of(directory / "12A_take001"), there);
   EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(0, 0));
 }
@@ -459,7 +447,7 @@ TEST(Recorder, RemembersThatItWasRecordingUntilSomebodyEndsIt) {
     recorder.start();
     recorder.offer(picture(0));
   }  // as for an upgrade: the take is closed, and nobody has ended the recording
-  EXPECT_TRUE(session::open_session(directory / "12A_take001").missing.empty());
+  EXPECT_THAT(missing_of(directory / "12A_take001"), testing::IsEmpty());
   EXPECT_EQ(interrupted_in(directory.path()), "12A_take001");
   {
     Recorder recorder(options_in(directory.path()));
@@ -476,7 +464,7 @@ TEST(Recorder, HasEverythingOnTheDiskOnceItIsFinishedAndTakesNothingAfterThat) {
   for (int i = 0; i < 3; ++i) recorder.offer(picture(i));
   recorder.finish();
   const std::filesystem::path take = directory / "12A_take001";
-  EXPECT_TRUE(session::open_session(take).missing.empty());
+  EXPECT_THAT(missing_of(take), testing::IsEmpty());
   recorder.offer(picture(3));
   recorder.offer(track_of(3));
   recorder.finish();

@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include "drivers/session/files.hpp"
+#include "tests/support/cut_off_take.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
 
@@ -52,8 +53,7 @@ TEST(Recorder, OfTwoDisksHasTheAssetsOnBothBeforeTheyAreNeeded) {
   std::filesystem::remove_all(rig.directory / "set");
   ASSERT_TRUE(wait_for_take(recorder, 2));
   recorder.offer(picture(1));
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   EXPECT_EQ(recorder.status().failures, 0u);
   const session::Session session = session::open_session(rig.second / "12A_take002");
   EXPECT_TRUE(session.missing.empty()) << session.missing.front();
@@ -68,8 +68,7 @@ TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
   std::filesystem::remove_all(rig.first / ".assets");
   std::filesystem::remove_all(rig.directory / "set");
   ASSERT_TRUE(begin_take(recorder));
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   EXPECT_EQ(recorder.status().failures, 0u);
   EXPECT_EQ(recorder.status().finished, "12A_take001");
   const session::Session session = session::open_session(rig.first / "12A_take001");
@@ -110,10 +109,9 @@ TEST(Recorder, LeavesTheReserveToTakesAndNotToTheFilesOfTheSet) {
       wait_until("it is said", [&] { return rig.heard.said("a.glb will be missing from takes"); }));
   EXPECT_FALSE(std::filesystem::exists(kept_in(rig.first)));
   ASSERT_TRUE(begin_take(recorder));
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   EXPECT_EQ(recorder.status().failures, 0u);
-  EXPECT_TRUE(mentions(session::open_session(rig.first / "12A_take001").missing, "almost full"));
+  EXPECT_TRUE(mentions(missing_of(rig.first / "12A_take001"), "almost full"));
 }
 
 // A pipe that nobody writes to, as a file on a mount that is dead.
@@ -206,8 +204,7 @@ TEST(Recorder, LeavesOutWhatCannotBeRecordedAndGoesOn) {
   recorder.offer(astray);
   recorder.offer_event(0, "not UTF-8: \xff");
   for (std::uint64_t i = 2; i < 4; ++i) recorder.offer(track_of(i));
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   const RecorderStatus status = recorder.status();
   EXPECT_EQ(status.failures, 0u) << status.fault;
   EXPECT_EQ(status.directory, rig.first / "12A_take001");
@@ -254,8 +251,7 @@ TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
   EXPECT_EQ(recorder.status().lost, session::Losses{});
   recorder.offer(picture(13));
   disk.unlock();
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   EXPECT_EQ(recorder.status().failures, 0u) << recorder.status().fault;
   // What was lost was offered before the frame that began the second take, and after the last of
   // the first that was written: whichever of the two says it, no other does.
@@ -271,7 +267,8 @@ TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
 
 // ---- from one take to the next
 
-// Tracks come three frames late, as the tracking takes its time.
+// The first disk is full: every frame is in one of the two takes, bit for bit and in order. Tracks
+// come three frames late, as the tracking takes its time.
 TEST(Recorder, FromOneDiskToTheNextKeepsTheTracksOfTheLastFramesAndTheLight) {
   Rig rig;
   constexpr std::uint64_t behind = 3;
@@ -294,20 +291,24 @@ TEST(Recorder, FromOneDiskToTheNextKeepsTheTracksOfTheLastFramesAndTheLight) {
       return recorder.status().number == 2;
     }));
     for (int i = 0; i < 5; ++i) offer();
+    ASSERT_TRUE(wait_until("the first take is finished",
+                           [&] { return recorder.status().finished == "12A_take001"; }));
+    EXPECT_TRUE(recorder.status().recording);
+    EXPECT_EQ(recorder.status().failures, 0u);
     for (std::uint64_t i = offered - behind; i < offered; ++i) recorder.offer(track_of(i));
   }
-  const std::filesystem::path takes[] = {rig.first / "12A_take001", rig.second / "12A_take002"};
-  std::size_t frames = 0, tracks = 0;
-  for (const std::filesystem::path& take : takes) {
+  std::vector<std::uint64_t> frames;
+  for (const std::filesystem::path& take :
+       {rig.first / "12A_take001", rig.second / "12A_take002"}) {
     const session::Session session = session::open_session(take);
     EXPECT_TRUE(session.missing.empty()) << session.missing.front();
     EXPECT_EQ(session.track.size(), frame_count(take));
     EXPECT_EQ(frame_count(take, "light"), 1u);
-    frames += frame_count(take);
-    tracks += session.track.size();
+    std::ranges::copy(frames_of(take), std::back_inserter(frames));
   }
-  EXPECT_EQ(frames, offered);
-  EXPECT_EQ(tracks, offered);
+  EXPECT_EQ(frames, count_from(0, offered - 1));
+  EXPECT_TRUE(rig.heard.said("the disk of 12A_take001 is almost full; recording continues in " +
+                             (rig.second / "12A_take002").string()));
 }
 
 // A disk whose free space goes up and down about the reserve, as takes that are closed give some
@@ -344,12 +345,7 @@ TEST(Recorder, NearTheReserveDoesNotFallApartIntoShortTakes) {
 
 // A take that was cut off, and the wish to record on.
 void leave_a_cut_off_take(const std::filesystem::path& folder) {
-  const test::TemporaryDirectory elsewhere;
-  session::SessionWriter writer(elsewhere / "12A_take007", {});
-  for (std::uint64_t i = 0; i < 3; ++i) writer.write(*picture(i));
-  std::filesystem::create_directories(folder);
-  std::filesystem::copy(elsewhere / "12A_take007", folder / "12A_take007",
-                        std::filesystem::copy_options::recursive);
+  test::write_cut_off_take(folder / "12A_take007", 3);
   TakeFolders::keep_wish(folder / "12A_take007");
 }
 

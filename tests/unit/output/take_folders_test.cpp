@@ -91,8 +91,8 @@ TEST(TakeFolders, TheSpeedOfADiskIsMeasuredAndNothingStays) {
 
 TEST(NextTakeNumber, CountsThroughAllFoldersAndIgnoresAbsurdNumbers) {
   const TemporaryDirectory directory;
-  for (const char* take :
-       {"a/12A_take003", "b/12A_take007", "b/12A_take2147483647", "a/12B_take009"})
+  for (const char* take : {"a/12A_take003", "b/12A_take007", "b/12A_take2147483647",
+                           "a/12B_take009", "a/12A_takeover"})
     session::make_folders(directory / take);
   EXPECT_EQ(next_take_number({directory / "a", directory / "b", directory / "none"}, "12A"), 8);
   EXPECT_EQ(next_take_number({directory / "a", directory / "b"}, "12A", 11), 12);
@@ -119,43 +119,6 @@ TEST(TakeFolders, AreOnOneDiskWhereTheFoldersAboveThemAre) {
   const TemporaryDirectory directory;
   EXPECT_TRUE(are_on_one_disk(directory / "not/made", directory / "yet"));
   EXPECT_FALSE(are_on_one_disk(directory.path(), "/proc"));
-}
-
-TEST(Recorder, OfTwoDisksGoesOnWithoutAGapWhenTheFirstIsFull) {
-  TwoDisks disks;
-  std::uint64_t offered = 0;
-  {
-    Recorder recorder(disks.options());
-    const auto offer = [&] {
-      recorder.offer(picture(offered));
-      recorder.offer(track_of(offered++));
-    };
-    recorder.start();
-    for (int i = 0; i < 5; ++i) offer();
-    ASSERT_TRUE(wait_for_frames(recorder, 5));
-    disks.free_on_first = 50;
-    ASSERT_TRUE(wait_until("the second take runs", [&] {
-      offer();
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // as a camera does
-      return recorder.status().number == 2;
-    }));
-    offer();
-    ASSERT_TRUE(wait_until("the first take is finished",
-                           [&] { return recorder.status().finished == "12A_take001"; }));
-    const RecorderStatus status = recorder.status();
-    EXPECT_TRUE(status.recording);
-    EXPECT_EQ(status.failures, 0u);
-  }
-  std::vector<std::uint64_t> there;
-  for (const std::filesystem::path& take :
-       {disks.first / "12A_take001", disks.second / "12A_take002"}) {
-    const std::vector<std::string> missing = session::open_session(take).missing;
-    EXPECT_TRUE(missing.empty()) << missing.front();
-    std::ranges::copy(frames_of(take), std::back_inserter(there));
-  }
-  EXPECT_EQ(there, count_from(0, offered - 1));
-  EXPECT_TRUE(disks.heard.said("the disk of 12A_take001 is almost full; recording continues in " +
-                               (disks.second / "12A_take002").string()));
 }
 
 TEST(Recorder, OfTwoFullDisksSaysOfEachWhyItCannotRecord) {
@@ -221,8 +184,7 @@ TEST(Recorder, WritesTheFormThatTheSetWants) {
   Recorder recorder(std::move(options));
   recorder.start();
   for (std::uint64_t i = 0; i < 3; ++i) recorder.offer(picture(i));
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   const std::filesystem::path take = disks.first / "12A_take001";
   EXPECT_EQ(frames_of(take), count_from(0, 2));
   EXPECT_THAT(session::open_session(take).missing, testing::IsEmpty());
@@ -238,11 +200,9 @@ TEST(Recorder, WhoseTakeIsGoneGoesOnOnTheNextDisk) {
   std::filesystem::create_directory(rig.first);
   ASSERT_TRUE(wait_until("it goes on", [&] { return recorder.status().number == 2; }));
   recorder.offer(picture(1));
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   EXPECT_EQ(recorder.status().directory, rig.second / "12A_take002");
-  const session::Session left = session::open_session(rig.directory / "unmounted/12A_take001");
-  EXPECT_TRUE(mentions(left.missing, "not closed"));
+  EXPECT_TRUE(mentions(missing_of(rig.directory / "unmounted/12A_take001"), "not closed"));
   EXPECT_TRUE(rig.heard.said("is gone; its disk was unmounted"));
 }
 
@@ -268,7 +228,7 @@ TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
   first->finish();
   EXPECT_EQ(first->status().failures, 0u);
   first.reset();
-  EXPECT_TRUE(session::open_session(directory / "takes/12A_take001").missing.empty());
+  EXPECT_THAT(missing_of(directory / "takes/12A_take001"), testing::IsEmpty());
   // Whoever is left takes the folder over.
   Recorder third(options);
   EXPECT_TRUE(wait_until("it has the folder", [&] { return third.folders()[0].is_own; }));

@@ -62,46 +62,31 @@ INSTANTIATE_TEST_SUITE_P(Stages, RigIsolation,
                            return word;
                          });
 
-// While the renderer is made anew, the plate is shown.
+// While the renderer is made anew, the plate is shown: in the preview, and in a refinement, in
+// which tracking rests.
 TEST_F(RigLive, TheCrewSeesThePlateWhileTheRendererIsMadeAnew) {
   write_set();
   std::atomic<bool> fails = false;
   options_.rehearse = [&](const std::string& part) {
     if (part == "render" && fails) throw std::runtime_error("lamp fell down");
   };
-  run([&] {
-    until_samples(2);
+  const auto until_plates = [&](Mode mode, int pictures) {
+    const auto is_plate = [mode](const Shown& s) {
+      return s.shot.untouched == "the renderer has failed" && s.look.state.mode == mode;
+    };
     fails = true;
-    const int first =
-        until([](const Shown& s) { return s.shot.untouched == "the renderer has failed"; }).count;
-    until([&](const Shown& s) {
-      return s.count > first + 4 && s.shot.untouched == "the renderer has failed";
-    });
+    const int first = until(is_plate).count;
+    until([&](const Shown& s) { return s.count > first + pictures && is_plate(s); });
     fails = false;
-    until_samples(2);
-  });
-  EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
-}
-
-// In a refinement tracking rests, and the plates are there all the same.
-TEST_F(RigLive, TheCrewSeesThePlateInARefinementWhoseRendererIsMadeAnew) {
-  write_set();
-  std::atomic<bool> fails = false;
-  options_.rehearse = [&](const std::string& part) {
-    if (part == "render" && fails) throw std::runtime_error("lamp fell down");
   };
   run([&] {
+    until_samples(2);
+    until_plates(Mode::live, 4);
     until_samples(2);
     press("refine");
     until_mode(Mode::refine);
     until_counted("frames not tracked in this mode");
-    fails = true;
-    const auto is_plate = [](const Shown& s) {
-      return s.shot.untouched == "the renderer has failed" && s.look.state.mode == Mode::refine;
-    };
-    const int first = until(is_plate).count;
-    until([&](const Shown& s) { return s.count > first + 8 && is_plate(s); });
-    fails = false;
+    until_plates(Mode::refine, 8);
     until_frozen();
   });
   EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
