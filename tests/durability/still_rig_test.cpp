@@ -48,8 +48,7 @@ TEST_F(RigLive, ADiskThatStandsStillForASnapshotKeepsNoPictureWaiting) {
 // while the rig is well.
 TEST_F(RigLive, EveryQueueIsMeasured) {
   write_set();
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     until_measured([](const nlohmann::json& stages) {
       return std::ranges::all_of(
           std::array{"tracking", "lighting", "render", "review", "display", "snapshot", "recorder",
@@ -106,8 +105,7 @@ TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
   };
   StillDisk disk(file);
   NotifySocket systemd(directory_ / "notify");
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     disk.stand_still();
     write(other);
     press("reload_set");

@@ -212,8 +212,7 @@ void Storm::weather(const std::vector<Gust>& gusts) {
   if (!bus.running()) GTEST_SKIP() << "dbus-daemon is not installed";
   throw_in_every_stage();
   options_.bus = true;
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     std::vector<Gust> all = everyday(bus);
     all.insert(all.end(), gusts.begin(), gusts.end());
     blow(all);

@@ -50,7 +50,7 @@ class RigLive : public testing::Test {
     pipeline::Shot shot;
     rig::Look look;
     int count = 0;     // pictures until this one
-    int rendered = 0;  // how many of them were
+    int rendered = 0;  // how many of these were rendered
     bool records(int samples) const { return look.state.recording && shot.samples == samples; }
   };
 
@@ -92,6 +92,14 @@ class RigLive : public testing::Test {
     metrics_ = run_looped(std::move(options), directory_.path(), hand_, script, out);
   }
 
+  // The same with a script that begins once pictures are rendered.
+  void run_rendering(const std::function<void()>& script) {
+    run([&] {
+      until_samples(2);
+      script();
+    });
+  }
+
   // Waits until metrics.json, which is written once a second while pictures are shown, is as it
   // should be.
   void until_metrics(const std::string& what,
@@ -113,7 +121,7 @@ class RigLive : public testing::Test {
     });
   }
 
-  // A press, then whatever is shown until the condition holds: no time is assumed.
+  // Waits until the condition holds for what is shown: no time is assumed.
   Shown until(const std::function<bool(const Shown&)>& condition) {
     std::unique_lock lock(mutex_);
     await(
@@ -169,6 +177,7 @@ class RigLive : public testing::Test {
   }
   void press(const std::string& button) { hand_.press(button); }
 
+  // Begins a take and waits for a picture in it; ends one and waits until it is on the disk.
   Shown begin_take() {
     press("record");
     return until([](const Shown& s) { return s.look.state.recording; });

@@ -10,6 +10,7 @@
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 
+#include "drivers/session/files.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -216,19 +217,15 @@ TEST_F(Exr, OnAFullDiskThereIsTheWholeFileOrNone) {
 TEST_F(Exr, ADataWindowThatDoesNotBeginAtZeroIsRefused) {
   const render::Layers layers = sample_layers(4, 4);
   const auto window_of = [&](int min_x, int min_y, int max_x, int max_y) {
-    auto path = directory_ / "window.exr";
-    write_exr(path, layers, {});
-    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
-    std::string bytes(std::filesystem::file_size(path), '\0');
-    file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    write_exr(file_, layers, {});
+    std::string bytes = session::read_file(file_);
     const std::string name("dataWindow\0box2i\0\x10\0\0\0", 21);
     const std::size_t at = bytes.find(name);
     EXPECT_NE(at, std::string::npos);
-    file.seekp(static_cast<std::streamoff>(at + name.size()));
-    for (const int value : {min_x, min_y, max_x, max_y})
-      file.write(reinterpret_cast<const char*>(&value), 4);
-    file.close();
-    return path;
+    const int window[] = {min_x, min_y, max_x, max_y};
+    std::memcpy(&bytes[at + name.size()], window, sizeof window);
+    std::ofstream(file_, std::ios::binary) << bytes;
+    return file_;
   };
   EXPECT_NO_THROW(read_exr(window_of(0, 0, 3, 3)));
   EXPECT_THROW(read_exr(window_of(-2, -2, 1, 1)), Error);

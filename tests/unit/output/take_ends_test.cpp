@@ -18,6 +18,10 @@ using test::wait_until;
 constexpr char hash_of_a_model[] =
     "97ff8a35544dcf40ad84047074439dd6aa3a0be469ea578a1b1c017d939ec61c";
 
+std::filesystem::path kept_in(const std::filesystem::path& folder) {
+  return folder / ".assets" / (std::string(hash_of_a_model) + ".glb");
+}
+
 // Two disks, and a set with one file.
 struct Rig : TwoDisks {
   RecorderOptions options() {
@@ -31,11 +35,10 @@ struct Rig : TwoDisks {
     with.take.assets = {{"a.glb", directory / "set/a.glb"}};
     return with;
   }
+  [[nodiscard]] testing::AssertionResult wait_for_asset() const {
+    return wait_until("the file is kept", [&] { return exists(kept_in(first)); });
+  }
 };
-
-std::filesystem::path kept_in(const std::filesystem::path& folder) {
-  return folder / ".assets" / (std::string(hash_of_a_model) + ".glb");
-}
 
 // ---- files of the set
 
@@ -63,8 +66,7 @@ TEST(Recorder, OfTwoDisksHasTheAssetsOnBothBeforeTheyAreNeeded) {
 TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
   Rig rig;
   Recorder recorder(rig.options_with_asset());
-  ASSERT_TRUE(
-      wait_until("it is kept", [&] { return std::filesystem::exists(kept_in(rig.first)); }));
+  ASSERT_TRUE(rig.wait_for_asset());
   std::filesystem::remove_all(rig.first / ".assets");
   std::filesystem::remove_all(rig.directory / "set");
   ASSERT_TRUE(begin_take(recorder));
@@ -85,8 +87,7 @@ TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
 TEST(Recorder, OfAStoreThatWasDeletedTakesTheFileOfTheSetIfItIsTheSame) {
   Rig rig;
   Recorder recorder(rig.options_with_asset());
-  ASSERT_TRUE(
-      wait_until("it is kept", [&] { return std::filesystem::exists(kept_in(rig.first)); }));
+  ASSERT_TRUE(rig.wait_for_asset());
   for (const char* content : {"a model", "another model"}) {
     std::filesystem::remove_all(rig.first / ".assets");
     write_content(rig.directory / "set/a.glb", content);

@@ -25,8 +25,8 @@ class RigDisplay : public test::RigLive {
       if (pictures_.size() > 1024) pictures_.pop_front();
     };
     options_.on_screen = [this](const Plate& screen, const OsdPage& page) {
-      pages_.show(page);
       ++count_;
+      pages_.show(page);
       std::unique_lock lock(mutex_);
       const Pictures pictures = pictures_;
       lock.unlock();

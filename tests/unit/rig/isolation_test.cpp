@@ -26,8 +26,7 @@ TEST_P(RigIsolation, AStageThatFailsBeginsAnewAndTheTakeLacksNothing) {
   options_.rehearse = [&](const std::string& part) {
     if (part == stage && failures > 0 && failures-- > 0) throw std::runtime_error("lamp fell down");
   };
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     press("record");
     until([](const Shown& s) { return s.records(2); });
     for (int times = 1; times <= 2; ++times) {
@@ -79,8 +78,7 @@ TEST_F(RigLive, TheCrewSeesThePlateWhileTheRendererIsMadeAnew) {
     until([&](const Shown& s) { return s.count > first + pictures && is_plate(s); });
     fails = false;
   };
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     until_plates(Mode::live, 4);
     until_samples(2);
     press("refine");
@@ -145,8 +143,7 @@ TEST_F(RigLive, ACameraThatThrowsIsAskedAgain) {
       return event;
     });
   };
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     begin_take();
     throws = true;
     until_said("has failed: lamp fell down; trying again");
@@ -175,8 +172,7 @@ TEST_F(RigLive, ACameraThatThrowsWhereItsExposureIsSetIsAskedOnce) {
   options_.around_cameras = [&](Cameras& cameras) {
     cameras.observer = std::make_unique<StubbornCamera>(std::move(cameras.observer));
   };
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     begin_take();
     press("exposure_up");
     until_said("its exposure cannot be set: lamp fell down");
@@ -333,8 +329,7 @@ INSTANTIATE_TEST_SUITE_P(InItsDestructorOrInNext, RigStop, testing::Bool());
 // Reviews that are begun and ended faster than a take is read.
 TEST_F(RigLive, ReviewsThatAreToggledFollowEachOther) {
   write_set();
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     begin_take();
     until_more(8);
     end_take();

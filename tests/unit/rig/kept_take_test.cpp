@@ -208,8 +208,7 @@ class KeptTakeRecording : public test::RigLive {};
 TEST_F(KeptTakeRecording, DISABLED_IsDoneOnceAVersion) {
   write_set("preroll_s = 0\ncomposite = true\n", 400'000'000);
   test::write_card_with_variants(directory_ / "card.gltf");
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     for (const char* button :
          {"move_right", "next_variant", "next_variant", "light_down", "light_warmer"})
       press(button);

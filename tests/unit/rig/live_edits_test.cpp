@@ -41,8 +41,7 @@ TEST_F(RigLive, ATakeInReviewIsChangedOnTopOfItsRecord) {
   const auto has = [](const Shown& s, const char* name) {
     return s.shot.scene.objects.contains(name);
   };
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     press("move_right");
     until([&](const Shown& s) { return has(s, "card"); });
     const Shown first = begin_take();
@@ -98,8 +97,7 @@ TEST_F(RigLive, ATakeInReviewIsChangedOnTopOfItsRecord) {
 TEST_F(RigLive, ChangesOutlastTheSetAndAreKeptInItsFile) {
   write_set();
   const std::filesystem::path file = directory_ / "set.toml";
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     press("move_right");
     press("light_down");
     until([](const Shown& s) {
@@ -197,8 +195,7 @@ TEST_F(RigLive, AColourThatIsNewInTheSetBuildsNoTree) {
 // What is moved while no picture is made is where it was put when the frozen one is refined.
 TEST_F(RigLive, ARefinementShowsWhatWasMovedInStandby) {
   write_set();
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     press("standby");
     until_said("button standby: standby");
     press("move_right");

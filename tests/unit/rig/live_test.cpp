@@ -27,8 +27,7 @@ void expect_same(const render::Layers& a, const render::Layers& b) {
 TEST_F(RigLive, ThroughEveryModeByButtons) {
   write_set();
   Shown refined, reviewed;
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     press("move_right");
     until([](const Shown& s) { return s.shot.scene.objects.contains("card"); });
     press("light_up");
@@ -105,8 +104,7 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
 TEST_F(RigLive, ALiveRefinementIsWhatRenderMakesOfItsFrame) {
   write_set("[lighting]\nfrom = \"set\"\n");
   Shown refined;
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     const Shown first = begin_take();
     until([&](const Shown& s) {  // the frame that is frozen then was captured after the press
       return s.shot.frame->timestamp_ns > first.shot.frame->timestamp_ns + 1'000'000'000 &&
@@ -127,8 +125,7 @@ TEST_F(RigLive, ALiveRefinementIsWhatRenderMakesOfItsFrame) {
 // Without a take nobody needs the poses and the light of the frames that come while one is refined.
 TEST_F(RigLive, TrackingAndLightEstimationRestInARefinement) {
   write_set();
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     press("refine");
     until_mode(Mode::refine);
     until_counted("frames not tracked in this mode");
@@ -139,8 +136,7 @@ TEST_F(RigLive, TrackingAndLightEstimationRestInARefinement) {
 // A take gets the pose and the light of every frame, whatever is shown.
 TEST_F(RigLive, TrackingDoesNotRestInATake) {
   write_set();
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     begin_take();
     press("refine");
     const Shown begun = until_frozen();
@@ -157,8 +153,7 @@ TEST_F(RigLive, TrackingDoesNotRestInATake) {
 TEST_F(RigLive, ASnapshotIsOfTheRefinementThatItsPressEnded) {
   write_set("[[button]]\nname = \"snapshot\"\npress = \"double\"\naction = \"standby\"\n");
   Shown refined;
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     press("refine");
     refined = until_frozen(6);
     press("snapshot");
@@ -188,8 +183,7 @@ TEST_F(RigLive, AButtonThatIsNotThereIsToldOfAndHoldsUpNobody) {
 // Captured = rendered + dropped by cause, whatever was done in between.
 TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
   write_set();
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     press("refine");
     until_frozen(4);
     press("standby");  // only ends the refinement
@@ -209,8 +203,7 @@ TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
 // A disk that does not take picture.png is reported, and no reason to stop.
 TEST_F(RigLive, GoesOnWhereItsFilesCannotBeWritten) {
   write_set();
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     std::filesystem::rename(directory_ / "live", directory_ / "gone");
     std::ofstream(directory_ / "live") << "a file where the directory was";
     until_said((directory_ / "live").string());
@@ -226,8 +219,7 @@ TEST_F(RigLive, GoesOnWhereItsFilesCannotBeWritten) {
 TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
   write_set();
   const std::string good = session::read_file(directory_ / "set.toml");
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     std::ofstream(directory_ / "set.toml") << "[quality]\nsamples = none\n";
     press("reload_set");
     until_said("the old set stays in use");
@@ -249,8 +241,7 @@ TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
 // A set that can be read and cannot be started is not started again and again.
 TEST_F(RigLive, ASetThatCannotStartIsTriedOnce) {
   write_set();
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     const std::string good =
         replace_in_set("[observer]\n", "[observer]\nfaults = [\"nonsense\"]\n");
     until_said("back to the previous set");  // the rig saw the file by itself
@@ -328,8 +319,7 @@ TEST_F(RigLive, RecordsOnAfterARestartUntilSomebodyEndsIt) {
 TEST_F(RigLive, WhatDrawsOnTheProcessorYieldsToTheRecording) {
   write_set();
   int drawing = 0, yielding = 0;
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
       std::string name;
       std::ifstream(task.path() / "comm") >> name;

@@ -51,8 +51,7 @@ TEST_F(RigLive, TheWatchdogIsFedWhileTheCameraIsSilent) {
       return NoFrame{};
     });
   };
-  run([&] {
-    until_samples(2);
+  run_rendering([&] {
     is_silent = true;
     systemd.skip();
     EXPECT_GE(systemd.fed_within(while_fed), often);
