@@ -9,10 +9,9 @@
 #include "daemon/post/take_copy.hpp"
 #include "daemon/post/takes.hpp"
 #include "daemon/rig/set_keeper.hpp"
-#include "drivers/error.hpp"
-#include "tests/durability/cut_off_take.hpp"
 #include "tests/durability/still_disk.hpp"
-#include "tests/support/session_fixture.hpp"
+#include "tests/support/cut_off_take.hpp"
+#include "tests/support/recorder_fixture.hpp"
 #include "tests/support/small_shot.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/test.hpp"
@@ -61,12 +60,7 @@ INSTANTIATE_TEST_SUITE_P(Fails, FailingDisk,
                          ::testing::Values(ReadFault::once, ReadFault::from_then_on));
 
 void expect_frames(const fs::path& take) {
-  session::Session session = session::open_session(take);
-  const auto stream = session::open_stream(session, "observer");
-  ASSERT_TRUE(stream);
-  ASSERT_EQ(stream->records().size(), frames);
-  for (std::uint64_t i = 0; i < frames; ++i)
-    EXPECT_TRUE(session::is_frame(*stream->read(i), i)) << i;
+  EXPECT_EQ(output::frames_of(take), output::count_from(0, frames - 1));
 }
 
 // A take that was cut off is in order again, or what hindered it is said, and then the next start

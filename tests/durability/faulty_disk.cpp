@@ -159,12 +159,13 @@ std::optional<DiskFault> next_fault() {
   return d.fault->fault;
 }
 
-// Returns the error of the next call, which is then counted as one that changes nothing; 0: none.
-int refusal() {
+// Returns whether the next call fails, which is then counted as one that changes nothing.
+bool is_refused() {
   const std::optional<DiskFault> fault = next_fault();
-  if (!fault || *fault == DiskFault::short_write) return 0;
+  if (!fault || *fault == DiskFault::short_write) return false;
   disk().calls.push_back({.kind = Call::Kind::refused});
-  return *fault == DiskFault::io_error ? EIO : ENOSPC;
+  errno = *fault == DiskFault::io_error ? EIO : ENOSPC;
+  return true;
 }
 
 void note(Call call) {
@@ -191,12 +192,7 @@ int open_noted(const char* path, int flags, mode_t mode) {
   }
   const bool makes = (flags & O_CREAT) != 0 && !place->node;
   const bool empties = (flags & O_TRUNC) != 0 && place->node;
-  if (makes || empties) {
-    if (const int error = refusal()) {
-      errno = error;
-      return -1;
-    }
-  }
+  if ((makes || empties) && is_refused()) return -1;
   const int descriptor = call(path, flags, mode);
   if (descriptor < 0) return descriptor;
   std::size_t node = place->node.value_or(0);
@@ -227,10 +223,7 @@ ssize_t write_noted(int descriptor, const void* bytes, std::size_t count, off_t 
   const std::unique_lock lock(disk().mutex);
   const std::optional<std::size_t> node = node_of(descriptor);
   if (!node) return forward(count);
-  if (const int error = refusal()) {
-    errno = error;
-    return -1;
-  }
+  if (is_refused()) return -1;
   if (next_fault() == DiskFault::short_write && count > 1) count /= 2;
   off_t at = offset;
   if (offset < 0)
@@ -258,10 +251,7 @@ int sync_noted(const char* name, int descriptor) {
     errno = EIO;
     return -1;
   }
-  if (const int error = refusal()) {
-    errno = error;
-    return -1;
-  }
+  if (is_refused()) return -1;
   note({.kind = Call::Kind::sync, .node = *node, .name = name_of(*node)});
   return 0;  // the medium behind the folder may forget, too: nobody asks it
 }
@@ -272,13 +262,17 @@ int change_noted(const char* path, const Forward& forward, const auto& call_of) 
   const std::lock_guard lock(disk().mutex);
   const std::optional<Place> place = place_of(path);
   if (!place) return forward();
-  if (const int error = refusal()) {
-    errno = error;
-    return -1;
-  }
+  if (is_refused()) return -1;
   const int result = forward();
   if (result == 0) note(call_of(*place));
   return result;
+}
+
+int remove_noted(const char* name, const char* path) {
+  const auto forward = [&] { return real<int(const char*)>(name)(path); };
+  return change_noted(path, forward, [](const Place& place) {
+    return Call{.kind = Call::Kind::remove, .folder = place.folder, .name = place.name};
+  });
 }
 
 }  // namespace
@@ -358,6 +352,7 @@ using previz::test::disk;
 using previz::test::note;
 using previz::test::Place;
 using previz::test::real;
+using previz::test::remove_noted;
 
 int open(const char* path, int flags, ...) {
   va_list rest;
@@ -366,13 +361,7 @@ int open(const char* path, int flags, ...) {
   va_end(rest);
   return previz::test::open_noted(path, flags, mode);
 }
-int open64(const char* path, int flags, ...) {
-  va_list rest;
-  va_start(rest, flags);
-  const auto mode = static_cast<mode_t>(va_arg(rest, int));
-  va_end(rest);
-  return previz::test::open_noted(path, flags, mode);
-}
+[[gnu::alias("open")]] int open64(const char* path, int flags, ...);
 
 // A stream's descriptor is opened here, so that it is known to the calls below.
 FILE* fopen(const char* path, const char* mode) {
@@ -386,9 +375,7 @@ FILE* fopen(const char* path, const char* mode) {
   const int descriptor = previz::test::open_noted(path, flags, 0666);
   return descriptor < 0 ? nullptr : ::fdopen(descriptor, mode);
 }
-FILE* fopen64(const char* path, const char* mode) {
-  return fopen(path, mode);
-}
+[[gnu::alias("fopen")]] FILE* fopen64(const char* path, const char* mode);
 
 int close(int descriptor) {
   {
@@ -404,9 +391,8 @@ ssize_t write(int descriptor, const void* bytes, size_t count) {
 ssize_t pwrite(int descriptor, const void* bytes, size_t count, off_t offset) {
   return previz::test::write_noted(descriptor, bytes, count, offset);
 }
-ssize_t pwrite64(int descriptor, const void* bytes, size_t count, off64_t offset) {
-  return previz::test::write_noted(descriptor, bytes, count, offset);
-}
+[[gnu::alias("pwrite")]] ssize_t pwrite64(int descriptor, const void* bytes, size_t count,
+                                          off64_t offset);
 ssize_t writev(int descriptor, const iovec* parts, int count) {
   {
     const std::lock_guard lock(disk().mutex);
@@ -424,10 +410,7 @@ ssize_t sendfile(int, int, off_t*, size_t) {
   errno = EINVAL;
   return -1;
 }
-ssize_t sendfile64(int, int, off64_t*, size_t) {
-  errno = EINVAL;
-  return -1;
-}
+[[gnu::alias("sendfile")]] ssize_t sendfile64(int, int, off64_t*, size_t);
 ssize_t copy_file_range(int, off64_t*, int, off64_t*, size_t, unsigned) {
   errno = EINVAL;
   return -1;
@@ -474,16 +457,10 @@ int mkdir(const char* path, mode_t mode) noexcept {
 }
 
 int unlink(const char* path) noexcept {
-  const auto forward = [&] { return real<int(const char*)>("unlink")(path); };
-  return change_noted(path, forward, [](const Place& place) {
-    return Call{.kind = Call::Kind::remove, .folder = place.folder, .name = place.name};
-  });
+  return remove_noted("unlink", path);
 }
 int remove(const char* path) noexcept {
-  const auto forward = [&] { return real<int(const char*)>("remove")(path); };
-  return change_noted(path, forward, [](const Place& place) {
-    return Call{.kind = Call::Kind::remove, .folder = place.folder, .name = place.name};
-  });
+  return remove_noted("remove", path);
 }
 
 int ftruncate(int descriptor, off_t size) noexcept {

@@ -3,10 +3,9 @@
 #include "daemon/output/png.hpp"
 #include "daemon/output/video.hpp"
 #include "daemon/render/composite.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/draft.hpp"
-#include "tests/durability/faulty_disk.hpp"
+#include "tests/durability/faulty_rounds.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 
@@ -59,6 +58,16 @@ std::vector<Kind> kinds() {
   };
 }
 
+// What stands there after some writing that perhaps failed.
+struct Found {
+  bool is_whole = false, is_as_before = false;
+};
+Found found_in(const std::filesystem::path& folder, const Kind& kind, const std::string& whole) {
+  const bool exists = std::filesystem::exists(folder / kind.file);
+  const std::string content = exists ? content_of(folder / kind.file) : "";
+  return {content == whole, kind.replaces ? content == before : !exists};
+}
+
 // Everybody who looks finds the whole file, or what was there before.
 TEST(Files, AreWholeOrNotThereAfterAPowerCut) {
   for (const Kind& kind : kinds()) {
@@ -68,22 +77,16 @@ TEST(Files, AreWholeOrNotThereAfterAPowerCut) {
     const std::size_t begun = disk.calls();
     kind.write(folder.path());
     const std::string whole = content_of(folder / kind.file);
-    for (std::size_t cut = begun; cut <= disk.calls(); ++cut)
-      for (const AfterPowerCut kept : power_cuts) {
-        SCOPED_TRACE(std::string(kind.name) + ", cut before call " + std::to_string(cut) + " (" +
-                     disk.describe(cut) + "), kept " + std::to_string(static_cast<int>(kept)));
-        disk.restore(cut, kept, elsewhere / "after");
-        const std::filesystem::path file = elsewhere / "after" / kind.file;
-        const bool exists = std::filesystem::exists(file);
-        const std::string found = exists ? content_of(file) : "";
-        const bool is_as_before = kind.replaces ? found == before : !exists;
-        EXPECT_TRUE(found == whole || is_as_before);
-        EXPECT_TRUE(found == whole || cut < disk.calls()) << "it was said to be written";
-      }
+    SCOPED_TRACE(kind.name);
+    for_each_power_cut(disk, begun, elsewhere / "after", [&](std::size_t cut) {
+      const Found found = found_in(elsewhere / "after", kind, whole);
+      EXPECT_TRUE(found.is_whole || found.is_as_before);
+      EXPECT_TRUE(found.is_whole || cut < disk.calls()) << "it was said to be written";
+    });
   }
 }
 
-class EveryCallOfAFile : public ::testing::TestWithParam<DiskFault> {};
+class EveryCallOfAFile : public EveryFault {};
 INSTANTIATE_TEST_SUITE_P(Fails, EveryCallOfAFile,
                          ::testing::Values(DiskFault::io_error, DiskFault::no_space,
                                            DiskFault::short_write));
@@ -97,37 +100,27 @@ TEST_P(EveryCallOfAFile, LeavesTheFileWholeOrNotThereAndSaysSo) {
       kind.write(folder.path());
       whole = content_of(folder / kind.file);
     }
-    for (std::size_t call = 0;; ++call) {
-      const TemporaryDirectory folder;
-      FaultyDisk disk(folder.path());
-      if (kind.replaces) session::replace_file(folder / kind.file, before);
-      const std::size_t begun = disk.calls();
-      disk.fail(begun + call, GetParam());
-      std::string fault;
-      try {
-        kind.write(folder.path());
-      } catch (const Error& error) {
-        fault = error.what();
-      }
-      SCOPED_TRACE(std::string(kind.name) + ", call " + std::to_string(call) + ", " +
-                   disk.describe(begun + call) + ", " + fault);
-      const bool exists = std::filesystem::exists(folder / kind.file);
-      const std::string found = exists ? content_of(folder / kind.file) : "";
-      const bool is_as_before = kind.replaces ? found == before : !exists;
-      EXPECT_TRUE(found == whole || is_as_before);
-      EXPECT_TRUE(found == whole || !fault.empty()) << "it was said to be written";
-      EXPECT_TRUE(fault.empty() || fault.find(folder.path().string()) != std::string::npos)
-          << "the error names no file";
+    const auto put_what_it_replaces = [&](const Round& round) {
+      if (kind.replaces) session::replace_file(round.folder / kind.file, before);
+    };
+    const auto write = [&](Round& round) {
+      const std::string fault = error_of([&] { kind.write(round.folder.path()); });
+      SCOPED_TRACE(std::string(kind.name) + ", " + round.describe() + ", " + fault);
+      const Found found = found_in(round.folder.path(), kind, whole);
+      EXPECT_TRUE(found.is_whole || found.is_as_before);
+      EXPECT_TRUE(found.is_whole || !fault.empty()) << "it was said to be written";
       // What a failed sync was to keep may be lost from the medium.
+      if (!fault.empty()) {
+        EXPECT_THAT(fault, HasSubstr(round.folder.path().string())) << "the error names no file";
+        return;
+      }
       for (const AfterPowerCut kept : power_cuts) {
-        if (!fault.empty()) break;
-        disk.restore(disk.calls(), kept, elsewhere / "after");
-        const std::filesystem::path after = elsewhere / "after" / kind.file;
-        EXPECT_TRUE(std::filesystem::exists(after) && content_of(after) == whole)
+        round.disk.restore(round.disk.calls(), kept, elsewhere / "after");
+        EXPECT_TRUE(found_in(elsewhere / "after", kind, whole).is_whole)
             << "it was said to be written; kept " << static_cast<int>(kept);
       }
-      if (begun + call >= disk.calls()) break;
-    }
+    };
+    for_each_call(write, put_what_it_replaces);
   }
 }
 

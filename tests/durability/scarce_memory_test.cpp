@@ -9,13 +9,10 @@
 
 #include <csignal>
 
-#include "daemon/output/recorder.hpp"
 #include "daemon/output/salvage.hpp"
 #include "tests/durability/scarce_memory.hpp"
 #include "tests/support/recorder_fixture.hpp"
-#include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::scarce_memory_test {
 

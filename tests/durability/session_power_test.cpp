@@ -1,30 +1,24 @@
 // Sessions on disks that lose power and that fail: what was acknowledged is there, and nothing is
 // taken for whole that is not.
 #include "daemon/output/asset_store.hpp"
-#include "daemon/output/recorder.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
-#include "tests/durability/faulty_disk.hpp"
-#include "tests/support/session_fixture.hpp"
+#include "tests/durability/faulty_rounds.hpp"
+#include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
-namespace previz::test::session_power_test {
+namespace previz::output::session_power_test {
 
 using session::is_frame;
 using session::noise_frame;
 using session::SessionWriter;
-using session::TemporaryDirectory;
 using session::write_content;
+using test::AfterPowerCut;
+using test::DiskFault;
+using test::FaultyDisk;
+using test::TemporaryDirectory;
+using test::wait_until;
 
 constexpr int frames = 4;
-
-session::TrackRecord track_of(std::uint64_t frame) {
-  session::TrackRecord record;
-  record.frame = frame;
-  record.timestamp_ns = static_cast<std::int64_t>(frame);
-  return record;
-}
 
 // Writes a session with two streams, a track, an event and an asset. `done` is called after each
 // frame of the observer and, with `frames`, once more after closing.
@@ -36,7 +30,9 @@ void write_session(const std::filesystem::path& directory, const std::filesystem
     writer.write(noise_frame("observer", i, PixelFormat::rgb8, 24, 18));
     done(i);
     writer.write(noise_frame("light", i, PixelFormat::rgb8, 16, 16));
-    writer.write(track_of(i));
+    session::TrackRecord track = track_of(i);
+    track.frame = static_cast<std::uint64_t>(i);
+    writer.write(track);
     writer.write_event(i, "something happened");
   }
   writer.close();
@@ -66,19 +62,15 @@ TEST(PowerCut, LosesNoFrameThatWasAcknowledged) {
   write_session(folder / "takes" / "one", elsewhere / "asset.glb",
                 [&](int) { acknowledged.push_back(disk.calls()); });
   ASSERT_GT(disk.calls(), 50u);
-  for (std::size_t cut = 0; cut <= disk.calls(); ++cut)
-    for (const AfterPowerCut kept : power_cuts) {
-      SCOPED_TRACE("cut before call " + std::to_string(cut) + " (" + disk.describe(cut) +
-                   "), kept " + std::to_string(static_cast<int>(kept)));
-      disk.restore(cut, kept, elsewhere / "after");
-      const auto promised = static_cast<int>(
-          std::ranges::count_if(acknowledged, [&](std::size_t calls) { return calls <= cut; }));
-      bool closed = false;
-      const std::optional<int> there = frames_in(elsewhere / "after" / "takes" / "one", closed);
-      EXPECT_GE(there.value_or(0), std::min(promised, frames));
-      EXPECT_TRUE(!closed || there == frames) << "closed, and something is missing";
-      EXPECT_TRUE(closed || promised <= frames) << "it was said to be closed";
-    }
+  for_each_power_cut(disk, 0, elsewhere / "after", [&](std::size_t cut) {
+    const auto promised = static_cast<int>(
+        std::ranges::count_if(acknowledged, [&](std::size_t calls) { return calls <= cut; }));
+    bool closed = false;
+    const std::optional<int> there = frames_in(elsewhere / "after" / "takes" / "one", closed);
+    EXPECT_GE(there.value_or(0), std::min(promised, frames));
+    EXPECT_TRUE(!closed || there == frames) << "closed, and something is missing";
+    EXPECT_TRUE(closed || promised <= frames) << "it was said to be closed";
+  });
 }
 
 // A session that names an asset has it, whole: it is on the medium before the session names it.
@@ -86,32 +78,28 @@ TEST(PowerCut, LeavesALinkedAssetWhereTheSessionNamesIt) {
   const TemporaryDirectory folder, elsewhere;
   write_content(elsewhere / "asset.glb", "a model");
   FaultyDisk disk(folder.path());
-  output::AssetStore store(folder / "store", {{"a.glb", elsewhere / "asset.glb"}},
-                           [](const std::string& what) { ADD_FAILURE() << what; });
+  AssetStore store(folder / "store", {{"a.glb", elsewhere / "asset.glb"}},
+                   [](const std::string& what) { ADD_FAILURE() << what; });
   SessionWriter writer(folder / "one", {}, std::chrono::nanoseconds(0));
   const auto order = store.deliver(folder / "one");
   ASSERT_TRUE(wait_until("it is there", [&] { return order->result().has_value(); }));
   writer.set_assets(order->result()->assets, order->result()->missing);
   const std::size_t acknowledged = disk.calls();
   writer.close();
-  for (std::size_t cut = 0; cut <= disk.calls(); ++cut)
-    for (const AfterPowerCut kept : power_cuts) {
-      SCOPED_TRACE("cut before call " + std::to_string(cut) + " (" + disk.describe(cut) +
-                   "), kept " + std::to_string(static_cast<int>(kept)));
-      disk.restore(cut, kept, elsewhere / "after");
-      std::size_t assets = 0;
-      if (std::filesystem::exists(elsewhere / "after/one/session.toml")) {
-        const session::Session session = session::open_session(elsewhere / "after/one");
-        assets = session.info.assets.size();
-        for (const auto& [as_written, file] : session.info.assets)
-          EXPECT_EQ(session::read_file(session.directory / file), "a model");
-      }
-      EXPECT_TRUE(assets == 1 || cut < acknowledged);
+  for_each_power_cut(disk, 0, elsewhere / "after", [&](std::size_t cut) {
+    std::size_t assets = 0;
+    if (std::filesystem::exists(elsewhere / "after/one/session.toml")) {
+      const session::Session session = session::open_session(elsewhere / "after/one");
+      assets = session.info.assets.size();
+      for (const auto& [as_written, file] : session.info.assets)
+        EXPECT_EQ(session::read_file(session.directory / file), "a model");
     }
+    EXPECT_TRUE(assets == 1 || cut < acknowledged);
+  });
 }
 
 // Each call to the disk in turn fails, or writes less than it was given.
-class EveryCall : public ::testing::TestWithParam<DiskFault> {};
+class EveryCall : public test::EveryFault {};
 INSTANTIATE_TEST_SUITE_P(Fails, EveryCall,
                          ::testing::Values(DiskFault::io_error, DiskFault::no_space,
                                            DiskFault::short_write));
@@ -119,74 +107,64 @@ INSTANTIATE_TEST_SUITE_P(Fails, EveryCall,
 TEST_P(EveryCall, OfASessionThatFailsIsAnErrorAndTheSessionIsNotClosed) {
   const TemporaryDirectory elsewhere;
   write_content(elsewhere / "asset.glb", "a model");
-  for (std::size_t call = 0;; ++call) {
-    const TemporaryDirectory folder;
-    FaultyDisk disk(folder.path());
-    disk.fail(call, GetParam());
+  for_each_call([&](Round& round) {
     int acknowledged = 0;
-    std::string fault;
-    try {
-      write_session(folder / "one", elsewhere / "asset.glb", [&](int i) { acknowledged = i + 1; });
-    } catch (const Error& error) {
-      fault = error.what();
-    }
-    SCOPED_TRACE("call " + std::to_string(call) + ", " + disk.describe(call) + ", " + fault);
+    const std::string fault = test::error_of([&] {
+      write_session(round.folder / "one", elsewhere / "asset.glb",
+                    [&](int i) { acknowledged = i + 1; });
+    });
+    SCOPED_TRACE(round.describe() + ", " + fault);
     bool closed = false;
-    const std::optional<int> there = frames_in(folder / "one", closed);
+    const std::optional<int> there = frames_in(round.folder / "one", closed);
     EXPECT_GE(there.value_or(0), std::min(acknowledged, frames));
     EXPECT_EQ(closed, fault.empty());
     // What a failed sync was to keep may be lost from the medium, whatever the kernel says later.
-    for (const AfterPowerCut kept : power_cuts) {
-      disk.restore(disk.calls(), kept, elsewhere / "after");
+    for (const AfterPowerCut kept : test::power_cuts) {
+      round.disk.restore(round.disk.calls(), kept, elsewhere / "after");
       const std::optional<int> after = frames_in(elsewhere / "after" / "one", closed);
       EXPECT_GE(after.value_or(0), std::min(acknowledged, frames));
       EXPECT_EQ(closed, fault.empty()) << static_cast<int>(kept);
     }
-    if (call >= disk.calls()) break;  // no call was left to fail
+  });
+}
+
+// Options for disks with room, the first of which perhaps fails.
+RecorderOptions options_of(std::vector<std::filesystem::path> folders) {
+  RecorderOptions options = recorder_options(std::move(folders));
+  options.free_bytes = [](const auto&) { return plenty; };
+  return options;
+}
+
+// Offers these frames with their tracks, without which the end of a take waits for them.
+void offer(Recorder& recorder, int first, int last) {
+  for (int i = first; i < last; ++i) {
+    recorder.offer(picture(i));
+    recorder.offer(track_of(i));
   }
 }
 
 // A rig's recorder: the fault is reported, frames on the disk are counted, and the next take is
 // whole.
 TEST_P(EveryCall, OfARecorderThatFailsEndsTheTakeAndNotTheNext) {
-  const auto picture = [](int i) {
-    return std::make_shared<Frame>(noise_frame("observer", i, PixelFormat::rgb8, 24, 18));
-  };
-  for (std::size_t call = 0;; ++call) {
-    const TemporaryDirectory folder;
-    FaultyDisk disk(folder.path());
-    disk.fail(call, GetParam());
-    output::RecorderOptions options;
-    options.take.folders = {folder / "takes"};
-    options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
-    options.preroll_s = 0;
-    options.reserve_bytes = 0;
-    options.free_bytes = [](const auto&) { return std::uint64_t{1'000'000'000}; };
-    output::RecorderStatus first, second;
+  for_each_call([&](Round& round) {
+    RecorderStatus first, second;
     {
-      output::Recorder recorder(std::move(options));
+      Recorder recorder(options_of({round.folder / "takes"}));
       const auto record = [&](int from) {
-        const std::uint64_t takes = recorder.status().finished_takes;
-        const std::uint64_t failures = recorder.status().failures;
+        const RecorderStatus before = recorder.status();
         recorder.start();
-        for (int i = from; i < from + frames; ++i) {
-          const FramePtr frame = picture(i);
-          session::TrackRecord track;  // without it the end of a take waits for it
-          track.timestamp_ns = frame->timestamp_ns;
-          recorder.offer(frame);
-          recorder.offer(track);
-        }
+        offer(recorder, from, from + frames);
         recorder.stop();
         EXPECT_TRUE(wait_until("the take is over", [&] {
-          const output::RecorderStatus status = recorder.status();
-          return status.finished_takes > takes || status.failures > failures;
+          const RecorderStatus status = recorder.status();
+          return status.finished_takes > before.finished_takes || status.failures > before.failures;
         }));
         return recorder.status();
       };
       first = record(0);
       second = record(frames);
     }
-    SCOPED_TRACE("call " + std::to_string(call) + ", " + disk.describe(call) + ", " + first.fault);
+    SCOPED_TRACE(round.describe() + ", " + first.fault);
     EXPECT_EQ(first.failures + second.failures > 0, !(first.fault + second.fault).empty());
     bool closed = false;
     if (first.failures > 0 && std::filesystem::exists(first.directory / "session.toml")) {
@@ -207,8 +185,7 @@ TEST_P(EveryCall, OfARecorderThatFailsEndsTheTakeAndNotTheNext) {
       EXPECT_EQ(frames_in(first.directory, closed), frames);
       EXPECT_TRUE(closed);
     }
-    if (call >= disk.calls()) break;
-  }
+  });
 }
 
 bool is_closed(const std::filesystem::path& take) {
@@ -216,61 +193,32 @@ bool is_closed(const std::filesystem::path& take) {
          session::content_of(take / "session.toml").find("closed = true") != std::string::npos;
 }
 
-// The recorder of two folders, the first of them perhaps on a disk that fails.
-output::RecorderOptions options_of(const std::filesystem::path& first,
-                                   const std::filesystem::path& second) {
-  output::RecorderOptions options;
-  options.take.folders = {first, second};
-  options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
-  options.preroll_s = 0;
-  options.reserve_bytes = 0;
-  options.free_bytes = [](const auto&) { return std::uint64_t{1'000'000'000}; };
-  return options;
-}
-
-void offer(output::Recorder& recorder, int index) {
-  const auto frame =
-      std::make_shared<Frame>(noise_frame("observer", index, PixelFormat::rgb8, 24, 18));
-  session::TrackRecord track;
-  track.timestamp_ns = frame->timestamp_ns;
-  recorder.offer(frame);
-  recorder.offer(track);
-}
-
 // The next recording has begun when the first take ends, and goes on afterwards: a failure is that
 // of one take, and leaves the other whole.
 TEST_P(EveryCall, OfARecorderThatHasBegunTheNextTakeCostsOneOfThem) {
-  for (std::size_t call = 0;; ++call) {
-    const TemporaryDirectory folder;
-    FaultyDisk disk(folder.path());
-    disk.fail(call, GetParam());
-    output::RecorderOptions options = options_of(folder / "takes", {});
-    options.take.folders.pop_back();
+  for_each_call([&](Round& round) {
     {
-      output::Recorder recorder(std::move(options));
+      Recorder recorder(options_of({round.folder / "takes"}));
       recorder.start();
-      for (int i = 0; i < frames; ++i) offer(recorder, i);
+      offer(recorder, 0, frames);
       recorder.stop();
       recorder.start();
       EXPECT_TRUE(wait_until("the first take is over", [&] {
-        const output::RecorderStatus status = recorder.status();
+        const RecorderStatus status = recorder.status();
         return status.finished_takes + status.failures > 0;
       }));
-      for (int i = frames; i < 2 * frames; ++i) offer(recorder, i);
+      offer(recorder, frames, 2 * frames);
       recorder.stop();
     }
-    SCOPED_TRACE("call " + std::to_string(call) + ", " + disk.describe(call));
-    const bool has_failed = call < disk.calls();
+    SCOPED_TRACE(round.describe());
     int whole = 0;
-    for (const auto& take : std::filesystem::directory_iterator(folder / "takes")) {
+    for (const auto& take : std::filesystem::directory_iterator(round.folder / "takes")) {
       if (!is_closed(take.path())) continue;
-      session::Session session = session::open_session(take.path());
-      const auto stream = session::open_stream(session, "observer");
-      whole += session.missing.empty() && stream && stream->records().size() >= std::size_t{frames};
+      whole += session::open_session(take.path()).missing.empty() &&
+               frame_count(take.path()) >= std::uint64_t{frames};
     }
-    EXPECT_GE(whole, has_failed ? 1 : 2);
-    if (!has_failed) break;
-  }
+    EXPECT_GE(whole, round.has_failed() ? 1 : 2);
+  });
 }
 
 // With a second disk the recording goes on there, and every frame that was offered is in one of the
@@ -279,46 +227,41 @@ TEST_P(EveryCall, OfARecorderThatHasBegunTheNextTakeCostsOneOfThem) {
 TEST_P(EveryCall, OfTheFirstOfTwoDisksThatFailsLosesNoFrame) {
   const TemporaryDirectory elsewhere;
   write_content(elsewhere / "asset.glb", "a model");
-  for (std::size_t call = 0;; ++call) {
-    const TemporaryDirectory folder;
-    FaultyDisk disk(folder.path());
-    disk.fail(call, GetParam());
-    const std::filesystem::path second = elsewhere / std::to_string(call);
-    output::RecorderOptions options = options_of(folder / "takes", second);
+  for_each_call([&](Round& round) {
+    const std::filesystem::path second = elsewhere / std::to_string(round.call);
+    RecorderOptions options = options_of({round.folder / "takes", second});
     options.take.assets = {{"a.glb", elsewhere / "asset.glb"}};
-    output::RecorderStatus status;
+    RecorderStatus status;
     {
-      output::Recorder recorder(std::move(options));
+      Recorder recorder(std::move(options));
       recorder.start();
-      for (int i = 0; i < frames; ++i) offer(recorder, i);
+      offer(recorder, 0, frames);
       recorder.stop();
       EXPECT_TRUE(wait_until("it is over", [&] {
-        const output::RecorderStatus now = recorder.status();
+        const RecorderStatus now = recorder.status();
         return now.failures > 0 || (!now.recording && now.frames > 0 && !now.finished.empty());
       }));
       recorder.finish();
       status = recorder.status();
     }
-    SCOPED_TRACE("call " + std::to_string(call) + ", " + disk.describe(call) + ", " + status.fault);
+    SCOPED_TRACE(round.describe() + ", " + status.fault);
     bool closed = false;
-    const std::filesystem::path first = folder / "takes/1_take001";
+    const std::filesystem::path first = round.folder / "takes/12A_take001";
     const int in_first = frames_in(first, closed).value_or(0);
     const bool is_first_closed = is_closed(first);  // perhaps without its asset
     int in_second = 0;
     bool goes_on = false;  // perhaps without a frame, where only the stop was left
-    for (const char* name : {"1_take001", "1_take002"}) {
+    for (const char* name : {"12A_take001", "12A_take002"}) {
       const std::filesystem::path take = second / name;
       if (!std::filesystem::exists(take)) continue;
-      const int there = frames_in(take, closed, in_first).value_or(0);
+      in_second += frames_in(take, closed, in_first).value_or(0);
       goes_on = true;
       EXPECT_TRUE(closed);
-      in_second += there;
     }
     EXPECT_EQ(in_first + in_second, frames);
     EXPECT_FALSE(std::filesystem::exists(second / ".recording")) << "it would record on by itself";
     EXPECT_EQ(status.failures, goes_on || is_first_closed ? 0u : 1u);
-    if (call >= disk.calls()) break;
-  }
+  });
 }
 
 // A folder that is named with a slash at its end is given up as any other.
@@ -326,15 +269,15 @@ TEST(RecorderOfTwoDisks, GoesOnInTheSecondHoweverTheFirstIsNamed) {
   for (const char* name : {"takes", "takes/"}) {
     const TemporaryDirectory folder, elsewhere;
     FaultyDisk disk(folder.path());
-    output::Recorder recorder(options_of(folder / name, elsewhere / "second"));
+    Recorder recorder(options_of({folder / name, elsewhere / "second"}));
     recorder.start();
-    offer(recorder, 0);
-    ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 1; }));
+    offer(recorder, 0, 1);
+    ASSERT_TRUE(wait_for_frames(recorder, 1));
     disk.fail(disk.calls() + 4, DiskFault::io_error);
-    for (int i = 1; i < frames; ++i) offer(recorder, i);
+    offer(recorder, 1, frames);
     recorder.stop();
     recorder.finish();
-    EXPECT_EQ(recorder.status().directory, elsewhere / "second/1_take002") << name;
+    EXPECT_EQ(recorder.status().directory, elsewhere / "second/12A_take002") << name;
   }
 }
 
@@ -344,12 +287,12 @@ TEST(TakeFolders, OfWhichOneFailsForgetTheWishInTheOther) {
   FaultyDisk disk(folder.path());
   session::make_folders(elsewhere / "second");
   session::make_folders(folder / "takes");
-  const output::TakeFolders folders({folder / "takes", elsewhere / "second"}, 0, {});
-  output::TakeFolders::keep_wish(folder / "takes/1_take001");
-  output::TakeFolders::keep_wish(elsewhere / "second/1_take002");
+  const TakeFolders folders({folder / "takes", elsewhere / "second"}, 0, {});
+  TakeFolders::keep_wish(folder / "takes/12A_take001");
+  TakeFolders::keep_wish(elsewhere / "second/12A_take002");
   disk.fail(disk.calls() + 1, DiskFault::io_error);  // the file is removed, and its name not synced
   EXPECT_THROW(folders.drop_wish(), Error);
   EXPECT_FALSE(folders.kept_wish());
 }
 
-}  // namespace previz::test::session_power_test
+}  // namespace previz::output::session_power_test

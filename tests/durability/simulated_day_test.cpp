@@ -1,22 +1,16 @@
 // A day of the whole rig in simulated time: the crew records a take in every hour, and each hour
 // has its own mishap.
-#include <poll.h>
-#include <sys/eventfd.h>
-#include <sys/socket.h>
-#include <sys/un.h>
-
 #include <iostream>
 
 #include "daemon/output/take_writer.hpp"
 #include "daemon/post/check.hpp"
 #include "daemon/rig/live.hpp"
-#include "drivers/descriptor.hpp"
 #include "drivers/lifeline.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/durability/simulated_time.hpp"
 #include "tests/durability/simulated_time_camera.hpp"
 #include "tests/support/crewed_rig.hpp"
-#include "tests/support/hand.hpp"
+#include "tests/support/notify_socket.hpp"
 #include "tests/support/other_camera.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -53,54 +47,6 @@ constexpr std::int64_t quiet_grain = 4 * second;
 // milliseconds.
 constexpr std::int64_t work = 5 * ms;
 
-// Listens as the watchdog of systemd does, and notes when it is fed.
-class Watchdog {
- public:
-  Watchdog(const SimulatedTime& time, const std::filesystem::path& path)
-      : time_(time), socket_(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    path.string().copy(address.sun_path, sizeof address.sun_path - 1);
-    EXPECT_EQ(::bind(socket_.get(), reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    ::setenv("NOTIFY_SOCKET", path.c_str(), 1);
-    ::setenv("WATCHDOG_USEC", "20000000", 1);  // as previzd.service has it
-    thread_ = std::jthread([this] { listen(); });
-  }
-  ~Watchdog() { end(); }
-
-  void end() {
-    if (!thread_.joinable()) return;
-    ::unsetenv("NOTIFY_SOCKET");
-    ::unsetenv("WATCHDOG_USEC");
-    ::eventfd_write(end_.get(), 1);
-    thread_.join();
-  }
-  std::vector<std::int64_t> fed_ns() const {
-    const std::lock_guard lock(mutex_);
-    return fed_ns_;
-  }
-
- private:
-  void listen() {
-    std::array<pollfd, 2> both{{{socket_.get(), POLLIN, 0}, {end_.get(), POLLIN, 0}}};
-    while (::poll(both.data(), both.size(), -1) > 0 && both[1].revents == 0) {
-      std::array<char, 4096> text{};
-      while (::recv(socket_.get(), text.data(), text.size() - 1, 0) > 0) {
-        const std::lock_guard lock(mutex_);
-        if (std::string_view(text.data()).find("WATCHDOG=1") != std::string_view::npos)
-          fed_ns_.push_back(time_.now_ns());
-        text.fill('\0');
-      }
-    }
-  }
-
-  const SimulatedTime& time_;
-  OwnedDescriptor socket_, end_{::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)};
-  mutable std::mutex mutex_;
-  std::vector<std::int64_t> fed_ns_;
-  std::jthread thread_;
-};
-
 class SimulatedDay : public testing::Test {
  protected:
   struct Said {
@@ -125,32 +71,19 @@ class SimulatedDay : public testing::Test {
         "[lighting]\nfrom = \"set\"\n[recording]\nslate = \"12A\"\nreserve_mb = 1\n"
         "directory = \"takes\"\n" +
             test::button_for_every_action());
-    without_light_camera();
+    std::string text = session::read_file(directory_ / "set.toml");
+    const std::string before = "[light_camera]\ndriver = \"replay\"\ndevice = \"session\"\n";
+    text.replace(text.find(before), before.size(), "[light_camera]\ndriver = \"none\"\n");
+    std::ofstream(directory_ / "set.toml") << text;
   }
   ~SimulatedDay() override {
     for (const char* name : {"STATE_DIRECTORY", "VK_DRIVER_FILES", "VK_ICD_FILENAMES"})
       ::unsetenv(name);
   }
 
-  void without_light_camera() const {
-    std::string text = session::read_file(directory_ / "set.toml");
-    const std::string before = "[light_camera]\ndriver = \"replay\"\ndevice = \"session\"\n";
-    text.replace(text.find(before), before.size(), "[light_camera]\ndriver = \"none\"\n");
-    std::ofstream(directory_ / "set.toml") << text;
-  }
-
   // Runs the rig until the crew's script has ended.
   void run(const std::function<void()>& script) {
     LiveOptions options;
-    options.set_file = directory_ / "set.toml";
-    options.directory = directory_ / "live";
-    std::stop_source stop;
-    options.stop = stop.get_token();
-    options.buttons = [this] {
-      std::vector<std::unique_ptr<Buttons>> buttons;
-      buttons.push_back(std::make_unique<test::Hand::Device>(hand_));
-      return buttons;
-    };
     options.around_cameras = [this](Cameras& cameras) {
       cameras.observer = std::make_unique<Lifeline>("simulated", [this] { return device_.open(); });
       cameras.observer->start();
@@ -163,15 +96,7 @@ class SimulatedDay : public testing::Test {
     options.on_shown = [this](const pipeline::Shot& shot, const Look& look) {
       look_at(shot, look);
     };
-    std::jthread crew([&] {
-      try {
-        script();
-      } catch (const test::WaitedInVain& what) {
-        ADD_FAILURE() << what.what();
-      }
-      stop.request_stop();
-    });
-    metrics_ = run_live(options, reports_);
+    metrics_ = test::run_crewed(std::move(options), directory_.path(), hand_, script, reports_);
   }
 
   // ---- what is checked at every event
@@ -516,7 +441,13 @@ class SimulatedDay : public testing::Test {
 };
 
 TEST_F(SimulatedDay, HasEveryTakeWholeAndEveryAlarmInTime) {
-  Watchdog watchdog(time_, directory_ / "notify");
+  std::vector<std::int64_t> fed_ns;
+  std::optional<test::NotifySocket> systemd;
+  systemd.emplace(directory_ / "notify", std::chrono::seconds(20),  // as previzd.service has it
+                  [&](const std::string& message) {
+                    if (message.find("WATCHDOG=1") != std::string::npos)
+                      fed_ns.push_back(time_.now_ns());
+                  });
   const std::int64_t begin = time_.now_ns();
   run([&] {
     for (int i = 0; i < takes; ++i) {
@@ -538,8 +469,8 @@ TEST_F(SimulatedDay, HasEveryTakeWholeAndEveryAlarmInTime) {
       time_.sleep_exactly_until(begin + (i + 1) * 24 * hour / takes);
     }
   });
-  watchdog.end();
-  expect_fed(watchdog.fed_ns(), begin, begin + 24 * hour);
+  systemd.reset();
+  expect_fed(fed_ns, begin, begin + 24 * hour);
 
   EXPECT_EQ(metrics_.stages.at("observer").frames, delivered_);
   EXPECT_EQ(test::accounted_for(metrics_), delivered_) << to_json(metrics_);

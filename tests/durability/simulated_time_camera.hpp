@@ -1,24 +1,13 @@
 // A camera in simulated time that knows when each of its pictures was really taken.
 #pragma once
 
-#include <algorithm>
-#include <cstdint>
-#include <map>
-#include <memory>
-#include <mutex>
-#include <optional>
-#include <random>
-#include <string>
-#include <thread>
-#include <utility>
-
 #include "drivers/camera.hpp"
 #include "drivers/clock_map.hpp"
-#include "drivers/error.hpp"
 #include "drivers/frame_order.hpp"
 #include "drivers/host_clock.hpp"
 #include "drivers/other_clock.hpp"
 #include "tests/durability/simulated_time.hpp"
+#include "tests/support/test.hpp"
 
 namespace previz::test {
 

@@ -6,9 +6,8 @@
 #include "daemon/output/take_list.hpp"
 #include "daemon/post/render_directory.hpp"
 #include "daemon/post/take_copy.hpp"
-#include "drivers/error.hpp"
-#include "tests/durability/cut_off_take.hpp"
 #include "tests/durability/still_disk.hpp"
+#include "tests/support/cut_off_take.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_shot.hpp"
 #include "tests/support/test.hpp"
@@ -74,11 +73,9 @@ TEST(StillDiskOfACopy, ThatIsStoppedMeanwhileLeavesNoHalfCopy) {
     fs::create_directories(copies);
     std::stop_source stop;
     const auto work = [&] {
-      try {
-        copy_take(output::listed_take(take), copies / "12A_take001", stop.get_token());
-      } catch (const Error& error) {
-        EXPECT_TRUE(stop.stop_requested()) << error.what();
-      }
+      const std::string fault = test::error_of(
+          [&] { copy_take(output::listed_take(take), copies / "12A_take001", stop.get_token()); });
+      EXPECT_TRUE(fault.empty() || stop.stop_requested()) << fault;
     };
     was_still = run_past_call(call, directory.path(), work, [&] { stop.request_stop(); });
     for (const fs::directory_entry& entry : fs::directory_iterator(copies)) {

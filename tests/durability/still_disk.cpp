@@ -16,6 +16,7 @@
 #include <map>
 #include <mutex>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 namespace previz::test {
@@ -73,6 +74,18 @@ bool pass(const char* function, int descriptor) {
   if (!disk().watches) return true;
   const auto open = disk().open.find(descriptor);
   return open == disk().open.end() || pass(lock, function, std::string(open->second));
+}
+
+// Calls the C library's function of this name, whose first argument is the path or descriptor that
+// the call is for. Returns its own error where the call does not work.
+template <typename Function, typename Where, typename... Arguments>
+auto passed(const char* name, Where where, Arguments... arguments) {
+  using Result = decltype(real<Function>(name)(where, arguments...));
+  if (pass(name, where)) return real<Function>(name)(where, arguments...);
+  if constexpr (std::is_pointer_v<Result>)
+    return Result{nullptr};
+  else
+    return Result{-1};
 }
 
 int opened(int descriptor, const char* path) {
@@ -149,6 +162,7 @@ std::size_t StillDisk::waiting() const {
 extern "C" {
 
 using previz::test::pass;
+using previz::test::passed;
 using previz::test::real;
 
 int open(const char* path, int flags, ...) {
@@ -158,20 +172,12 @@ int open(const char* path, int flags, ...) {
   va_end(rest);
   return previz::test::open_passed(path, flags, mode);
 }
-int open64(const char* path, int flags, ...) {
-  va_list rest;
-  va_start(rest, flags);
-  const auto mode = static_cast<mode_t>(va_arg(rest, int));
-  va_end(rest);
-  return previz::test::open_passed(path, flags, mode);
-}
+[[gnu::alias("open")]] int open64(const char* path, int flags, ...);
 FILE* fopen(const char* path, const char* mode) {
   if (!pass(__func__, path)) return nullptr;
   return real<FILE*(const char*, const char*)>("fopen64")(path, mode);
 }
-FILE* fopen64(const char* path, const char* mode) {
-  return fopen(path, mode);
-}
+[[gnu::alias("fopen")]] FILE* fopen64(const char* path, const char* mode);
 int close(int descriptor) {
   {
     const std::lock_guard lock(previz::test::disk().mutex);
@@ -181,72 +187,54 @@ int close(int descriptor) {
 }
 
 ssize_t read(int descriptor, void* bytes, size_t count) {
-  if (!pass(__func__, descriptor)) return -1;
-  return real<ssize_t(int, void*, size_t)>("read")(descriptor, bytes, count);
+  return passed<ssize_t(int, void*, size_t)>(__func__, descriptor, bytes, count);
 }
 ssize_t pread64(int descriptor, void* bytes, size_t count, off64_t offset) {
-  if (!pass(__func__, descriptor)) return -1;
-  return real<ssize_t(int, void*, size_t, off64_t)>("pread64")(descriptor, bytes, count, offset);
+  return passed<ssize_t(int, void*, size_t, off64_t)>(__func__, descriptor, bytes, count, offset);
 }
-ssize_t pread(int descriptor, void* bytes, size_t count, off_t offset) {
-  return pread64(descriptor, bytes, count, offset);
-}
+[[gnu::alias("pread64")]] ssize_t pread(int descriptor, void* bytes, size_t count, off_t offset);
 ssize_t write(int descriptor, const void* bytes, size_t count) {
-  if (!pass(__func__, descriptor)) return -1;
-  return real<ssize_t(int, const void*, size_t)>("write")(descriptor, bytes, count);
+  return passed<ssize_t(int, const void*, size_t)>(__func__, descriptor, bytes, count);
 }
 int fsync(int descriptor) {
-  if (!pass(__func__, descriptor)) return -1;
-  return real<int(int)>("fsync")(descriptor);
+  return passed<int(int)>(__func__, descriptor);
 }
 int fdatasync(int descriptor) {
-  if (!pass(__func__, descriptor)) return -1;
-  return real<int(int)>("fdatasync")(descriptor);
+  return passed<int(int)>(__func__, descriptor);
 }
 int flock(int descriptor, int operation) noexcept {
-  if (!pass(__func__, descriptor)) return -1;
-  return real<int(int, int)>("flock")(descriptor, operation);
+  return passed<int(int, int)>(__func__, descriptor, operation);
 }
 int fstat(int descriptor, struct stat* status) noexcept {
-  if (!pass(__func__, descriptor)) return -1;
-  return real<int(int, struct stat*)>("fstat")(descriptor, status);
+  return passed<int(int, struct stat*)>(__func__, descriptor, status);
 }
 
 int stat(const char* path, struct stat* status) noexcept {
-  if (!pass(__func__, path)) return -1;
-  return real<int(const char*, struct stat*)>("stat")(path, status);
+  return passed<int(const char*, struct stat*)>(__func__, path, status);
 }
 int stat64(const char* path, struct stat64* status) noexcept {
-  if (!pass(__func__, path)) return -1;
-  return real<int(const char*, struct stat64*)>("stat64")(path, status);
+  return passed<int(const char*, struct stat64*)>(__func__, path, status);
 }
 int lstat(const char* path, struct stat* status) noexcept {
-  if (!pass(__func__, path)) return -1;
-  return real<int(const char*, struct stat*)>("lstat")(path, status);
+  return passed<int(const char*, struct stat*)>(__func__, path, status);
 }
 int lstat64(const char* path, struct stat64* status) noexcept {
-  if (!pass(__func__, path)) return -1;
-  return real<int(const char*, struct stat64*)>("lstat64")(path, status);
+  return passed<int(const char*, struct stat64*)>(__func__, path, status);
 }
 int access(const char* path, int mode) noexcept {
-  if (!pass(__func__, path)) return -1;
-  return real<int(const char*, int)>("access")(path, mode);
+  return passed<int(const char*, int)>(__func__, path, mode);
 }
 int statvfs(const char* path, struct statvfs* status) noexcept {
-  if (!pass(__func__, path)) return -1;
-  return real<int(const char*, struct statvfs*)>("statvfs")(path, status);
+  return passed<int(const char*, struct statvfs*)>(__func__, path, status);
 }
 int statvfs64(const char* path, struct statvfs64* status) noexcept {
-  if (!pass(__func__, path)) return -1;
-  return real<int(const char*, struct statvfs64*)>("statvfs64")(path, status);
+  return passed<int(const char*, struct statvfs64*)>(__func__, path, status);
 }
 DIR* opendir(const char* path) {
-  if (!pass(__func__, path)) return nullptr;
-  return real<DIR*(const char*)>("opendir")(path);
+  return passed<DIR*(const char*)>(__func__, path);
 }
 char* realpath(const char* path, char* resolved) noexcept {
-  if (!pass(__func__, path)) return nullptr;
-  return real<char*(const char*, char*)>("realpath")(path, resolved);
+  return passed<char*(const char*, char*)>(__func__, path, resolved);
 }
 
 int rename(const char* from, const char* to) noexcept {
@@ -258,16 +246,13 @@ int link(const char* from, const char* to) noexcept {
   return real<int(const char*, const char*)>("link")(from, to);
 }
 int mkdir(const char* path, mode_t mode) noexcept {
-  if (!pass(__func__, path)) return -1;
-  return real<int(const char*, mode_t)>("mkdir")(path, mode);
+  return passed<int(const char*, mode_t)>(__func__, path, mode);
 }
 int unlink(const char* path) noexcept {
-  if (!pass(__func__, path)) return -1;
-  return real<int(const char*)>("unlink")(path);
+  return passed<int(const char*)>(__func__, path);
 }
 int remove(const char* path) noexcept {
-  if (!pass(__func__, path)) return -1;
-  return real<int(const char*)>("remove")(path);
+  return passed<int(const char*)>(__func__, path);
 }
 
 }  // extern "C"

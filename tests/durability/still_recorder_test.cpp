@@ -1,11 +1,8 @@
 // Takes on disks that stand still, at any call: nobody but the recorder's own threads waits, and
 // what is offered meanwhile is recorded or counted.
-#include "daemon/output/recorder.hpp"
-#include "drivers/error.hpp"
 #include "tests/durability/still_disk.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::still_recorder_test {
 
@@ -52,8 +49,7 @@ TEST(StillDisk, AtAnyCallKeepsNobodyWaitingAndLosesNoFrameUncounted) {
       }));
       was_still = disk.waiting() > 0;
       disk.go_on();
-      ASSERT_TRUE(
-          wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+      ASSERT_TRUE(wait_for_finished(recorder, 1));
       recorder.finish();
       take = recorder.status().directory;
       lost = recorder.status().lost;
@@ -75,8 +71,7 @@ TEST(StillDisk, ThatIsTheSecondKeepsNothingFromTheFirst) {
     Recorder recorder(rig.options());
     ASSERT_TRUE(wait_until("it is still", [&] { return disk.waiting() > 0; }));
     offer_take(recorder);
-    ASSERT_TRUE(
-        wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+    ASSERT_TRUE(wait_for_finished(recorder, 1));
     EXPECT_EQ(recorder.status().directory.parent_path(), rig.first);
     EXPECT_GT(recorder.folders().at(1).silent_s, 0);
   }  // and ends

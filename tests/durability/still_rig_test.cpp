@@ -25,9 +25,8 @@ TEST_F(RigLive, ADiskThatStandsStillForASnapshotKeepsNoPictureWaiting) {
   StillDisk disk(directory_ / "live");
   run([&] {
     const GoesOn at_end{disk};
-    until([](const Shown& s) { return s.shot.samples == 2; });
-    press("record");
-    until([](const Shown& s) { return s.look.state.recording; });
+    until_samples(2);
+    begin_take();
     disk.stand_still();
     constexpr std::uint64_t waiting = 4;
     for (std::uint64_t i = 1; i <= waiting + 3; ++i) {
@@ -36,22 +35,20 @@ TEST_F(RigLive, ADiskThatStandsStillForASnapshotKeepsNoPictureWaiting) {
       until([&](const Shown& s) { return s.count > now.count + 3; });
     }
     until_said("snapshot: is skipped");
-    press("record");
-    until_said("12A_take001 is finished");
+    end_take();
   });
   const auto dropped = metrics_.stages.at("snapshot").dropped;
   ASSERT_TRUE(dropped.contains("queue full")) << log_.text();
   EXPECT_GE(dropped.at("queue full"), 1u);
   EXPECT_LE(dropped.at("queue full"), 2u);
-  EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
+  EXPECT_TRUE(session::open_session(take_folder()).missing.empty());
 }
 
 // The stages, the recorder and the main loop say what waits for them, and nothing does for long
 // while the rig is well.
 TEST_F(RigLive, EveryQueueIsMeasured) {
   write_set();
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     until_measured([](const nlohmann::json& stages) {
       return std::ranges::all_of(
           std::array{"tracking", "lighting", "render", "review", "display", "snapshot", "recorder",
@@ -70,10 +67,9 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
   StillDisk disk(directory_ / "takes");
   run([&] {
     const GoesOn at_end{disk};
-    until([](const Shown& s) { return s.shot.samples == 2; });
+    until_samples(2);
     disk.stand_still();
-    press("record");
-    until([](const Shown& s) { return s.look.state.recording; });
+    begin_take();
     until_said("its disk does not respond");
     until_measured([](const nlohmann::json& stages) {
       const nlohmann::json& waiting = stages.at("recorder").at("waiting");
@@ -82,7 +78,7 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
              folders.at("oldest_s") > 0.1;
     });
     for (int times = 0; times < 2; ++times) {
-      const Shown now = until([](const Shown&) { return true; });
+      const Shown now = shown_now();
       press("refine");
       until_mode(Mode::refine);
       press("live");
@@ -90,8 +86,7 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
       until([&](const Shown& s) { return s.count > now.count + 2; });
     }
     disk.go_on();
-    press("record");
-    until_said("12A_take001 is finished");
+    end_take();
   });
 }
 
@@ -110,8 +105,7 @@ TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
   };
   StillDisk disk(file);
   NotifySocket systemd(directory_ / "notify");
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     disk.stand_still();
     write(other);
     press("reload_set");
@@ -119,27 +113,25 @@ TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
     systemd.skip();
     EXPECT_GE(systemd.fed_within(std::chrono::seconds(2)), 3);
     press("samples_up");
-    until([](const Shown& s) { return s.shot.samples == 3; });
+    until_samples(3);
     press("next_set");
     until_said("button next_set: a set is already loading");
     disk.go_on();
-    until([](const Shown& s) { return s.shot.samples == 4; });
+    until_samples(4);
 
     // A take that begins meanwhile is not ended by a set.
     disk.stand_still();
     write(good);
     press("reload_set");
-    press("record");
-    until([](const Shown& s) { return s.look.state.recording; });
+    begin_take();
     disk.go_on();
     until_said("the old set stays in use: recording began while another one was loading");
-    const int before = until([](const Shown&) { return true; }).count;
+    const int before = shown_now().count;
     until([&](const Shown& s) { return s.count > before + 4 && s.look.state.recording; });
-    press("record");
-    until_said("12A_take001 is finished");
-    until([](const Shown& s) { return s.shot.samples == 2; });  // it is read now
+    end_take();
+    until_samples(2);  // it is read now
   });
-  EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
+  EXPECT_TRUE(session::open_session(take_folder()).missing.empty());
 }
 
 // Nobody waits for a set whose disk does not respond: it is given up after a while, and a rig that
@@ -161,7 +153,7 @@ TEST(SetKeeperOnAStillDisk, ReadsOnAThreadOfItsOwnAndGivesUp) {
     EXPECT_TRUE(sets.is_reading());
     const std::optional<SetKeeper::Ended> ended = sets.finish(std::chrono::milliseconds(0));
     ASSERT_TRUE(ended && ended->why_not);
-    EXPECT_NE(ended->why_not->find("the disk does not respond"), std::string::npos);
+    EXPECT_THAT(*ended->why_not, HasSubstr("the disk does not respond"));
     EXPECT_FALSE(sets.is_reading());
     EXPECT_EQ(sets.running().set.name, "old");
     EXPECT_FALSE(sets.look_at_file());

@@ -4,29 +4,11 @@
 // rendered or dropped for a cause that is counted. Prints the figures; 0: all of it held.
 #include <malloc.h>
 #include <sys/resource.h>
-#include <sys/timerfd.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
-#include <cmath>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <iostream>
-#include <iterator>
-#include <limits>
-#include <mutex>
-#include <sstream>
-#include <stop_token>
-#include <string>
-#include <thread>
-#include <utility>
-#include <vector>
 
-#include "daemon/rig/live.hpp"
-#include "drivers/descriptor.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/devices/leftovers.hpp"
 #include "tests/support/crewed_rig.hpp"
@@ -38,37 +20,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// A button pressed every second, in turn.
-class Crew final : public Buttons {
- public:
-  Crew() {
-    const itimerspec each_second{{1, 0}, {1, 0}};
-    if (!timer_ || timerfd_settime(timer_.get(), 0, &each_second, nullptr) != 0)
-      throw Error("no timer can be made");
-  }
-  std::string name() const override { return "crew"; }
-  int fd() const override { return timer_.get(); }
-  std::optional<ButtonsEvent> next() override {
-    if (is_down_) {
-      is_down_ = false;
-      return ButtonEvent{buttons[pressed_++ % buttons.size()], false, 0};
-    }
-    std::uint64_t times = 0;
-    if (read(timer_.get(), &times, sizeof times) != sizeof times) return std::nullopt;
-    is_down_ = true;
-    return ButtonEvent{buttons[pressed_ % buttons.size()], true, 0};
-  }
-
-  static inline const std::vector<std::string> buttons = {
-      "record",   "move_right", "refine",    "live",       "light_up",     "record",
-      "review",   "live",       "move_left", "samples_up", "samples_down", "debug_view",
-      "snapshot", "standby",    "live",      "reload_set"};
-
- private:
-  OwnedDescriptor timer_{timerfd_create(CLOCK_MONOTONIC, TFD_NONBLOCK | TFD_CLOEXEC)};
-  std::size_t pressed_ = 0;
-  bool is_down_ = false;
-};
+// The buttons that the crew presses in turn, one every second.
+constexpr std::array buttons = {"record",    "move_right", "refine",       "live",
+                                "light_up",  "record",     "review",       "live",
+                                "move_left", "samples_up", "samples_down", "debug_view",
+                                "snapshot",  "standby",    "live",         "reload_set"};
 
 struct Sample {
   double minutes = 0;
@@ -174,17 +130,10 @@ bool stays_flat(const std::vector<Sample>& samples, double minutes) {
 }
 
 std::string set_text(const std::filesystem::path& takes) {
-  std::string text =
-      "[[light]]\nname = \"key\"\ntype = \"point\"\nposition_m = [0.3, 0, 0.6]\n"
-      "emission = [1, 1, 1]\n[recording]\nslate = \"soak\"\nreserve_mb = 100\nqueue_mb = 2\n"
-      "preroll_s = 0.2\ncomposite = true\ndirectory = \"" +
-      takes.string() + "\"\n";
-  std::vector<std::string> names = Crew::buttons;
-  std::ranges::sort(names);
-  names.erase(std::unique(names.begin(), names.end()), names.end());
-  for (const std::string& name : names)
-    text += "[[button]]\nname = \"" + name + "\"\naction = \"" + name + "\"\n";
-  return text;
+  return "[[light]]\nname = \"key\"\ntype = \"point\"\nposition_m = [0.3, 0, 0.6]\n"
+         "emission = [1, 1, 1]\n[recording]\nslate = \"soak\"\nreserve_mb = 100\nqueue_mb = 2\n"
+         "preroll_s = 0.2\ncomposite = true\ndirectory = \"" +
+         takes.string() + "\"\n" + test::button_for_every_action();
 }
 
 // Takes would fill the disk in half an hour.
@@ -217,33 +166,21 @@ bool soak(double minutes) {
   constexpr std::int64_t interval_ns = 4'000'000;  // 250 frames a second
   test::write_small_take(directory.path(), true, set_text(directory / "takes"), {}, interval_ns);
   add_faults(directory / "set.toml");
-  rig::LiveOptions options;
-  options.set_file = directory / "set.toml";
-  options.directory = directory / "live";
-  options.loop = true;
-  options.buttons = [] {
-    std::vector<std::unique_ptr<Buttons>> buttons;
-    buttons.push_back(std::make_unique<Crew>());
-    return buttons;
-  };
-  std::stop_source stop;
-  options.stop = stop.get_token();
-
   std::vector<Sample> samples;
-  std::jthread watch([&] {
+  test::Hand hand;
+  const auto crew = [&] {
     const auto begin = std::chrono::steady_clock::now();
-    for (double now = 0; now < minutes;) {
+    double now = 0;
+    for (std::size_t pressed = 0; now < minutes; ++pressed) {
       std::this_thread::sleep_for(1s);
+      hand.press(buttons[pressed % buttons.size()]);
       now = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count() / 60;
       samples.push_back(sample_at(now));
       forget_old_takes(directory / "takes");
     }
-    stop.request_stop();
-  });
+  };
   std::ostringstream log;
-  report::Reports reports(report::lines_to(log));
-  const pipeline::MetricsSnapshot metrics = rig::run_live(options, reports);
-  watch.join();
+  const pipeline::MetricsSnapshot metrics = test::run_looped({}, directory.path(), hand, crew, log);
 
   std::printf("%.1f minutes, %.1f frames a second captured, %.1f rendered\n", metrics.seconds / 60,
               static_cast<double>(metrics.stages.at("observer").frames) / metrics.seconds,

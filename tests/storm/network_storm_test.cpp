@@ -3,13 +3,7 @@
 // that are none, from others and in the camera's name.
 #include <arv.h>
 
-#include <algorithm>
-#include <array>
 #include <csignal>
-#include <cstring>
-#include <memory>
-#include <random>
-#include <vector>
 
 #include "daemon/set/actions.hpp"
 #include "tests/devices/hostile_packets.hpp"

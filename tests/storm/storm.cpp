@@ -2,13 +2,6 @@
 
 #include <systemd/sd-bus.h>
 
-#include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <stdexcept>
-#include <thread>
-
 #include "daemon/control/bus.hpp"
 #include "daemon/set/actions.hpp"
 #include "drivers/session/files.hpp"
@@ -79,7 +72,7 @@ void expect_whole(const fs::path& take) {
       EXPECT_NO_THROW(stream->read(i));
   }
   for (const std::string& missing : session.missing)
-    EXPECT_NE(missing.find("did not reach the disk in time"), std::string::npos) << missing;
+    EXPECT_THAT(missing, HasSubstr("did not reach the disk in time"));
 }
 
 std::size_t count_whole_takes(const fs::path& takes) {
@@ -190,7 +183,7 @@ void Storm::blow(const std::vector<Gust>& gusts) {
 // The sky clears: the rig shows pictures again.
 void Storm::clear_up() {
   std::ofstream(directory_ / "set.toml") << text_;
-  const int before = until([](const Shown&) { return true; }).count;
+  const int before = shown_now().count;
   test::must_come("pictures are shown again", [&] {
     push("live");
     std::this_thread::sleep_for(std::chrono::milliseconds(500));  // two presses a second
@@ -219,8 +212,7 @@ void Storm::weather(const std::vector<Gust>& gusts) {
   if (!bus.running()) GTEST_SKIP() << "dbus-daemon is not installed";
   throw_in_every_stage();
   options_.bus = true;
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     std::vector<Gust> all = everyday(bus);
     all.insert(all.end(), gusts.begin(), gusts.end());
     blow(all);

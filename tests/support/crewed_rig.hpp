@@ -1,4 +1,4 @@
-// Runs the rig on the small take, looped, with one Hand as its crew.
+// Runs the rig, most often on the small take, with one Hand as its crew.
 #pragma once
 
 #include <stop_token>
@@ -30,22 +30,27 @@ void await(std::condition_variable& news, std::unique_lock<std::mutex>& lock, Co
     throw WaitedInVain("the crew waited in vain; seen last: " + seen());
 }
 
-// Runs the rig until the script, on a thread of its own, has ended or waited in vain. set.toml is
-// in `directory`; `options` may watch the shown pictures.
-inline pipeline::MetricsSnapshot run_crewed(rig::LiveOptions options,
-                                            const std::filesystem::path& directory, Hand& hand,
-                                            const std::function<void()>& script,
-                                            std::ostream& out) {
+// Options with the buttons of this hand, for a rig whose set.toml is in `directory`.
+inline rig::LiveOptions with_hand(rig::LiveOptions options, const std::filesystem::path& directory,
+                                  Hand& hand, const std::stop_source& stop) {
   options.set_file = directory / "set.toml";
   options.directory = directory / "live";
-  options.loop = true;
-  std::stop_source stop;
   options.stop = stop.get_token();
   options.buttons = [&hand] {
     std::vector<std::unique_ptr<Buttons>> buttons;
     buttons.push_back(std::make_unique<Hand::Device>(hand));
     return buttons;
   };
+  return options;
+}
+
+// Runs the rig until the script, on a thread of its own, has ended or waited in vain. set.toml is
+// in `directory`; `options` may watch the shown pictures.
+inline pipeline::MetricsSnapshot run_crewed(rig::LiveOptions options,
+                                            const std::filesystem::path& directory, Hand& hand,
+                                            const std::function<void()>& script,
+                                            report::Reports& reports) {
+  std::stop_source stop;
   std::jthread crew([&] {
     try {
       script();
@@ -54,19 +59,17 @@ inline pipeline::MetricsSnapshot run_crewed(rig::LiveOptions options,
     }
     stop.request_stop();
   });
-  report::Reports reports(report::lines_to(out));
-  return rig::run_live(options, reports);
+  return rig::run_live(with_hand(std::move(options), directory, hand, stop), reports);
 }
 
-// Waits until metrics.json, which is written once a second while pictures are shown, has counted
-// `what`.
-inline void must_be_counted(const std::filesystem::path& directory, const std::string& what) {
-  const auto text = [file = directory / "live/metrics.json"] {
-    return std::filesystem::exists(file) ? session::read_file(file) : std::string();
-  };
-  must_come(
-      "\"" + what + "\" is counted",
-      [&] { return text().find("\"" + what + "\"") != std::string::npos; }, text);
+// The same on a take that is looped, with the reports as lines.
+inline pipeline::MetricsSnapshot run_looped(rig::LiveOptions options,
+                                            const std::filesystem::path& directory, Hand& hand,
+                                            const std::function<void()>& script,
+                                            std::ostream& out) {
+  options.loop = true;
+  report::Reports reports(report::lines_to(out));
+  return run_crewed(std::move(options), directory, hand, script, reports);
 }
 
 // Counts the frames that were rendered, or dropped for a counted cause. This must equal the number

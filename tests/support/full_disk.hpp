@@ -7,8 +7,8 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <filesystem>
-#include <string>
+
+#include "tests/support/test.hpp"
 
 namespace previz::test {
 

@@ -3,13 +3,9 @@
 
 #include <sys/eventfd.h>
 
-#include <deque>
-#include <mutex>
-#include <optional>
-#include <string>
-
 #include "drivers/buttons.hpp"
 #include "drivers/descriptor.hpp"
+#include "tests/support/test.hpp"
 
 namespace previz::test {
 

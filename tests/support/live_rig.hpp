@@ -5,7 +5,6 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/post/render.hpp"
-#include "daemon/rig/live.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -33,12 +32,26 @@ class Log : public std::stringbuf {
   std::string lines_;
 };
 
+// The film camera's frames of a take, each of which must be there.
+inline std::vector<session::FrameRecord> unbroken(const std::filesystem::path& take) {
+  session::Session session = session::open_session(take);
+  EXPECT_TRUE(session.missing.empty()) << testing::PrintToString(session.missing);
+  const auto stream = session::open_stream(session, "observer");
+  if (!stream) return {};
+  std::vector<session::FrameRecord> records = stream->records();
+  for (std::size_t i = 0; i < records.size(); ++i)
+    EXPECT_EQ(records[i].sequence, records[0].sequence + i);
+  return records;
+}
+
 class RigLive : public testing::Test {
  protected:
   struct Shown {
     pipeline::Shot shot;
     rig::Look look;
-    int count = 0;
+    int count = 0;     // pictures until this one
+    int rendered = 0;  // how many of these were rendered
+    bool records(int samples) const { return look.state.recording && shot.samples == samples; }
   };
 
   // The small take with a button for every action, named like it, and a lamp.
@@ -52,6 +65,16 @@ class RigLive : public testing::Test {
     write_small_take(directory_.path(), true, text, {}, interval_ns);
   }
 
+  // Replaces words of the set file. Returns its text as it was before.
+  std::string replace_in_set(const std::string& old, const std::string& by) {
+    const std::string before = session::read_file(directory_ / "set.toml");
+    std::string text = before;
+    EXPECT_THAT(text, HasSubstr(old));
+    text.replace(text.find(old), old.size(), by);
+    std::ofstream(directory_ / "set.toml") << text;
+    return before;
+  }
+
   std::function<void()> while_shown_ = [] {};  // on the display's thread
   rig::LiveOptions options_;
 
@@ -60,37 +83,74 @@ class RigLive : public testing::Test {
     rig::LiveOptions options = options_;
     options.on_shown = [&](const pipeline::Shot& shot, const rig::Look& look) {
       std::unique_lock lock(mutex_);
-      shown_ = {shot, look, shown_.count + 1};
+      shown_ = {shot, look, shown_.count + 1, shown_.rendered + (shot.samples > 0 ? 1 : 0)};
       seen_.notify_all();
       lock.unlock();
       while_shown_();
     };
     std::ostream out(&log_);
-    metrics_ = run_crewed(std::move(options), directory_.path(), hand_, script, out);
+    metrics_ = run_looped(std::move(options), directory_.path(), hand_, script, out);
   }
 
-  // Waits until the stages in metrics.json, which is written once a second while pictures are
-  // shown, are as they should be.
-  void until_measured(const std::function<bool(const nlohmann::json&)>& condition) {
+  // The same with a script that begins once pictures are rendered.
+  void run_rendering(const std::function<void()>& script) {
+    run([&] {
+      until_samples(2);
+      script();
+    });
+  }
+
+  // Waits until metrics.json, which is written once a second while pictures are shown, is as it
+  // should be.
+  void until_metrics(const std::string& what,
+                     const std::function<bool(const nlohmann::json&)>& condition) {
     const auto text = [file = directory_ / "live/metrics.json"] {
       return std::filesystem::exists(file) ? session::read_file(file) : std::string("{}");
     };
     must_come(
-        "the metrics are right",
-        [&] {
-          const auto json = nlohmann::json::parse(text());
-          return json.contains("stages") && condition(json.at("stages"));
-        },
-        text);
+        what, [&] { return condition(nlohmann::json::parse(text())); }, text);
+  }
+  void until_measured(const std::function<bool(const nlohmann::json& stages)>& condition) {
+    until_metrics("the metrics are right", [&](const nlohmann::json& metrics) {
+      return metrics.contains("stages") && condition(metrics.at("stages"));
+    });
+  }
+  void until_counted(const std::string& what) {
+    until_metrics("\"" + what + "\" is counted", [&](const nlohmann::json& metrics) {
+      return metrics.dump().find("\"" + what + "\"") != std::string::npos;
+    });
   }
 
-  // A press, then whatever is shown until the condition holds: no time is assumed.
+  // Waits until the condition holds for what is shown: no time is assumed.
   Shown until(const std::function<bool(const Shown&)>& condition) {
     std::unique_lock lock(mutex_);
     await(
         seen_, lock, [&] { return shown_.shot.frame && condition(shown_); },
         [&] { return "picture " + std::to_string(shown_.count) + "\n" + log_.text(); });
     return shown_;
+  }
+  Shown shown_now() {
+    return until([](const Shown&) { return true; });
+  }
+  Shown until_samples(int samples) {
+    return until([samples](const Shown& s) { return s.shot.samples == samples; });
+  }
+  // Waits until more than so many pictures were shown since now.
+  Shown until_more(int pictures) {
+    const int before = shown_now().count;
+    return until([=](const Shown& s) { return s.count > before + pictures; });
+  }
+  // Waits until so many pictures were rendered since now.
+  Shown until_rendered(int more) {
+    const int before = rendered_pictures();
+    return until([=](const Shown& s) { return s.rendered >= before + more; });
+  }
+  int rendered_pictures() {
+    const std::lock_guard lock(mutex_);
+    return shown_.rendered;
+  }
+  Shown until_frozen(int samples = 0) {
+    return until([=](const Shown& s) { return s.shot.frozen && s.shot.samples >= samples; });
   }
   Shown until_mode(rig::Mode mode) {
     return until([mode](const Shown& s) {
@@ -99,9 +159,9 @@ class RigLive : public testing::Test {
   }
   void until_said(const std::string& words) {
     must_come(
-        "\"" + words + "\" is said", [&] { return count_said(words) > 0; },
-        [&] { return log_.text(); });
+        "\"" + words + "\" is said", [&] { return said(words); }, [&] { return log_.text(); });
   }
+  bool said(const std::string& words) const { return count_said(words) > 0; }
   int count_said(const std::string& words) const {
     const std::string text = log_.text();
     int count = 0;
@@ -115,8 +175,20 @@ class RigLive : public testing::Test {
     return s.count > first.count + 12 &&
            s.shot.frame->timestamp_ns > first.shot.frame->timestamp_ns + 4'000'000'000;
   }
-  void until_counted(const std::string& what) { must_be_counted(directory_.path(), what); }
   void press(const std::string& button) { hand_.press(button); }
+
+  // Begins a take and waits for a picture in it; ends one and waits until it is on the disk.
+  Shown begin_take() {
+    press("record");
+    return until([](const Shown& s) { return s.look.state.recording; });
+  }
+  void end_take(const std::string& name = "12A_take001") {
+    press("record");
+    until_said(name + " is finished");
+  }
+  std::filesystem::path take_folder(const std::string& name = "12A_take001") const {
+    return directory_ / "takes" / name;
+  }
 
   // The layers of the frame as `previzd render` makes them.
   render::Layers rendered(const std::filesystem::path& take, std::int64_t timestamp_ns,

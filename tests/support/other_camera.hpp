@@ -1,12 +1,8 @@
 // Puts something around a camera that changes what it delivers.
 #pragma once
 
-#include <functional>
-#include <memory>
-#include <string>
-#include <utility>
-
 #include "drivers/camera.hpp"
+#include "tests/support/test.hpp"
 
 namespace previz::test {
 

@@ -6,7 +6,6 @@
 #include <systemd/sd-bus.h>
 #include <systemd/sd-event.h>
 
-#include "drivers/error.hpp"
 #include "tests/support/private_bus.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

@@ -6,16 +6,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "daemon/output/recorder.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/session/files.hpp"
-#include "tests/support/session_fixture.hpp"
+#include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::asset_store_test {
 
-using session::noise_frame;
 using session::TemporaryDirectory;
 using session::write_content;
 using test::wait_until;
@@ -81,9 +78,7 @@ TEST(AssetStore, RemovesWhatNoTakeAndNoSetNeeds) {
 TEST(Recorder, LinksTheAssetsIntoEachTakeAsTheyWereWhenTheSetWasLoaded) {
   const TemporaryDirectory directory;
   write_content(directory / "a.glb", "a model");
-  RecorderOptions options;
-  options.take.folders = {directory / "takes"};
-  options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
+  RecorderOptions options = recorder_options({directory / "takes"});
   options.take.assets = {{"models/a.glb", directory / "a.glb"}};
   options.reserve_bytes = 0;
   {
@@ -95,15 +90,11 @@ TEST(Recorder, LinksTheAssetsIntoEachTakeAsTheyWereWhenTheSetWasLoaded) {
     }));
     write_content(directory / "a.glb", "changed since");
     for (std::uint64_t take = 1; take <= 2; ++take) {
-      recorder.start();
-      recorder.offer(
-          std::make_shared<Frame>(noise_frame("observer", take, PixelFormat::rgb8, 32, 24)));
-      recorder.stop();
-      ASSERT_TRUE(wait_until("the take is finished",
-                             [&] { return recorder.status().finished_takes == take; }));
+      record_take(recorder, take);
+      ASSERT_TRUE(wait_for_finished(recorder, take));
     }
   }
-  for (const char* take : {"1_take001", "1_take002"}) {
+  for (const char* take : {"12A_take001", "12A_take002"}) {
     const session::Session session = session::open_session(directory / "takes" / take);
     EXPECT_TRUE(session.missing.empty()) << session.missing.front();
     const std::filesystem::path file = session.directory / session.info.assets.at("models/a.glb");
@@ -117,16 +108,12 @@ TEST(Recorder, DoesNotWaitForAnAssetThatIsStillBeingRead) {
   const TemporaryDirectory directory;
   const std::filesystem::path pipe = directory / "slow.glb";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  RecorderOptions options;
-  options.take.folders = {directory / "takes"};
-  options.take.info.take = session::TakeInfo{0, "1", "", 25, "", false};
+  RecorderOptions options = recorder_options({directory / "takes"});
   options.take.assets = {{"slow.glb", pipe}};
   options.reserve_bytes = 0;
   {
     Recorder recorder(std::move(options));
-    recorder.start();
-    recorder.offer(std::make_shared<Frame>(noise_frame("observer", 0, PixelFormat::rgb8, 32, 24)));
-    ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 1; }));
+    ASSERT_TRUE(begin_take(recorder));
     // The store reads the pipe to its end, and then finds a file in its place.
     {
       const OwnedDescriptor into(::open(pipe.c_str(), O_WRONLY | O_CLOEXEC));
@@ -135,10 +122,9 @@ TEST(Recorder, DoesNotWaitForAnAssetThatIsStillBeingRead) {
       ASSERT_EQ(::write(into.get(), "a model", 7), 7);
     }
     recorder.stop();
-    ASSERT_TRUE(
-        wait_until("the take is finished", [&] { return recorder.status().finished_takes == 1; }));
+    ASSERT_TRUE(wait_for_finished(recorder, 1));
   }
-  const session::Session session = session::open_session(directory / "takes/1_take001");
+  const session::Session session = session::open_session(directory / "takes/12A_take001");
   EXPECT_EQ(session::read_file(session.directory / session.info.assets.at("slow.glb")), "a model");
 }
 

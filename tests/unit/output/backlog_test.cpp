@@ -1,8 +1,6 @@
 // How far a recording may be behind the cameras.
-#include "daemon/output/recorder.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::backlog_test {
 
@@ -179,7 +177,7 @@ TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
   };
   recorder.start();
   offer();
-  ASSERT_TRUE(wait_until("the take is begun", [&] { return recorder.status().frames == 1; }));
+  ASSERT_TRUE(wait_for_frames(recorder, 1));
   disk.lock();
   ASSERT_TRUE(wait_until("frames are dropped", [&] {
     offer();
@@ -189,8 +187,7 @@ TEST(Recorder, SaysHowFarItIsBehindAndWhatItLeavesOut) {
   EXPECT_LE(recorder.status().backlog.seconds, 0.3);
   EXPECT_GT(recorder.status().backlog.bytes, 0u);
   disk.unlock();
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   EXPECT_EQ(recorder.status().backlog.seconds, 0);
   session::Session session = session::open_session(directory / "takes/12A_take001");
   const auto stream = session::open_stream(session, "observer");

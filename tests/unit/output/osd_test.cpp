@@ -1,7 +1,6 @@
 // The overlay as pixels: boxes that fit, do not overlap, and can be read on any picture.
 #include "daemon/output/osd_painter.hpp"
 
-#include "drivers/error.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::output::osd_test {
@@ -101,12 +100,8 @@ TEST(OsdPainter, NoticesBeyondTheScreenAreCounted) {
 }
 
 TEST(OsdPainter, AFontThatIsMissingIsNamed) {
-  try {
-    const OsdPainter painter(64, 64, 0.1, "/no/such/font.ttf");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("/no/such/font.ttf"));
-  }
+  const std::string font = "/no/such/font.ttf";
+  EXPECT_THAT(test::error_of([&] { OsdPainter(64, 64, 0.1, font); }), HasSubstr(font));
 }
 
 TEST(Font, WidthGrowsWithTheTextAndAnyBytesAreDrawn) {

@@ -7,15 +7,12 @@
 #include <csignal>
 
 #include "drivers/bracket.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::recorder_test {
 
-using session::is_frame;
 using session::mentions;
 using session::noise_frame;
 using session::TemporaryDirectory;
@@ -28,27 +25,6 @@ RecorderOptions options_in(const std::filesystem::path& directory) {
   options.take.info.take->notes = "rain";
   options.reserve_bytes = 0;
   return options;
-}
-
-// What the take has: positions of its frames in the stream of noise, each compared bit for bit.
-std::vector<std::uint64_t> frames_of(const std::filesystem::path& take,
-                                     const std::string& source = "observer") {
-  session::Session session = session::open_session(take);
-  const auto stream = session::open_stream(session, source);
-  std::vector<std::uint64_t> indices;
-  if (!stream) return indices;
-  for (std::size_t i = 0; i < stream->records().size(); ++i) {
-    const std::uint64_t index = stream->records()[i].sequence - 100;
-    EXPECT_TRUE(is_frame(*stream->read(i), index)) << index;
-    indices.push_back(index);
-  }
-  return indices;
-}
-
-std::vector<std::uint64_t> count_from(std::uint64_t first, std::uint64_t last) {
-  std::vector<std::uint64_t> numbers;
-  for (; first <= last; ++first) numbers.push_back(first);
-  return numbers;
 }
 
 // Whoever takes the disk out after "recording ended" must be able to see that the take is whole.
@@ -66,7 +42,7 @@ TEST(Recorder, SaysForHowLongATakeIsBeingWritten) {
   EXPECT_TRUE(wait_until("the take is whole", [&] { return !recorder.status().writing; }));
   const RecorderStatus status = recorder.status();
   EXPECT_EQ(status.finished_takes, 1u);
-  EXPECT_TRUE(session::open_session(status.directory).missing.empty());
+  EXPECT_THAT(missing_of(status.directory), testing::IsEmpty());
 }
 
 TEST(Timecode, CountsFramesOfTheNearestWholeRate) {
@@ -188,7 +164,7 @@ TEST(Recorder, TellsTheTimeOfATakeAndTheRoomThatIsLeft) {
   for (const std::uint64_t i : {10, 11, 12, 13}) recorder.offer(picture(i));
   recorder.offer(picture(20, "light"));
   recorder.offer(picture(14));
-  ASSERT_TRUE(wait_until("five frames are written", [&] { return recorder.status().frames == 5; }));
+  ASSERT_TRUE(wait_for_frames(recorder, 5));
   EXPECT_DOUBLE_EQ(recorder.status().seconds, 4e-9 * interval_ns);
 }
 
@@ -211,26 +187,12 @@ TEST(Recorder, TheTrackOfTheLastFrameMayComeAfterTheButton) {
   const TemporaryDirectory directory;
   {
     Recorder recorder(options_in(directory.path()));
-    recorder.start();
-    recorder.offer(picture(0));
-    recorder.stop();
+    record_take(recorder);
     recorder.offer(picture(1));
     recorder.offer(track_of(0));
     recorder.offer(track_of(1));
   }
   EXPECT_EQ(session::open_session(directory / "12A_take001").track.size(), 1u);
-}
-
-TEST(Recorder, TakesAreNumberedOnFromWhatIsThere) {
-  const TemporaryDirectory directory;
-  for (const char* name : {"12A_take041", "12A_take009", "12A_takeover", "12B_take100"})
-    std::filesystem::create_directory(directory / name);
-  {
-    Recorder recorder(options_in(directory.path()));
-    recorder.start();
-    recorder.offer(picture(0));
-  }
-  EXPECT_EQ(frames_of(directory / "12A_take042"), count_from(0, 0));
 }
 
 TEST(Recorder, MarksTheRunningTakeOrTheLast) {
@@ -241,9 +203,7 @@ TEST(Recorder, MarksTheRunningTakeOrTheLast) {
     recorder.offer(picture(0));
     recorder.mark_good();
     recorder.stop();
-    recorder.start();
-    recorder.offer(picture(1));
-    recorder.stop();
+    record_take(recorder, 1);
     recorder.mark_good();
   }
   EXPECT_TRUE(session::open_session(directory / "12A_take001").info.take->good);
@@ -301,8 +261,7 @@ TEST(Recorder, ASlowDiskCostsFramesThatAreCounted) {
     recorder.start();
     for (const FramePtr& frame : pictures) recorder.offer(frame);
     recorder.stop();
-    ASSERT_TRUE(
-        wait_until("the take is finished", [&] { return recorder.status().finished_takes == 1; }));
+    ASSERT_TRUE(wait_for_finished(recorder, 1));
     status = recorder.status();
   }
   EXPECT_EQ(frames_of(directory / "12A_take001").size(), status.frames);
@@ -323,7 +282,7 @@ TEST(Recorder, AnAlmostFullDiskEndsTheTakeInOrder) {
   recorder.start();
   std::uint64_t next = 0;
   for (; next < 5; ++next) recorder.offer(picture(next));
-  ASSERT_TRUE(wait_until("five frames are written", [&] { return recorder.status().frames == 5; }));
+  ASSERT_TRUE(wait_for_frames(recorder, 5));
   free = 50;
   ASSERT_TRUE(wait_until("the take has ended", [&] {
     recorder.offer(picture(next++));
@@ -333,11 +292,11 @@ TEST(Recorder, AnAlmostFullDiskEndsTheTakeInOrder) {
   EXPECT_THAT(status.fault, HasSubstr("almost full"));
   EXPECT_EQ(status.failures, 1u);
   EXPECT_EQ(status.finished_takes, 1u);
-  EXPECT_TRUE(session::open_session(directory / "12A_take001").missing.empty());  // closed
+  EXPECT_THAT(missing_of(directory / "12A_take001"), testing::IsEmpty());  // closed
   EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, status.frames - 1));
 
   recorder.start();  // refused by the same disk
-  ASSERT_TRUE(wait_until("the start is refused", [&] { return recorder.status().failures == 2; }));
+  ASSERT_TRUE(wait_for_failures(recorder, 2));
   EXPECT_FALSE(recorder.status().recording);
   free = 1000;
   recorder.start();
@@ -375,8 +334,7 @@ TEST(Recorder, AFileThatCannotGrowEndsTheTakeWithEverythingSoFarReadable) {
   recorder.start();  // and it goes on when there is room again
   recorder.offer(picture(next));
   recorder.stop();
-  ASSERT_TRUE(wait_until("the next take is finished",
-                         [&] { return recorder.status().finished_takes == 2; }));
+  ASSERT_TRUE(wait_for_finished(recorder, 2));
   // With the frame the ring held.
   EXPECT_EQ(frames_of(directory / "12A_take002").back(), next);
 }
@@ -453,7 +411,7 @@ TEST(RecorderDeath, AKilledProcessKeepsEveryFrameThatItCounted) {
   EXPECT_GT(report.counted, 0u);
   EXPECT_GE(there.size(), report.counted);
   EXPECT_GE(there.back() + 25, report.offered);
-  EXPECT_TRUE(mentions(session::open_session(directory / "12A_take001").missing, "not closed"));
+  EXPECT_TRUE(mentions(missing_of(directory / "12A_take001"), "not closed"));
 
   // The next process knows that it was recording, and brings the take into order.
   {
@@ -468,7 +426,7 @@ TEST(RecorderDeath, AKilledProcessKeepsEveryFrameThatItCounted) {
     recorder.start();
     recorder.offer(picture(0));
   }
-  EXPECT_TRUE(mentions(session::open_session(directory / "12A_take001").missing, "was cut off"));
+  EXPECT_TRUE(mentions(missing_of(directory / "12A_take001"), "was cut off"));
   EXPECT_EQ(frames_of(directory / "12A_take001"), there);
   EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(0, 0));
 }
@@ -476,7 +434,7 @@ TEST(RecorderDeath, AKilledProcessKeepsEveryFrameThatItCounted) {
 // Returns the take that the recorder of a new process finds cut off, if any.
 std::optional<std::string> interrupted_in(const std::filesystem::path& directory) {
   const Recorder recorder(options_in(directory));
-  EXPECT_TRUE(wait_until("it has looked", [&] { return recorder.free_bytes().has_value(); }));
+  EXPECT_TRUE(wait_for_its_look(recorder));
   EXPECT_THAT(recorder.status().salvaged, testing::IsEmpty());
   return recorder.status().interrupted;
 }
@@ -489,13 +447,11 @@ TEST(Recorder, RemembersThatItWasRecordingUntilSomebodyEndsIt) {
     recorder.start();
     recorder.offer(picture(0));
   }  // as for an upgrade: the take is closed, and nobody has ended the recording
-  EXPECT_TRUE(session::open_session(directory / "12A_take001").missing.empty());
+  EXPECT_THAT(missing_of(directory / "12A_take001"), testing::IsEmpty());
   EXPECT_EQ(interrupted_in(directory.path()), "12A_take001");
   {
     Recorder recorder(options_in(directory.path()));
-    recorder.start();
-    recorder.offer(picture(0));
-    recorder.stop();
+    record_take(recorder);
   }
   EXPECT_EQ(interrupted_in(directory.path()), std::nullopt);
 }
@@ -508,7 +464,7 @@ TEST(Recorder, HasEverythingOnTheDiskOnceItIsFinishedAndTakesNothingAfterThat) {
   for (int i = 0; i < 3; ++i) recorder.offer(picture(i));
   recorder.finish();
   const std::filesystem::path take = directory / "12A_take001";
-  EXPECT_TRUE(session::open_session(take).missing.empty());
+  EXPECT_THAT(missing_of(take), testing::IsEmpty());
   recorder.offer(picture(3));
   recorder.offer(track_of(3));
   recorder.finish();
@@ -537,9 +493,7 @@ TEST(Recorder, OfADiskThatHangsKeepsAQueueOfBoundedSizeAndSaysSo) {
   session::Losses lost;
   {
     Recorder recorder(std::move(options));
-    recorder.start();
-    recorder.offer(picture(0));
-    ASSERT_TRUE(wait_until("the take is begun", [&] { return recorder.status().frames == 1; }));
+    ASSERT_TRUE(begin_take(recorder));
     hangs.lock();
     for (std::uint64_t i = 1; recorder.status().disk_silent_s < 2.5; ++i) {
       recorder.offer(picture(i));

@@ -3,12 +3,10 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
-#include "daemon/output/recorder.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/cut_off_take.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::take_ends_test {
 
@@ -20,20 +18,15 @@ using test::wait_until;
 constexpr char hash_of_a_model[] =
     "97ff8a35544dcf40ad84047074439dd6aa3a0be469ea578a1b1c017d939ec61c";
 
-// A recorder of two folders whose disks have as much room as a test says.
-struct Rig {
-  const test::TemporaryDirectory directory;
-  const std::filesystem::path first = directory / "first", second = directory / "second";
-  std::atomic<std::uint64_t> free_on_first = plenty, free_on_second = plenty;
-  Heard heard;
+std::filesystem::path kept_in(const std::filesystem::path& folder) {
+  return folder / ".assets" / (std::string(hash_of_a_model) + ".glb");
+}
 
+// Two disks, and a set with one file.
+struct Rig : TwoDisks {
   RecorderOptions options() {
-    RecorderOptions options = recorder_options({first, second});
+    RecorderOptions options = TwoDisks::options();
     options.asset_patience = std::chrono::milliseconds(500);
-    options.free_bytes = [this](const std::filesystem::path& folder) {
-      return folder.filename() == "first" ? free_on_first.load() : free_on_second.load();
-    };
-    heard.listen(options);
     return options;
   }
   RecorderOptions options_with_asset() {
@@ -42,25 +35,10 @@ struct Rig {
     with.take.assets = {{"a.glb", directory / "set/a.glb"}};
     return with;
   }
+  [[nodiscard]] testing::AssertionResult wait_for_asset() const {
+    return wait_until("the file is kept", [&] { return exists(kept_in(first)); });
+  }
 };
-
-std::filesystem::path kept_in(const std::filesystem::path& folder) {
-  return folder / ".assets" / (std::string(hash_of_a_model) + ".glb");
-}
-
-std::size_t frames_of(const std::filesystem::path& take, const std::string& source = "observer") {
-  session::Session session = session::open_session(take);
-  const auto stream = session::open_stream(session, source);
-  return stream ? stream->records().size() : 0;
-}
-
-bool wait_for_frames(const Recorder& recorder, std::uint64_t frames) {
-  return wait_until("they are written", [&] { return recorder.status().frames == frames; });
-}
-
-bool wait_for_take(const Recorder& recorder, int number) {
-  return wait_until("the take runs", [&] { return recorder.status().number == number; });
-}
 
 // ---- files of the set
 
@@ -71,17 +49,14 @@ TEST(Recorder, OfTwoDisksHasTheAssetsOnBothBeforeTheyAreNeeded) {
     return std::filesystem::exists(kept_in(rig.first)) &&
            std::filesystem::exists(kept_in(rig.second));
   }));
-  recorder.start();
-  recorder.offer(picture(0));
-  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  ASSERT_TRUE(begin_take(recorder));
   // The first disk is gone with what it kept, and so is the disk of the set.
   rig.free_on_first = 0;
   std::filesystem::remove_all(rig.first / ".assets");
   std::filesystem::remove_all(rig.directory / "set");
   ASSERT_TRUE(wait_for_take(recorder, 2));
   recorder.offer(picture(1));
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   EXPECT_EQ(recorder.status().failures, 0u);
   const session::Session session = session::open_session(rig.second / "12A_take002");
   EXPECT_TRUE(session.missing.empty()) << session.missing.front();
@@ -91,15 +66,11 @@ TEST(Recorder, OfTwoDisksHasTheAssetsOnBothBeforeTheyAreNeeded) {
 TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
   Rig rig;
   Recorder recorder(rig.options_with_asset());
-  ASSERT_TRUE(
-      wait_until("it is kept", [&] { return std::filesystem::exists(kept_in(rig.first)); }));
+  ASSERT_TRUE(rig.wait_for_asset());
   std::filesystem::remove_all(rig.first / ".assets");
   std::filesystem::remove_all(rig.directory / "set");
-  recorder.start();
-  recorder.offer(picture(0));
-  ASSERT_TRUE(wait_for_frames(recorder, 1));
-  recorder.stop();
-  recorder.finish();
+  ASSERT_TRUE(begin_take(recorder));
+  end_take(recorder);
   EXPECT_EQ(recorder.status().failures, 0u);
   EXPECT_EQ(recorder.status().finished, "12A_take001");
   const session::Session session = session::open_session(rig.first / "12A_take001");
@@ -116,17 +87,13 @@ TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
 TEST(Recorder, OfAStoreThatWasDeletedTakesTheFileOfTheSetIfItIsTheSame) {
   Rig rig;
   Recorder recorder(rig.options_with_asset());
-  ASSERT_TRUE(
-      wait_until("it is kept", [&] { return std::filesystem::exists(kept_in(rig.first)); }));
+  ASSERT_TRUE(rig.wait_for_asset());
   for (const char* content : {"a model", "another model"}) {
     std::filesystem::remove_all(rig.first / ".assets");
     write_content(rig.directory / "set/a.glb", content);
     const std::uint64_t takes = recorder.status().finished_takes;
-    recorder.start();
-    recorder.offer(picture(takes));
-    recorder.stop();
-    ASSERT_TRUE(wait_until("the take is finished",
-                           [&] { return recorder.status().finished_takes == takes + 1; }));
+    record_take(recorder, takes);
+    ASSERT_TRUE(wait_for_finished(recorder, takes + 1));
   }
   const session::Session same = session::open_session(rig.first / "12A_take001");
   EXPECT_EQ(session::read_file(same.directory / same.info.assets.at("a.glb")), "a model");
@@ -142,13 +109,10 @@ TEST(Recorder, LeavesTheReserveToTakesAndNotToTheFilesOfTheSet) {
   ASSERT_TRUE(
       wait_until("it is said", [&] { return rig.heard.said("a.glb will be missing from takes"); }));
   EXPECT_FALSE(std::filesystem::exists(kept_in(rig.first)));
-  recorder.start();
-  recorder.offer(picture(0));
-  ASSERT_TRUE(wait_for_frames(recorder, 1));
-  recorder.stop();
-  recorder.finish();
+  ASSERT_TRUE(begin_take(recorder));
+  end_take(recorder);
   EXPECT_EQ(recorder.status().failures, 0u);
-  EXPECT_TRUE(mentions(session::open_session(rig.first / "12A_take001").missing, "almost full"));
+  EXPECT_TRUE(mentions(missing_of(rig.first / "12A_take001"), "almost full"));
 }
 
 // A pipe that nobody writes to, as a file on a mount that is dead.
@@ -160,11 +124,8 @@ TEST(Recorder, EndsATakeAndItselfWhileAFileOfTheSetCannotBeRead) {
   options.take.assets = {{"dead.glb", pipe}};
   {
     Recorder recorder(std::move(options));
-    recorder.start();
-    recorder.offer(picture(0));
-    recorder.stop();
-    ASSERT_TRUE(
-        wait_until("the take is finished", [&] { return recorder.status().finished_takes == 1; }));
+    record_take(recorder);
+    ASSERT_TRUE(wait_for_finished(recorder, 1));
     recorder.start();
     recorder.offer(picture(1));
     ASSERT_TRUE(wait_for_take(recorder, 2));
@@ -181,16 +142,12 @@ TEST(Recorder, EndsATakeAndItselfWhileAFileOfTheSetCannotBeRead) {
 TEST(Recorder, NumbersTakesOnWhereTheFirstDiskCannotBeListed) {
   Rig rig;
   Recorder recorder(rig.options());
-  recorder.start();
-  recorder.offer(picture(0));
-  recorder.stop();
-  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+  record_take(recorder);
+  ASSERT_TRUE(wait_for_finished(recorder, 1));
   std::filesystem::rename(rig.first, rig.directory / "elsewhere");
   write_content(rig.first, "no folder");
-  recorder.start();
-  recorder.offer(picture(1));
-  recorder.stop();
-  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 2; }));
+  record_take(recorder, 1);
+  ASSERT_TRUE(wait_for_finished(recorder, 2));
   EXPECT_EQ(recorder.status().directory, rig.second / "12A_take002");
 }
 
@@ -201,13 +158,9 @@ TEST(Recorder, GivesNoTakeTheNameOfOneOnADiskThatIsNotThere) {
     session::make_folders(folder);
   const auto record_once = [&] {
     Recorder recorder(rig.options());
-    recorder.start();
-    recorder.offer(picture(0));
-    recorder.stop();
-    EXPECT_TRUE(
-        wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
-    EXPECT_TRUE(wait_until("the folders were looked at",
-                           [&] { return recorder.free_bytes().has_value(); }));
+    record_take(recorder);
+    EXPECT_TRUE(wait_for_finished(recorder, 1));
+    EXPECT_TRUE(wait_for_its_look(recorder));
     return recorder.status().directory;
   };
   EXPECT_EQ(record_once(), rig.first / "12A_take001");
@@ -231,11 +184,9 @@ TEST(Recorder, NumbersTakesByWhatIsThereWhereAllDisksAre) {
   }
   session::make_folders(rig.second / "12A_take004");
   Recorder recorder(rig.options());
-  EXPECT_TRUE(wait_until("both were looked at", [&] { return recorder.free_bytes().has_value(); }));
-  recorder.start();
-  recorder.offer(picture(0));
-  recorder.stop();
-  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+  EXPECT_TRUE(wait_for_its_look(recorder));
+  record_take(recorder);
+  ASSERT_TRUE(wait_for_finished(recorder, 1));
   EXPECT_EQ(recorder.status().directory, rig.first / "12A_take005");
 }
 
@@ -254,14 +205,13 @@ TEST(Recorder, LeavesOutWhatCannotBeRecordedAndGoesOn) {
   recorder.offer(astray);
   recorder.offer_event(0, "not UTF-8: \xff");
   for (std::uint64_t i = 2; i < 4; ++i) recorder.offer(track_of(i));
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   const RecorderStatus status = recorder.status();
   EXPECT_EQ(status.failures, 0u) << status.fault;
   EXPECT_EQ(status.directory, rig.first / "12A_take001");
   EXPECT_EQ(status.lost, (session::Losses{1, 0, 2}));
   EXPECT_EQ(rig.heard.left_out(), (Causes{{"cannot be recorded", 1}}));
-  EXPECT_EQ(frames_of(rig.first / "12A_take001"), 3u);
+  EXPECT_EQ(frame_count(rig.first / "12A_take001"), 3u);
   const session::Session session = session::open_session(rig.first / "12A_take001");
   EXPECT_EQ(session.track.size(), 2u);
   EXPECT_EQ(session.missing.size(), 2u);
@@ -285,9 +235,7 @@ TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
   const auto wait_for_the_disk_to_hang = [&] {
     return wait_until("the disk hangs", [&] { return recorder.status().disk_silent_s > 0.1; });
   };
-  recorder.start();
-  recorder.offer(picture(0));
-  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  ASSERT_TRUE(begin_take(recorder));
   disk.lock();
   ASSERT_TRUE(wait_for_the_disk_to_hang());
   for (std::uint64_t i = 1; i <= 10; ++i) recorder.offer(picture(i));  // 4 of them fit
@@ -304,8 +252,7 @@ TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
   EXPECT_EQ(recorder.status().lost, session::Losses{});
   recorder.offer(picture(13));
   disk.unlock();
-  recorder.stop();
-  recorder.finish();
+  end_take(recorder);
   EXPECT_EQ(recorder.status().failures, 0u) << recorder.status().fault;
   // What was lost was offered before the frame that began the second take, and after the last of
   // the first that was written: whichever of the two says it, no other does.
@@ -321,7 +268,8 @@ TEST(Recorder, CountsTheLossesOfEachTakeThoughTheNextRecordingHasBegun) {
 
 // ---- from one take to the next
 
-// Tracks come three frames late, as the tracking takes its time.
+// The first disk is full: every frame is in one of the two takes, bit for bit and in order. Tracks
+// come three frames late, as the tracking takes its time.
 TEST(Recorder, FromOneDiskToTheNextKeepsTheTracksOfTheLastFramesAndTheLight) {
   Rig rig;
   constexpr std::uint64_t behind = 3;
@@ -344,20 +292,24 @@ TEST(Recorder, FromOneDiskToTheNextKeepsTheTracksOfTheLastFramesAndTheLight) {
       return recorder.status().number == 2;
     }));
     for (int i = 0; i < 5; ++i) offer();
+    ASSERT_TRUE(wait_until("the first take is finished",
+                           [&] { return recorder.status().finished == "12A_take001"; }));
+    EXPECT_TRUE(recorder.status().recording);
+    EXPECT_EQ(recorder.status().failures, 0u);
     for (std::uint64_t i = offered - behind; i < offered; ++i) recorder.offer(track_of(i));
   }
-  const std::filesystem::path takes[] = {rig.first / "12A_take001", rig.second / "12A_take002"};
-  std::size_t frames = 0, tracks = 0;
-  for (const std::filesystem::path& take : takes) {
+  std::vector<std::uint64_t> frames;
+  for (const std::filesystem::path& take :
+       {rig.first / "12A_take001", rig.second / "12A_take002"}) {
     const session::Session session = session::open_session(take);
     EXPECT_TRUE(session.missing.empty()) << session.missing.front();
-    EXPECT_EQ(session.track.size(), frames_of(take));
-    EXPECT_EQ(frames_of(take, "light"), 1u);
-    frames += frames_of(take);
-    tracks += session.track.size();
+    EXPECT_EQ(session.track.size(), frame_count(take));
+    EXPECT_EQ(frame_count(take, "light"), 1u);
+    std::ranges::copy(frames_of(take), std::back_inserter(frames));
   }
-  EXPECT_EQ(frames, offered);
-  EXPECT_EQ(tracks, offered);
+  EXPECT_EQ(frames, count_from(0, offered - 1));
+  EXPECT_TRUE(rig.heard.said("the disk of 12A_take001 is almost full; recording continues in " +
+                             (rig.second / "12A_take002").string()));
 }
 
 // A disk whose free space goes up and down about the reserve, as takes that are closed give some
@@ -374,9 +326,7 @@ TEST(Recorder, NearTheReserveDoesNotFallApartIntoShortTakes) {
   };
   Recorder recorder(std::move(options));
   std::uint64_t next = 0;
-  recorder.start();
-  recorder.offer(picture(next++));
-  ASSERT_TRUE(wait_for_frames(recorder, 1));
+  ASSERT_TRUE(begin_take(recorder, next++));
   is_near = true;
   ASSERT_TRUE(wait_until("it ends", [&] {
     recorder.offer(picture(next++));
@@ -396,12 +346,7 @@ TEST(Recorder, NearTheReserveDoesNotFallApartIntoShortTakes) {
 
 // A take that was cut off, and the wish to record on.
 void leave_a_cut_off_take(const std::filesystem::path& folder) {
-  const test::TemporaryDirectory elsewhere;
-  session::SessionWriter writer(elsewhere / "12A_take007", {});
-  for (std::uint64_t i = 0; i < 3; ++i) writer.write(*picture(i));
-  std::filesystem::create_directories(folder);
-  std::filesystem::copy(elsewhere / "12A_take007", folder / "12A_take007",
-                        std::filesystem::copy_options::recursive);
+  test::write_cut_off_take(folder / "12A_take007", 3);
   TakeFolders::keep_wish(folder / "12A_take007");
 }
 
@@ -410,7 +355,7 @@ TEST(Recorder, WhoseFirstFolderCannotBeReadFindsWhatIsInTheSecond) {
   write_content(rig.first, "no folder");
   leave_a_cut_off_take(rig.second);
   const Recorder recorder(rig.options());
-  ASSERT_TRUE(wait_until("it has looked", [&] { return recorder.free_bytes().has_value(); }));
+  ASSERT_TRUE(wait_for_its_look(recorder));
   EXPECT_EQ(recorder.status().salvaged,
             std::vector<std::string>{"12A_take007 was cut off; it has 3 frames"});
   EXPECT_EQ(recorder.status().interrupted, "12A_take007");
@@ -421,7 +366,7 @@ TEST(Recorder, FindsWhatIsOnADiskThatIsMountedLater) {
   Rig rig;
   std::filesystem::create_directory(rig.first);
   const Recorder recorder(rig.options());
-  ASSERT_TRUE(wait_until("it has looked", [&] { return recorder.free_bytes().has_value(); }));
+  ASSERT_TRUE(wait_for_its_look(recorder));
   EXPECT_EQ(recorder.status().interrupted, std::nullopt);
   leave_a_cut_off_take(rig.directory / "mounted");
   std::filesystem::rename(rig.directory / "mounted", rig.second);
@@ -432,10 +377,8 @@ TEST(Recorder, FindsWhatIsOnADiskThatIsMountedLater) {
 TEST(Recorder, ThatHasRecordedTakesNoOldWishForOne) {
   Rig rig;
   Recorder recorder(rig.options());
-  recorder.start();
-  recorder.offer(picture(0));
-  recorder.stop();
-  ASSERT_TRUE(wait_until("it is finished", [&] { return recorder.status().finished_takes == 1; }));
+  record_take(recorder);
+  ASSERT_TRUE(wait_for_finished(recorder, 1));
   leave_a_cut_off_take(rig.directory / "mounted");
   std::filesystem::rename(rig.directory / "mounted", rig.second);
   ASSERT_TRUE(wait_until("it is found", [&] { return !recorder.status().salvaged.empty(); }));

@@ -2,26 +2,18 @@
 #include "daemon/output/take_folders.hpp"
 
 #include "daemon/output/folder_watch.hpp"
-#include "daemon/output/recorder.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::output::take_folders_test {
 
-using session::is_frame;
 using session::mentions;
 using session::TemporaryDirectory;
 using test::wait_until;
 
 std::string refusal(TakeFolders& folders) {
-  try {
-    return "chose " + folders.all()[folders.choose()].string();
-  } catch (const Error& error) {
-    return error.what();
-  }
+  return test::error_of([&] { folders.choose(); });
 }
 
 TEST(TakeFolders, TheFirstThatHasRoomAndDidNotFailIsChosen) {
@@ -99,8 +91,8 @@ TEST(TakeFolders, TheSpeedOfADiskIsMeasuredAndNothingStays) {
 
 TEST(NextTakeNumber, CountsThroughAllFoldersAndIgnoresAbsurdNumbers) {
   const TemporaryDirectory directory;
-  for (const char* take :
-       {"a/12A_take003", "b/12A_take007", "b/12A_take2147483647", "a/12B_take009"})
+  for (const char* take : {"a/12A_take003", "b/12A_take007", "b/12A_take2147483647",
+                           "a/12B_take009", "a/12A_takeover"})
     session::make_folders(directory / take);
   EXPECT_EQ(next_take_number({directory / "a", directory / "b", directory / "none"}, "12A"), 8);
   EXPECT_EQ(next_take_number({directory / "a", directory / "b"}, "12A", 11), 12);
@@ -129,81 +121,15 @@ TEST(TakeFolders, AreOnOneDiskWhereTheFoldersAboveThemAre) {
   EXPECT_FALSE(are_on_one_disk(directory.path(), "/proc"));
 }
 
-// The recorder of two disks, and what it reports.
-struct TwoDisks {
-  const TemporaryDirectory directory;
-  std::atomic<std::uint64_t> free_on_first = plenty;
-  std::mutex mutex;
-  std::vector<std::string> notes;
-
-  RecorderOptions options() {
-    RecorderOptions options;
-    options.take.folders = {directory / "first", directory / "second"};
-    options.take.info.take = session::TakeInfo{0, "12A", "", 25, "", false};
-    options.preroll_s = 0;
-    options.reserve_bytes = 100;
-    options.free_bytes = [this](const std::filesystem::path& folder) {
-      return folder.filename() == "first" ? free_on_first.load() : plenty;
-    };
-    options.note = [this](const report::Report& report) {
-      const std::lock_guard lock(mutex);
-      notes.push_back(line_of(report));
-    };
-    return options;
-  }
-};
-
-std::uint64_t frames_of(const std::filesystem::path& take, std::uint64_t first) {
-  session::Session session = session::open_session(take);
-  EXPECT_TRUE(session.missing.empty()) << session.missing.front();
-  const auto stream = session::open_stream(session, "observer");
-  if (!stream) return 0;
-  for (std::size_t i = 0; i < stream->records().size(); ++i)
-    EXPECT_TRUE(is_frame(*stream->read(i), first + i)) << first + i;
-  return stream->records().size();
-}
-
-TEST(Recorder, OfTwoDisksGoesOnWithoutAGapWhenTheFirstIsFull) {
-  TwoDisks disks;
-  std::uint64_t offered = 0;
-  {
-    Recorder recorder(disks.options());
-    const auto offer = [&] {
-      recorder.offer(picture(offered));
-      recorder.offer(track_of(offered++));
-    };
-    recorder.start();
-    for (int i = 0; i < 5; ++i) offer();
-    ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 5; }));
-    disks.free_on_first = 50;
-    ASSERT_TRUE(wait_until("the second take runs", [&] {
-      offer();
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // as a camera does
-      return recorder.status().number == 2;
-    }));
-    offer();
-    ASSERT_TRUE(wait_until("the first take is finished",
-                           [&] { return recorder.status().finished == "12A_take001"; }));
-    const RecorderStatus status = recorder.status();
-    EXPECT_TRUE(status.recording);
-    EXPECT_EQ(status.failures, 0u);
-  }
-  const std::uint64_t in_first = frames_of(disks.directory / "first/12A_take001", 0);
-  EXPECT_EQ(in_first + frames_of(disks.directory / "second/12A_take002", in_first), offered);
-  EXPECT_TRUE(
-      mentions(disks.notes, "the disk of 12A_take001 is almost full; recording continues in " +
-                                (disks.directory / "second/12A_take002").string()));
-}
-
 TEST(Recorder, OfTwoFullDisksSaysOfEachWhyItCannotRecord) {
   TwoDisks disks;
   RecorderOptions options = disks.options();
   options.free_bytes = [](const auto&) { return 50; };
   Recorder recorder(std::move(options));
   recorder.start();
-  ASSERT_TRUE(wait_until("it is refused", [&] { return recorder.status().failures == 1; }));
-  for (const char* folder : {"first", "second"})
-    EXPECT_THAT(recorder.status().fault, HasSubstr((disks.directory / folder).string()));
+  ASSERT_TRUE(wait_for_failures(recorder, 1));
+  for (const std::filesystem::path& folder : {disks.first, disks.second})
+    EXPECT_THAT(recorder.status().fault, HasSubstr(folder.string()));
 }
 
 // 25 frames of 2304 bytes a second, of which 23040 bytes hold 10; 4 s are wished.
@@ -215,9 +141,8 @@ TEST(Recorder, ThatCannotKeepWhatIsWishedBeforeTheButtonSaysSoOnce) {
   Recorder recorder(std::move(options));
   for (std::uint64_t i = 0; i < 40; ++i) recorder.offer(picture(i));
   recorder.start();
-  ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 10; }));
-  const std::lock_guard lock(disks.mutex);
-  EXPECT_EQ(std::ranges::count(disks.notes,
+  ASSERT_TRUE(wait_for_frames(recorder, 10));
+  EXPECT_EQ(std::ranges::count(disks.heard.notes(),
                                "recording: takes begin 0.4 s before the button, not 4.0 s: "
                                "the frame memory is full (recording.queue_mb)"),
             1);
@@ -231,9 +156,8 @@ TEST(Recorder, KeepsWhatIsWishedBeforeTheButtonWithoutAWord) {
   Recorder recorder(std::move(options));
   for (std::uint64_t i = 0; i < 40; ++i) recorder.offer(picture(i));
   recorder.start();
-  ASSERT_TRUE(wait_until("it is recorded", [&] { return recorder.status().frames == 8; }));
-  const std::lock_guard lock(disks.mutex);
-  EXPECT_TRUE(disks.notes.empty()) << disks.notes.front();
+  ASSERT_TRUE(wait_for_frames(recorder, 8));
+  EXPECT_THAT(disks.heard.notes(), testing::IsEmpty());
 }
 
 TEST(Recorder, WarnsOfADiskThatIsTooSlowForTheCameras) {
@@ -249,8 +173,7 @@ TEST(Recorder, WarnsOfADiskThatIsTooSlowForTheCameras) {
     recorder.offer(std::make_shared<Frame>(std::move(frame)));
   }
   EXPECT_TRUE(wait_until("it is compared", [&] {
-    const std::lock_guard lock(disks.mutex);
-    return mentions(disks.notes, "takes will miss frames; recording.codec = \"raw\" needs");
+    return disks.heard.said("takes will miss frames; recording.codec = \"raw\" needs");
   }));
 }
 
@@ -261,10 +184,10 @@ TEST(Recorder, WritesTheFormThatTheSetWants) {
   Recorder recorder(std::move(options));
   recorder.start();
   for (std::uint64_t i = 0; i < 3; ++i) recorder.offer(picture(i));
-  recorder.stop();
-  recorder.finish();
-  const std::filesystem::path take = disks.directory / "first/12A_take001";
-  EXPECT_EQ(frames_of(take, 0), 3u);
+  end_take(recorder);
+  const std::filesystem::path take = disks.first / "12A_take001";
+  EXPECT_EQ(frames_of(take), count_from(0, 2));
+  EXPECT_THAT(session::open_session(take).missing, testing::IsEmpty());
   EXPECT_THAT(session::read_file(take / "session.toml"), HasSubstr("codec = \"raw\""));
 }
 
@@ -272,33 +195,23 @@ TEST(Recorder, WritesTheFormThatTheSetWants) {
 TEST(Recorder, WhoseTakeIsGoneGoesOnOnTheNextDisk) {
   TwoDisks rig;
   Recorder recorder(rig.options());
-  recorder.start();
-  recorder.offer(picture(0));
-  ASSERT_TRUE(wait_until("the take is begun", [&] { return recorder.status().frames == 1; }));
-  std::filesystem::rename(rig.directory / "first", rig.directory / "unmounted");
-  std::filesystem::create_directory(rig.directory / "first");
+  ASSERT_TRUE(begin_take(recorder));
+  std::filesystem::rename(rig.first, rig.directory / "unmounted");
+  std::filesystem::create_directory(rig.first);
   ASSERT_TRUE(wait_until("it goes on", [&] { return recorder.status().number == 2; }));
   recorder.offer(picture(1));
-  recorder.stop();
-  recorder.finish();
-  EXPECT_EQ(recorder.status().directory, rig.directory / "second/12A_take002");
-  const session::Session left = session::open_session(rig.directory / "unmounted/12A_take001");
-  EXPECT_TRUE(mentions(left.missing, "not closed"));
-  const std::lock_guard lock(rig.mutex);
-  EXPECT_TRUE(mentions(rig.notes, "is gone; its disk was unmounted"));
+  end_take(recorder);
+  EXPECT_EQ(recorder.status().directory, rig.second / "12A_take002");
+  EXPECT_TRUE(mentions(missing_of(rig.directory / "unmounted/12A_take001"), "not closed"));
+  EXPECT_TRUE(rig.heard.said("is gone; its disk was unmounted"));
 }
 
 TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
   const TemporaryDirectory directory;
-  RecorderOptions options;
-  options.take.folders = {directory / "takes"};
-  options.take.info.take = session::TakeInfo{0, "12A", "", 25, "", false};
-  options.preroll_s = 0;
+  RecorderOptions options = recorder_options({directory / "takes"});
   options.reserve_bytes = 0;
   auto first = std::make_unique<Recorder>(options);
-  first->start();
-  first->offer(picture(0));
-  ASSERT_TRUE(wait_until("the take is begun", [&] { return first->status().frames == 1; }));
+  ASSERT_TRUE(begin_take(*first));
   {
     Recorder second(options);
     ASSERT_TRUE(wait_until("it has looked", [&] { return second.folders()[0].is_looked_at; }));
@@ -306,7 +219,7 @@ TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
     EXPECT_TRUE(second.status().salvaged.empty());
     second.start();
     second.offer(picture(5));
-    ASSERT_TRUE(wait_until("it is refused", [&] { return second.status().failures == 1; }));
+    ASSERT_TRUE(wait_for_failures(second, 1));
     EXPECT_THAT(second.status().fault, HasSubstr("another previzd"));
     EXPECT_FALSE(second.status().interrupted);
   }
@@ -315,7 +228,7 @@ TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
   first->finish();
   EXPECT_EQ(first->status().failures, 0u);
   first.reset();
-  EXPECT_TRUE(session::open_session(directory / "takes/12A_take001").missing.empty());
+  EXPECT_THAT(missing_of(directory / "takes/12A_take001"), testing::IsEmpty());
   // Whoever is left takes the folder over.
   Recorder third(options);
   EXPECT_TRUE(wait_until("it has the folder", [&] { return third.folders()[0].is_own; }));

@@ -169,22 +169,24 @@ class Trial {
 
 constexpr int two_seconds = 2 * static_cast<int>(fps);
 
-// The number of samples that a frame's planned time has room for, with what is fixed.
-struct FixedRow {
-  double fixed_s, sample_s;
-  int fit;
-};
+// What is seen in the frames after the two seconds in which a governor may settle.
+Seen settled(const Plant& plant, int frames) {
+  Trial trial(Governor(fps, 1));
+  trial.run(plant, two_seconds);
+  return trial.run(plant, frames);
+}
 
 TEST(Governor, FindsWhatFitsBesideAFixedCost) {
-  const FixedRow rows[] = {{0.002, 0.003, 11}, {0.010, 0.003, 8}, {0.018, 0.001, 18},
-                           {0.020, 0.003, 5},  {0.025, 0.003, 3}, {0.030, 0.001, 6}};
-  for (const FixedRow& row : rows) {
+  struct Row {
+    double fixed_s, sample_s;
+    int fit;  // samples that a frame's planned time has room for
+  };
+  const Row rows[] = {{0.002, 0.003, 11}, {0.010, 0.003, 8}, {0.018, 0.001, 18},
+                      {0.020, 0.003, 5},  {0.025, 0.003, 3}, {0.030, 0.001, 6}};
+  for (const Row& row : rows) {
     SCOPED_TRACE(std::to_string(1e3 * row.fixed_s) + " ms fixed, " +
                  std::to_string(1e3 * row.sample_s) + " ms a sample");
-    Trial trial(Governor(fps, 1));
-    const Plant plant{row.fixed_s, row.sample_s};
-    trial.run(plant, two_seconds);
-    const Seen seen = trial.run(plant, 100);
+    const Seen seen = settled({row.fixed_s, row.sample_s}, 100);
     EXPECT_GE(seen.samples, 0.9 * row.fit);
     EXPECT_LE(seen.samples, 1.1 * row.fit);
     EXPECT_EQ(seen.scale, 1);
@@ -196,17 +198,11 @@ TEST(Governor, FindsWhatFitsBesideAFixedCost) {
 // 40 ms fixed and 1 ms a sample: where the fixed part is the host's, no size fits, and the picture
 // stays whole; where it is that of the pixels, half of them leave room for 32 samples.
 TEST(Governor, GivesUpPixelsOnlyWhereTheyCostTheTime) {
-  Trial host(Governor(fps, 1));
-  const Plant of_host{0.040, 0.001};
-  host.run(of_host, two_seconds);
-  const Seen whole = host.run(of_host, 200);
+  const Seen whole = settled({.fixed_s = 0.040, .sample_s = 0.001}, 200);
   EXPECT_EQ(whole.scale, 1);
   EXPECT_EQ(whole.sizes, 0);
 
-  Trial pixel(Governor(fps, 1));
-  const Plant of_pixels{.sample_s = 0.001, .fixed_by_pixels_s = 0.040};
-  pixel.run(of_pixels, two_seconds);
-  const Seen half = pixel.run(of_pixels, 200);
+  const Seen half = settled({.sample_s = 0.001, .fixed_by_pixels_s = 0.040}, 200);
   EXPECT_NEAR(half.scale, std::sqrt(0.5), 1e-12);
   EXPECT_GE(half.samples, 0.9 * 32);
   EXPECT_EQ(half.late, 0);
@@ -227,10 +223,7 @@ TEST(Governor, AFixedCostDoesNotMakeThePictureCollapse) {
   for (const Row& row : rows) {
     SCOPED_TRACE(std::to_string(1e3 * row.fixed_s) + " ms fixed, " +
                  std::to_string(1e3 * row.shrunk_s) + " ms for a smaller picture");
-    Trial trial(Governor(fps, 1));
-    const Plant plant{row.fixed_s, 0.025, row.shrunk_s};
-    trial.run(plant, two_seconds);
-    const Seen seen = trial.run(plant, 200);
+    const Seen seen = settled({row.fixed_s, 0.025, row.shrunk_s}, 200);
     EXPECT_NEAR(seen.scale, row.scale, 1e-12);
     EXPECT_EQ(seen.sizes, 0);
     if (row.fits) {

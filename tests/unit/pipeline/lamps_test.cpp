@@ -50,6 +50,12 @@ LightPtr light_of(const set::Set& set, const scene::Scene* scene = nullptr) {
   return stage.light();
 }
 
+// The green radiance of the environment in a direction.
+double green_at(const LightPtr& light, const glm::dvec3& direction) {
+  const lighting::EnvironmentMap& map = light->lighting.environment;
+  return map.radiance[lighting::texel_index(map.size, glm::vec3(direction))].g;
+}
+
 // A real lamp that stands where the light camera sees the key light.
 set::Light real_sphere(double distance_m = 1.5) {
   set::Light lamp;
@@ -60,6 +66,12 @@ set::Light real_sphere(double distance_m = 1.5) {
   lamp.gain_real = 1;
   lamp.captured = lamp.measured = true;
   return lamp;
+}
+
+set::Set set_with_real_sphere() {
+  set::Set set = set_with();
+  set.lights = {real_sphere()};
+  return set;
 }
 
 // Irradiance of a lamp on a plane at the light camera's place, as a distant disc: that of its
@@ -95,8 +107,7 @@ void expect_near(const glm::dvec3& found, const glm::dvec3& expected, double sha
 // The whole light is what it was, in both worlds: nothing shines twice and nothing is lost.
 TEST(DeclaredLamp, ShinesOnce) {
   const LightPtr whole = light_of(set_with());
-  set::Set set = set_with();
-  set.lights = {real_sphere()};
+  set::Set set = set_with_real_sphere();
   const LightPtr parted = light_of(set);
   ASSERT_TRUE(parted->lamps.empty());
   ASSERT_EQ(parted->emissions.size(), 1u);
@@ -106,8 +117,7 @@ TEST(DeclaredLamp, ShinesOnce) {
     expect_near(rest + lamp, irradiance(whole->lighting.environment, normal), spread);
   }
   // What is left in its place is the room; the emission is that of the picture.
-  const lighting::EnvironmentMap& map = parted->lighting.environment;
-  EXPECT_NEAR(map.radiance[lighting::texel_index(map.size, glm::vec3(key))].g, 0.2, 0.01);
+  EXPECT_NEAR(green_at(parted, key), 0.2, 0.01);
   // The pixels that the disc's edge crosses are means of 8x8 directions: their error is far below
   // the 2 % that noise of the merge and the ring of 0.2 in 40 bring.
   expect_near(parted->emissions.at("key"), {40, 35, 25}, 0.02);
@@ -141,33 +151,28 @@ TEST(DeclaredLamp, OfEveryKindIsMeasured) {
 
 // A lamp whose back is towards the light camera cannot be measured; that is said.
 TEST(DeclaredLamp, ThatShinesElsewhereIsNotMeasured) {
-  set::Set set = set_with();
-  set.lights = {real_sphere()};
+  set::Set set = set_with_real_sphere();
   set.lights[0].type = set::LightType::spot;
   set.lights[0].direction = key;
   const LightPtr light = light_of(set);
   EXPECT_EQ(light->emissions.at("key"), glm::dvec3(0)) << "no brightness is made up";
-  EXPECT_TRUE(std::ranges::any_of(light->lighting.report.notes, [](const std::string& note) {
-    return note.find("faces away from the light camera") != std::string::npos;
-  }));
+  EXPECT_THAT(light->lighting.report.notes,
+              Contains(HasSubstr("faces away from the light camera")));
 }
 
 // A lamp with a stated emission keeps it, and its light is taken out all the same.
 TEST(DeclaredLamp, WithAStatedEmissionKeepsIt) {
-  set::Set set = set_with();
-  set.lights = {real_sphere()};
+  set::Set set = set_with_real_sphere();
   set.lights[0].measured = false;
   const LightPtr light = light_of(set);
   EXPECT_TRUE(light->emissions.empty());
-  const lighting::EnvironmentMap& map = light->lighting.environment;
-  EXPECT_LT(map.radiance[lighting::texel_index(map.size, glm::vec3(key))].g, 0.21);
-  EXPECT_GT(map.radiance[lighting::texel_index(map.size, glm::vec3(fill))].g, 15);
+  EXPECT_LT(green_at(light, key), 0.21);
+  EXPECT_GT(green_at(light, fill), 15);
 }
 
 // A tape measure is not that exact: half of the lamp outside of its outline is taken too.
 TEST(DeclaredLamp, AsideOfItsPlaceIsTakenWhole) {
-  set::Set set = set_with();
-  set.lights = {real_sphere()};
+  set::Set set = set_with_real_sphere();
   const glm::dvec3 aside = glm::normalize(glm::cross(key, glm::dvec3(0, 0, 1)));
   set.lights[0].position += 1.5 * std::tan(2.5 * degree) * aside;
   const LightPtr light = light_of(set);
@@ -199,18 +204,10 @@ TEST(DeclaredLamp, OfARemovedObjectTakesItsLightAlong) {
   bulb.world_from_object = glm::translate(glm::dmat4(1), place + 1.5 * key);
   scene.instances = {bulb};
   set::Set set = set_with();
-  set.objects.push_back({.name = "ugly lamp",
-                         .file = {},
-                         .file_as_written = {},
-                         .presence = set::Presence::removed,
-                         .world_from_file = glm::dmat4(1),
-                         .nodes = {},
-                         .carrier = {},
-                         .animation = {},
-                         .variant = {}});
-  const LightPtr light = light_of(set, &scene);
-  const lighting::EnvironmentMap& map = light->lighting.environment;
-  EXPECT_LT(map.radiance[lighting::texel_index(map.size, glm::vec3(key))].g, 0.21);
+  set.objects.resize(1);
+  set.objects[0].name = "ugly lamp";
+  set.objects[0].presence = set::Presence::removed;
+  EXPECT_LT(green_at(light_of(set, &scene), key), 0.21);
   // A virtual one is not in the light camera's picture; one around the camera covers all of it, and
   // one that moves is not where the file has it.
   const auto expect_nothing_is_taken = [&] {

@@ -3,7 +3,6 @@
 #include "daemon/pipeline/light_feed.hpp"
 #include "daemon/pipeline/light_stage.hpp"
 #include "drivers/bracket.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/lighting_pictures.hpp"
@@ -102,9 +101,7 @@ TEST(LightStage, ASwitchedOffLightIsGoneWithinOneFrameInAnyPhaseOfTheBracket) {
 }
 
 bool says_blinded(const LightPtr& light) {
-  return std::ranges::any_of(light->lighting.report.notes, [](const std::string& note) {
-    return note.find("blinded") != std::string::npos;
-  });
+  return testing::Value(light->lighting.report.notes, Contains(HasSubstr("blinded")));
 }
 
 // A bracket that begins with an exposure so long that it clips the whole picture: by itself that
@@ -268,6 +265,14 @@ TEST(LightStage, TheRoomIsABoxOrAFileAndHoldsTheCamera) {
   EXPECT_THROW(LightStage(set, outside, film_camera()), Error);
 }
 
+// A light camera of so many frames.
+auto light_frames(std::uint64_t count) {
+  return [next = std::uint64_t{0}, count]() mutable -> std::optional<LightFrame> {
+    if (next == count) return std::nullopt;
+    return LightFrame{std::make_shared<Frame>(), next++};
+  };
+}
+
 // A light stage that takes a second a frame, or for ever: here until every frame was rendered. Were
 // a frame to wait for it, both would wait, and the estimate gives up after a minute.
 TEST(LightFeed, NoFrameWaitsForTheLight) {
@@ -280,11 +285,7 @@ TEST(LightFeed, NoFrameWaitsForTheLight) {
   std::atomic<bool> waited_in_vain = false;
   {
     StageThreads stages(metrics, {});
-    const auto light_source = [next = std::uint64_t{0}]() mutable -> std::optional<LightFrame> {
-      if (next == 100) return std::nullopt;
-      return LightFrame{std::make_shared<Frame>(), next++};
-    };
-    feed.start(stages, light_source,
+    feed.start(stages, light_frames(100),
                [&, gate = all_rendered.get_future().share()](const std::vector<LightFrame>& waiting,
                                                              const std::optional<ObserverView>&) {
                  EXPECT_FALSE(waiting.empty());
@@ -317,19 +318,15 @@ TEST(LightFeed, TheEstimateTakesAllThatWaits) {
   LightFeed feed;
   std::vector<std::uint64_t> taken;
   StageThreads stages(metrics, {});
-  feed.start(
-      stages,
-      [next = std::uint64_t{0}]() mutable -> std::optional<LightFrame> {
-        if (next == 500) return std::nullopt;
-        return LightFrame{std::make_shared<Frame>(), next++};
-      },
-      [&](const std::vector<LightFrame>& waiting, const std::optional<ObserverView>&) {
-        for (const LightFrame& frame : waiting) taken.push_back(frame.index);
-        return std::make_shared<const Light>();
-      });
+  feed.start(stages, light_frames(500),
+             [&](const std::vector<LightFrame>& waiting, const std::optional<ObserverView>&) {
+               for (const LightFrame& frame : waiting) taken.push_back(frame.index);
+               return std::make_shared<const Light>();
+             });
   stages.wait();
-  ASSERT_EQ(taken.size(), 500u);  // none lost, in order
-  for (std::size_t i = 0; i < taken.size(); ++i) EXPECT_EQ(taken[i], i);
+  std::vector<std::uint64_t> all(500);
+  std::iota(all.begin(), all.end(), std::uint64_t{0});
+  EXPECT_EQ(taken, all);  // none lost, in order
 }
 
 // The light camera's frames are recorded as they are taken, so that nothing may hold up their

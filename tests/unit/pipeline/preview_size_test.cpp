@@ -4,7 +4,6 @@
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/load.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"

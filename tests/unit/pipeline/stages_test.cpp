@@ -135,12 +135,7 @@ TEST(StageThreads, AnErrorEndsEveryStageAndIsThrown) {
     return value;
   });
   stages.sink("display", second, [](std::unique_ptr<int>) {});
-  try {
-    stages.wait();
-    FAIL() << "no error";
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "lamp fell down");
-  }
+  EXPECT_THAT([&] { stages.wait(); }, testing::ThrowsMessage<std::runtime_error>("lamp fell down"));
 }
 
 // A camera that is silent waits for its device, and never pushes.

@@ -1,6 +1,5 @@
 // The tracked and lit shots of a recorded take.
 #include "daemon/pipeline/take_shots.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
@@ -20,6 +19,17 @@ class TakeShotsTest : public testing::Test {
     std::vector<Shot> shots;
     for (Shot& shot : TakeShots(take_, options)) shots.push_back(std::move(shot));
     return shots;
+  }
+
+  // Replaces words of the session's own description, from `first` up to the next quote.
+  void replace_quoted(const std::string& first, const std::string& by) {
+    const std::filesystem::path toml = directory_ / "session/session.toml";
+    std::string text = session::read_file(toml);
+    const std::size_t begin = text.find(first);
+    ASSERT_NE(begin, std::string::npos);
+    const std::size_t end = text.find('"', begin + 1);
+    text.replace(begin, end + 1 - begin, '"' + by + '"');
+    std::ofstream(toml) << text;
   }
 
   test::TemporaryDirectory directory_;
@@ -48,13 +58,7 @@ TEST_F(TakeShotsTest, ATakeCanBeGoneThroughAgain) {
 
 // Whatever session.toml says, files outside of the session are not read as its assets.
 TEST_F(TakeShotsTest, ATakeCannotMakeForeignFilesItsAssets) {
-  const std::filesystem::path toml = directory_ / "session/session.toml";
-  std::string text = session::read_file(toml);
-  const std::size_t asset = text.find("\"assets/");
-  ASSERT_NE(asset, std::string::npos);
-  const std::size_t end = text.find('"', asset + 1);
-  text.replace(asset, end + 1 - asset, "\"../floor.gltf\"");
-  std::ofstream(toml) << text;
+  replace_quoted("\"assets/", "../floor.gltf");
   const session::Session read = session::open_session(directory_ / "session");
   ASSERT_EQ(read.missing.size(), 1u);
   EXPECT_THAT(read.missing[0], HasSubstr("lies outside the session"));
@@ -71,12 +75,7 @@ TEST_F(TakeShotsTest, ATakeCannotReadForeignFilesByWayOfItsModels) {
 }
 
 TEST_F(TakeShotsTest, ATakeIsReadInItsOwnFolderWhateverItsSetIsCalled) {
-  const std::filesystem::path toml = directory_ / "session/session.toml";
-  std::string text = session::read_file(toml);
-  const std::size_t name = text.find("\"set.toml\"");
-  ASSERT_NE(name, std::string::npos);
-  text.replace(name, 10, "\"../../set.toml\"");
-  std::ofstream(toml) << text;
+  replace_quoted("\"set.toml\"", "../../set.toml");
   EXPECT_EQ(open_take(directory_ / "session", {}).set.file, directory_ / "session/set.toml");
 }
 
@@ -163,21 +162,12 @@ TEST_F(TakeShotsTest, AFrameIsConvertedOnce) {
 TEST_F(TakeShotsTest, AStopEndsTheReadingOfATake) {
   std::stop_source stop;
   stop.request_stop();
-  const auto why = [](const auto& read) -> std::string {
-    try {
-      read();
-      return "it was read";
-    } catch (const Error& error) {
-      return error.what();
-    }
-  };
   const std::filesystem::path session = directory_ / "session";
-  const std::string asset = why([&] { open_take(session, {}, false, stop.get_token()); });
-  EXPECT_THAT(asset, HasSubstr(".gltf: reading interrupted"));
+  EXPECT_THAT(test::error_of([&] { open_take(session, {}, false, stop.get_token()); }),
+              HasSubstr(".gltf: reading interrupted"));
   session::Session opened = session::open_session(session);
-  const std::string video =
-      why([&] { session::open_stream(opened, "observer", stop.get_token()); });
-  EXPECT_THAT(video, HasSubstr("observer.mkv: reading interrupted"));
+  EXPECT_THAT(test::error_of([&] { session::open_stream(opened, "observer", stop.get_token()); }),
+              HasSubstr("observer.mkv: reading interrupted"));
 }
 
 }  // namespace previz::pipeline::take_shots_test

@@ -5,7 +5,6 @@
 
 #include "daemon/rig/camera_source.hpp"
 #include "drivers/camera_drivers.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/other_camera.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
@@ -30,15 +29,14 @@ class RigCameras : public testing::Test {
   }
 
   static std::string error_of(const set::Set& set) {
-    try {
-      open_cameras(set);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "no error";
+    return test::error_of([&] { open_cameras(set); });
   }
 
   test::TemporaryDirectory directory_;
+  std::ostringstream out_;
+  report::Reports reports_{report::lines_to(out_)};
+  pipeline::Metrics metrics_;
+  pipeline::Liveness liveness_;
 };
 
 TEST_F(RigCameras, AReplayedCameraStreams) {
@@ -115,14 +113,10 @@ TEST_F(RigCameras, ACameraThatThrowsAtEveryCallIsLost) {
     if (throws) throw Error("lamp fell down");
     return event;
   });
-  std::ostringstream out;
-  report::Reports reports(report::lines_to(out));
-  pipeline::Metrics metrics;
-  pipeline::Liveness liveness;
   std::stop_source stop;
   bool is_lost = false;
   CameraSource source(*cameras.observer, "observer", "film camera",
-                      {stop.get_token(), {reports, metrics, liveness}, 0.3, [&](bool lost) {
+                      {stop.get_token(), {reports_, metrics_, liveness_}, 0.3, [&](bool lost) {
                          is_lost = lost;
                          stop.request_stop();
                        }});
@@ -139,44 +133,36 @@ TEST_F(RigCameras, ACameraThatThrowsAtEveryCallIsLost) {
 TEST_F(RigCameras, EachLossOfADeviceIsALineWithItsNumber) {
   set::Set set = replayed();
   set.observer.faults = {"disconnect@2+0s"};
-  std::ostringstream out;
-  report::Reports reports(report::lines_to(out));
-  pipeline::Metrics metrics;
-  pipeline::Liveness liveness;
   std::string cameras_name;
   for (int loaded = 1; loaded <= 3; ++loaded) {
     const Cameras cameras = open_cameras(set, /*loop=*/true);
     cameras_name = cameras.observer->name();
     CameraSource source(*cameras.observer, "observer", "film camera",
-                        {{}, {reports, metrics, liveness}, 1.0, {}});
+                        {{}, {reports_, metrics_, liveness_}, 1.0, {}});
     for (int i = 0; i < 4; ++i) ASSERT_TRUE(source.next());
   }
   const std::string lost = cameras_name + ": was unplugged; reopening it";
-  EXPECT_EQ(out.str(), lost + "\n" + lost + ", the 2nd time in this run\n" + lost +
-                           ", the 3rd time in this run\n");
+  EXPECT_EQ(out_.str(), lost + "\n" + lost + ", the 2nd time in this run\n" + lost +
+                            ", the 3rd time in this run\n");
 }
 
 // `previzctl metrics` prints them; they go on over sets that are loaded anew.
 TEST_F(RigCameras, WhatADeviceCountsIsInTheMetrics) {
   set::Set set = replayed();
   set.observer.faults = {"disconnect@2+0s"};
-  std::ostringstream out;
-  report::Reports reports(report::lines_to(out));
-  pipeline::Metrics metrics;
-  pipeline::Liveness liveness;
   for (int loaded = 1; loaded <= 2; ++loaded) {
     const Cameras cameras = open_cameras(set, /*loop=*/true);
     CameraSource source(*cameras.observer, "observer", "film camera",
-                        {{}, {reports, metrics, liveness}, 1.0, {}});
+                        {{}, {reports_, metrics_, liveness_}, 1.0, {}});
     for (int i = 0; i < 4; ++i) ASSERT_TRUE(source.next());
-    const pipeline::MetricsSnapshot snapshot = metrics.snapshot(1);
+    const pipeline::MetricsSnapshot snapshot = metrics_.snapshot(1);
     const DeviceCounters& counted = snapshot.devices.at("observer");
     EXPECT_EQ(counted.at("opened"), 2u * loaded);
     EXPECT_EQ(counted.at("lost"), 1u * loaded);
     EXPECT_EQ(counted.at("returned"), 1u * loaded);
     EXPECT_EQ(counted.at("stalled"), 0u);  // there before anything is counted
   }
-  const auto json = nlohmann::json::parse(to_json(metrics.snapshot(1)));
+  const auto json = nlohmann::json::parse(to_json(metrics_.snapshot(1)));
   EXPECT_EQ(json["devices"]["observer"]["lost"], 2);
 }
 

@@ -25,7 +25,8 @@ set::Set stage() {
 
 struct Desk {
   set::Set set = stage();
-  Controls controls{set};
+  scene::Scene scene_of_files = {};
+  Controls controls{set, {}, scene_of_files};
   Outcome operator()(const char* action) { return controls.perform(*set::find_action(action)); }
   session::SceneState scene() const { return pipeline::scene_state(set, controls.look().edits); }
 };
@@ -60,33 +61,34 @@ TEST(Controls, SamplesGoThroughTheirStepsAndStopAtTheEnds) {
   for (int i = 0; i < 20; ++i) desk("samples_down");
   EXPECT_EQ(desk.controls.look().samples, 1);
   desk.set.quality.samples = 64;  // more than a preview has steps for
-  Controls controls(desk.set);
-  EXPECT_EQ(controls.perform(*set::find_action("samples_up")).said, "64 samples");
-  EXPECT_EQ(controls.perform(*set::find_action("samples_down")).said, "50 samples");
+  Desk fine{desk.set};
+  EXPECT_EQ(fine("samples_up").said, "64 samples");
+  EXPECT_EQ(fine("samples_down").said, "50 samples");
 }
 
 TEST(Controls, ANumberOfSamplesEndsTheGovernor) {
   set::Set set = stage();
   set.quality.fps = 25;
-  Controls controls(set);
-  EXPECT_TRUE(controls.look().governed);
-  controls.perform(*set::find_action("samples_up"));
-  EXPECT_FALSE(controls.look().governed);
+  Desk desk{set};
+  EXPECT_TRUE(desk.controls.look().governed);
+  desk("samples_up");
+  EXPECT_FALSE(desk.controls.look().governed);
 }
 
 TEST(Controls, SamplesGoOnFromTheGovernorsNumberAndTheRateCanBeHadBack) {
   set::Set set = stage();
   set.quality.fps = 25;
-  Controls controls(set);
-  controls.use_governed(3);
-  EXPECT_EQ(controls.perform(*set::find_action("samples_up")).said, "4 samples");
-  controls.use_governed(9);  // of a picture before the press
-  EXPECT_EQ(controls.perform(*set::find_action("samples_down")).said, "3 samples");
-  EXPECT_EQ(controls.perform(*set::find_action("hold_rate")).said, "holding 25 frames per second");
-  EXPECT_TRUE(controls.look().governed);
-  EXPECT_EQ(controls.look().samples, set.quality.samples) << "a refinement begins with the set's";
+  Desk desk{set};
+  desk.controls.use_governed(3);
+  EXPECT_EQ(desk("samples_up").said, "4 samples");
+  desk.controls.use_governed(9);  // of a picture before the press
+  EXPECT_EQ(desk("samples_down").said, "3 samples");
+  EXPECT_EQ(desk("hold_rate").said, "holding 25 frames per second");
+  EXPECT_TRUE(desk.controls.look().governed);
+  EXPECT_EQ(desk.controls.look().samples, set.quality.samples)
+      << "a refinement begins with the set's";
   set.quality.fps = 0;
-  EXPECT_TRUE(Controls(set).perform(*set::find_action("hold_rate")).refused);
+  EXPECT_TRUE(Desk{set}("hold_rate").refused);
 }
 
 TEST(Controls, OnlyVirtualObjectsAreMovedAndEachKeepsItsPlace) {
@@ -123,26 +125,21 @@ TEST(Controls, TurningAndScalingAreAboutTheObjectsOrigin) {
 TEST(Controls, StepsThroughTheVariantsOfTheSelectedObject) {
   scene::Scene painted;
   painted.variants = {{1, {"red", "blue"}, "", {}}, {2, {"dry", "wet"}, "wet", {}}};
-  const set::Set set = stage();
-  Controls controls(set, {}, painted);
-  const auto press = [&](const char* action) {
-    return controls.perform(*set::find_action(action)).said;
-  };
-  const auto shown = [&](const std::string& object) {
-    return pipeline::scene_state(set, controls.look().edits).variants.at(object);
-  };
-  EXPECT_EQ(press("next_variant"), "vase: variant \"red\" (2 of 3)");
+  Desk desk{stage(), painted};
+  const auto shown = [&](const std::string& object) { return desk.scene().variants.at(object); };
+  EXPECT_EQ(desk("next_variant").said, "vase: variant \"red\" (2 of 3)");
   EXPECT_EQ(shown("vase"), "red");
-  EXPECT_TRUE(pipeline::scene_state(set, controls.look().edits).objects.empty()) << "not moved";
-  EXPECT_EQ(press("next_variant"), "vase: variant \"blue\" (3 of 3)");
-  EXPECT_EQ(press("next_variant"), "vase: no variant (1 of 3)");
+  EXPECT_TRUE(desk.scene().objects.empty()) << "not moved";
+  EXPECT_EQ(desk("next_variant").said, "vase: variant \"blue\" (3 of 3)");
+  EXPECT_EQ(desk("next_variant").said, "vase: no variant (1 of 3)");
   EXPECT_EQ(shown("vase"), "");
-  EXPECT_EQ(press("previous_variant"), "vase: variant \"blue\" (3 of 3)");
-  press("next_object");
-  EXPECT_EQ(press("next_variant"), "bird: variant \"dry\" (1 of 2)") << "it was shown as if wet";
-  EXPECT_EQ(press("next_variant"), "bird: variant \"wet\" (2 of 2)");
-  press("reset_object");
-  EXPECT_FALSE(pipeline::scene_state(set, controls.look().edits).variants.contains("bird"));
+  EXPECT_EQ(desk("previous_variant").said, "vase: variant \"blue\" (3 of 3)");
+  desk("next_object");
+  EXPECT_EQ(desk("next_variant").said, "bird: variant \"dry\" (1 of 2)")
+      << "it was shown as if wet";
+  EXPECT_EQ(desk("next_variant").said, "bird: variant \"wet\" (2 of 2)");
+  desk("reset_object");
+  EXPECT_FALSE(desk.scene().variants.contains("bird"));
   EXPECT_EQ(shown("vase"), "blue");
 }
 
@@ -158,24 +155,23 @@ TEST(Controls, AnObjectWithoutVariantsHasNoNext) {
 TEST(Controls, InAReviewVariantsAreSteppedFromThoseOfTheTake) {
   scene::Scene painted;
   painted.variants = {{1, {"red", "green", "blue"}, "red", {}}};
-  const set::Set set = stage();
-  Controls controls(set, {}, painted);
-  const auto press = [&](const char* action) {
-    return controls.perform(*set::find_action(action)).said;
-  };
-  press("next_variant");
+  Desk desk{stage(), painted};
+  Controls& controls = desk.controls;
+  desk("next_variant");
   EXPECT_EQ(controls.look().edits.objects.at("vase").variant, "green");
   controls.happened(Event::good_frame);
   controls.happened(Event::take_finished);
-  press("review");
+  desk("review");
   ASSERT_TRUE(controls.look().of_take);
-  EXPECT_EQ(press("previous_variant"), "vase: variant \"blue\" (3 of 3)") << "the set's was red";
-  press("reset_object");
+  EXPECT_EQ(desk("previous_variant").said, "vase: variant \"blue\" (3 of 3)")
+      << "the set's was red";
+  desk("reset_object");
   controls.use_recorded({{"vase", "green"}});
-  EXPECT_EQ(press("next_variant"), "vase: variant \"blue\" (3 of 3)");
+  EXPECT_EQ(desk("next_variant").said, "vase: variant \"blue\" (3 of 3)");
   session::SceneState recorded;
   recorded.variants["vase"] = "green";
-  const session::SceneState state = pipeline::with_edits(recorded, set, controls.look().take_edits);
+  const session::SceneState state =
+      pipeline::with_edits(recorded, desk.set, controls.look().take_edits);
   EXPECT_EQ(state.variants.at("vase"), "blue");
   EXPECT_TRUE(state.objects.empty());
   EXPECT_EQ(controls.look().edits.objects.at("vase").variant, "green") << "the live picture's";
@@ -326,10 +322,10 @@ TEST(Controls, ALampThatIsGoneIsNotChangedNorAnotherInItsPlace) {
 TEST(Controls, AFoundLampHasNoNameOfTheSets) {
   set::Set set = stage();
   set.captured_lamps.push_back({"found 1", {0, 0, 1}, {}, 0.1});
-  Controls controls(set);
-  controls.use_found({first});
-  EXPECT_EQ(controls.perform(*set::find_action("previous_light")).said, "lamp: found 2");
-  EXPECT_EQ(controls.perform(*set::find_action("previous_light")).said, "lamp: found 1");
+  Desk desk{set};
+  desk.controls.use_found({first});
+  EXPECT_EQ(desk("previous_light").said, "lamp: found 2");
+  EXPECT_EQ(desk("previous_light").said, "lamp: found 1");
 }
 
 // What is changed in a take in review is the take's, also while it is refined, until another take

@@ -1,96 +1,48 @@
 // What the crew sees, from end to end: a replayed take on a headless display that is read back.
-#include "daemon/output/osd_painter.hpp"
 #include "daemon/output/png.hpp"
-#include "daemon/report/reports.hpp"
-#include "daemon/rig/live.hpp"
-#include "daemon/set/actions.hpp"
-#include "drivers/plate.hpp"
-#include "drivers/session/draft.hpp"
-#include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
-#include "tests/support/crewed_rig.hpp"
+#include "tests/support/live_rig.hpp"
+#include "tests/support/pages.hpp"
 #include "tests/support/session_fixture.hpp"
-#include "tests/support/small_take.hpp"
-#include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::rig::display_test {
 
 using output::OsdPage;
-using output::OsdText;
+using test::says;
 
 constexpr int screen_width = 480, screen_height = 270;
 constexpr int picture_width = 48, picture_height = 36;  // small_take_frame's
 constexpr int left = (screen_width - picture_width) / 2, top = (screen_height - picture_height) / 2;
 
-bool says(const std::vector<OsdText>& texts, const std::string& words) {
-  return std::ranges::any_of(
-      texts, [&](const OsdText& text) { return text.text.find(words) != std::string::npos; });
-}
-
-std::string words_of(const OsdPage& page) {
-  std::string words;
-  for (const auto* texts :
-       {&page.top_left, &page.top_right, &page.bottom_left, &page.bottom_right, &page.notices})
-    for (const OsdText& text : *texts) words += text.text + "\n";
-  return words;
-}
-
-class RigDisplay : public testing::Test {
+class RigDisplay : public test::RigLive {
  protected:
   using Pictures = std::deque<std::shared_ptr<const Plate>>;
 
-  void write_set(const std::string& display) {
-    std::string text = "[recording]\nslate = \"12A\"\nreserve_mb = 1\ndirectory = \"takes\"\n";
-    text += test::button_for_every_action();
-    test::write_small_take(directory_.path(), true, text + display);
-  }
-
-  void run(const std::function<void()>& script) {
-    LiveOptions options;
-    options.on_shown = [&](const pipeline::Shot& shot, const Look&) {
+  RigDisplay() {
+    while_shown_ = [this] {
       const std::lock_guard lock(mutex_);
-      pictures_.push_back(shot.picture);
+      pictures_.push_back(shown_.shot.picture);
       if (pictures_.size() > 1024) pictures_.pop_front();
-      news_.notify_all();
     };
-    options.on_screen = [&](const Plate& screen, const OsdPage& page) {
-      std::unique_lock lock(mutex_);
-      unread_.push_back(page);
+    options_.on_screen = [this](const Plate& screen, const OsdPage& page) {
       ++count_;
-      news_.notify_all();
+      pages_.show(page);
+      std::unique_lock lock(mutex_);
       const Pictures pictures = pictures_;
       lock.unlock();
       if (is_a_picture(screen, page, pictures)) ++as_expected_;
     };
-    std::ostringstream out;
-    metrics_ = test::run_crewed(std::move(options), directory_.path(), hand_, script, out);
-    log_ = out.str();
   }
 
-  // Reads page after page until the condition holds: no time is assumed, and no page is missed.
-  OsdPage until(const std::function<bool(const OsdPage&)>& condition) {
-    std::unique_lock lock(mutex_);
-    OsdPage page;
-    const auto found = [&] {
-      while (!unread_.empty()) {
-        page = unread_.front();
-        unread_.pop_front();
-        if (condition(page)) return true;
-      }
-      return false;
-    };
-    test::await(news_, lock, found, [&] { return words_of(page); });
-    return page;
+  void until_mode(const std::string& mode) {
+    pages_.until([&](const OsdPage& page) { return says(page.top_left, mode); }, mode);
   }
-  OsdPage until_mode(const std::string& mode) {
-    return until([&](const OsdPage& page) { return says(page.top_left, mode); });
+  void until_notice(const std::string& words) {
+    pages_.until([&](const OsdPage& page) { return says(page.notices, words); }, words);
   }
   // The pages before it are of no interest any more.
   void press(const std::string& button) {
-    const std::lock_guard lock(mutex_);
-    unread_.clear();
+    pages_.skip();
     hand_.press(button);
   }
 
@@ -132,18 +84,13 @@ class RigDisplay : public testing::Test {
     return true;
   }
 
-  test::TemporaryDirectory directory_;
-  test::Hand hand_;
-  std::mutex mutex_;
-  std::condition_variable news_;
+  test::Pages pages_;
   Pictures pictures_{// what may be seen: black before the first
                      std::make_shared<const Plate>(
                          Plate{picture_width, picture_height, 8,
                                std::vector<std::uint16_t>(3 * picture_width * picture_height, 0)})};
-  std::deque<OsdPage> unread_;
-  int count_ = 0, as_expected_ = 0;
-  pipeline::MetricsSnapshot metrics_;
-  std::string log_;
+  std::atomic<int> count_ = 0;
+  int as_expected_ = 0;  // on the display's thread
 };
 
 TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
@@ -151,26 +98,26 @@ TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
       "[display]\ndriver = \"headless\"\nmode = \"480x270\"\nscale = \"1:1\"\n"
       "text_height = 0.05\n");
   run([&] {
-    until([](const OsdPage& page) { return says(page.bottom_left, "2 samples"); });
-    until([](const OsdPage& page) { return says(page.notices, "plate only: pose lost"); });
+    pages_.until_words("2 samples");
+    until_notice("plate only: pose lost");
     press("debug_view");
     until_mode("view: mixed");
     for (std::size_t i = 1; i < render::all_views.size(); ++i) press("debug_view");
     press("record");
     until_mode("● 00:");
     press("refine");
-    until([](const OsdPage& page) {  // the take has its name once its folder is there
+    pages_.until([](const OsdPage& page) {  // the take has its name once its folder is there
       return says(page.bottom_left, "· error") && says(page.top_left, "REFINE") &&
              says(page.top_left, "12A_take001");
     });
     press("live");
     press("standby");  // refused: a take runs
-    until([](const OsdPage& page) { return says(page.notices, "end the take first"); });
+    until_notice("end the take first");
     press("record");
     press("snapshot");
-    until([](const OsdPage& page) { return says(page.notices, "snapshot"); });
+    until_notice("snapshot");
     press("osd");
-    until([](const OsdPage& page) { return page == OsdPage{}; });
+    pages_.until([](const OsdPage& page) { return page == OsdPage{}; });
     press("osd");
     until_mode("LIVE");
     // It is written by a thread of its own, which tells no page; an end would leave it out.
@@ -186,7 +133,7 @@ TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
   // None of them is in what was written.
   const Plate snapshot = output::read_png(directory_ / "live/snapshot_0001.png");
   EXPECT_EQ(snapshot.width, picture_width);
-  session::Session take = session::open_session(directory_ / "takes/12A_take001");
+  session::Session take = session::open_session(take_folder());
   const auto stream = session::open_stream(take, "observer");
   for (std::size_t i = 0; i < stream->records().size(); ++i)
     EXPECT_EQ(stream->read(i)->bytes,
@@ -198,22 +145,18 @@ TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
 // and that nothing is shown between it and the next picture.
 TEST_F(RigDisplay, IsReleasedInStandbyAndBackAfterIt) {
   write_set("[display]\ndriver = \"headless\"\nmode = \"480x270\"\n");
-  const auto shown = [this] {
-    const std::lock_guard lock(mutex_);
-    return count_;
-  };
   run([&] {
     until_mode("LIVE");
     press("standby");
     int before = 0;
     test::must_come("nothing is shown for ten of the screen's looks at its words", [&] {
-      before = shown();
+      before = count_;
       std::this_thread::sleep_for(std::chrono::seconds(1));
-      return shown() == before;
+      return count_ == before;
     });
     press("standby");
     until_mode("LIVE");
-    EXPECT_GT(shown(), before);
+    EXPECT_GT(count_, before);
   });
   EXPECT_EQ(metrics_.counts.at("screen: released"), 1u);
 }
@@ -222,7 +165,7 @@ TEST_F(RigDisplay, IsReleasedInStandbyAndBackAfterIt) {
 TEST_F(RigDisplay, TakesThatWereCutOffStandOnItUntilSomebodyTakesNote) {
   write_set("[display]\ndriver = \"headless\"\nmode = \"480x270\"\n");
   for (const char* name : {"12A_take001", "12A_take002"}) {
-    const std::filesystem::path take = directory_ / "takes" / name;
+    const std::filesystem::path take = take_folder(name);
     session::write_small_session(take, 3);
     std::string toml = session::read_file(take / "session.toml");
     const std::string closed = "closed = true";
@@ -231,30 +174,19 @@ TEST_F(RigDisplay, TakesThatWereCutOffStandOnItUntilSomebodyTakesNote) {
   }
   const std::string words = "take: 12A_take002 was cut off; it has 3 frames (and 1 more)";
   run([&] {
-    until([&](const OsdPage& page) { return says(page.notices, words); });
+    until_notice(words);
     std::this_thread::sleep_for(2 * report::Notices::trouble_time);
-    const std::size_t waiting = [this] {
-      const std::lock_guard lock(mutex_);
-      return unread_.size();
-    }();
-    for (std::size_t i = 0; i <= waiting; ++i)
-      EXPECT_TRUE(says(until([](const OsdPage&) { return true; }).notices, words)) << i;
+    for (std::size_t waiting = pages_.unread() + 1; waiting > 0; --waiting)
+      EXPECT_TRUE(says(pages_.next().notices, words)) << waiting;
     press("acknowledge");
-    until([&](const OsdPage& page) { return !says(page.notices, words); });
+    pages_.until([&](const OsdPage& page) { return !says(page.notices, words); });
   });
 }
 
 TEST_F(RigDisplay, WithoutAScreenTheRigGoesOnAndSaysSoOnce) {
   write_set("[display]\ndriver = \"kms\"\nconnector = \"HDMI-A-9\"\n");
-  run([&] {
-    std::unique_lock lock(mutex_);
-    test::await(
-        news_, lock, [&] { return pictures_.size() >= 20; },
-        [&] { return std::to_string(pictures_.size()) + " pictures"; });
-  });
-  const auto first = log_.find("retrying until it is available");
-  EXPECT_NE(first, std::string::npos) << log_;
-  EXPECT_EQ(log_.find("retrying until it is available", first + 1), std::string::npos);
+  run([&] { until_more(20); });
+  EXPECT_EQ(count_said("retrying until it is available"), 1) << log_.text();
   EXPECT_GT(metrics_.stages.at("screen").dropped.at("no display"), 0u);
 }
 

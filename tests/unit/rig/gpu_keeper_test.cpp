@@ -1,7 +1,6 @@
 // Losses of a graphics device that is made up, without a rig.
 #include "daemon/rig/gpu_keeper.hpp"
 
-#include "drivers/error.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::rig::gpu_keeper_test {

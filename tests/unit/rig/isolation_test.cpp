@@ -4,11 +4,8 @@
 #include <systemd/sd-bus.h>
 
 #include "daemon/control/bus.hpp"
-#include "daemon/rig/live.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/session/draft.hpp"
-#include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/other_camera.hpp"
 #include "tests/support/private_bus.hpp"
@@ -17,18 +14,7 @@
 namespace previz::rig::isolation_test {
 
 using test::RigLive;
-
-// The observer's frames of a take, each of which must be there.
-std::vector<session::FrameRecord> unbroken(const std::filesystem::path& take) {
-  session::Session session = session::open_session(take);
-  EXPECT_TRUE(session.missing.empty()) << testing::PrintToString(session.missing);
-  const auto stream = session::open_stream(session, "observer");
-  if (!stream) return {};
-  std::vector<session::FrameRecord> records = stream->records();
-  for (std::size_t i = 0; i < records.size(); ++i)
-    EXPECT_EQ(records[i].sequence, records[0].sequence + i);
-  return records;
-}
+using test::unbroken;
 
 class RigIsolation : public RigLive, public testing::WithParamInterface<const char*> {};
 
@@ -40,20 +26,18 @@ TEST_P(RigIsolation, AStageThatFailsBeginsAnewAndTheTakeLacksNothing) {
   options_.rehearse = [&](const std::string& part) {
     if (part == stage && failures > 0 && failures-- > 0) throw std::runtime_error("lamp fell down");
   };
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     press("record");
-    until([](const Shown& s) { return s.look.state.recording && s.shot.samples == 2; });
+    until([](const Shown& s) { return s.records(2); });
     for (int times = 1; times <= 2; ++times) {
       failures = 2;
       test::must_come(
           stage + " works again", [&] { return count_said(stage + ": works again") == times; },
           [&] { return log_.text(); });
     }
-    const int before = until([](const Shown&) { return true; }).count;
+    const int before = shown_now().count;
     until([&](const Shown& s) { return s.count > before + 4 && s.shot.samples == 2; });
-    press("record");
-    until_said("12A_take001 is finished");
+    end_take();
   });
   EXPECT_EQ(count_said(stage + ": has failed and is restarting; recording continues: lamp fell"),
             2)  // what is thrown twice in a row is reported once
@@ -62,12 +46,10 @@ TEST_P(RigIsolation, AStageThatFailsBeginsAnewAndTheTakeLacksNothing) {
   EXPECT_EQ(metrics_.counts.at(stage + ": restarted"), 2u);
   EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
 
-  const std::filesystem::path take = directory_ / "takes/12A_take001";
-  const std::vector<session::FrameRecord> frames = unbroken(take);
+  const std::vector<session::FrameRecord> frames = unbroken(take_folder());
   ASSERT_GT(frames.size(), 20u);
   EXPECT_GT(frames.back().timestamp_ns - frames.front().timestamp_ns, 1'000'000'000);
-  const session::Session session = session::open_session(take);
-  EXPECT_GT(session.track.size(), 8u);
+  EXPECT_GT(session::open_session(take_folder()).track.size(), 8u);
 }
 
 INSTANTIATE_TEST_SUITE_P(Stages, RigIsolation,
@@ -79,47 +61,31 @@ INSTANTIATE_TEST_SUITE_P(Stages, RigIsolation,
                            return word;
                          });
 
-// While the renderer is made anew, the plate is shown.
+// While the renderer is made anew, the plate is shown: in the preview, and in a refinement, in
+// which tracking rests.
 TEST_F(RigLive, TheCrewSeesThePlateWhileTheRendererIsMadeAnew) {
   write_set();
   std::atomic<bool> fails = false;
   options_.rehearse = [&](const std::string& part) {
     if (part == "render" && fails) throw std::runtime_error("lamp fell down");
   };
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  const auto until_plates = [&](Mode mode, int pictures) {
+    const auto is_plate = [mode](const Shown& s) {
+      return s.shot.untouched == "the renderer has failed" && s.look.state.mode == mode;
+    };
     fails = true;
-    const int first =
-        until([](const Shown& s) { return s.shot.untouched == "the renderer has failed"; }).count;
-    until([&](const Shown& s) {
-      return s.count > first + 4 && s.shot.untouched == "the renderer has failed";
-    });
+    const int first = until(is_plate).count;
+    until([&](const Shown& s) { return s.count > first + pictures && is_plate(s); });
     fails = false;
-    until([](const Shown& s) { return s.shot.samples == 2; });
-  });
-  EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
-}
-
-// In a refinement tracking rests, and the plates are there all the same.
-TEST_F(RigLive, TheCrewSeesThePlateInARefinementWhoseRendererIsMadeAnew) {
-  write_set();
-  std::atomic<bool> fails = false;
-  options_.rehearse = [&](const std::string& part) {
-    if (part == "render" && fails) throw std::runtime_error("lamp fell down");
   };
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
+    until_plates(Mode::live, 4);
+    until_samples(2);
     press("refine");
     until_mode(Mode::refine);
     until_counted("frames not tracked in this mode");
-    fails = true;
-    const auto is_plate = [](const Shown& s) {
-      return s.shot.untouched == "the renderer has failed" && s.look.state.mode == Mode::refine;
-    };
-    const int first = until(is_plate).count;
-    until([&](const Shown& s) { return s.count > first + 8 && is_plate(s); });
-    fails = false;
-    until([](const Shown& s) { return s.shot.frozen; });
+    until_plates(Mode::refine, 8);
+    until_frozen();
   });
   EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
 }
@@ -128,9 +94,7 @@ TEST_F(RigLive, TheCrewSeesThePlateInARefinementWhoseRendererIsMadeAnew) {
 // the camera's size. The take ends with the one and the next begins with the other.
 TEST_F(RigLive, ACameraOfAnotherSizeBeginsTheNextTakeAndIsShownAsItIs) {
   write_set();
-  std::string text = session::read_file(directory_ / "set.toml");
-  text.replace(text.find("samples = 2"), 11, "samples = 2\nscale = 0.5");
-  session::replace_file(directory_ / "set.toml", text);
+  replace_in_set("samples = 2", "samples = 2\nscale = 0.5");
   std::atomic<bool> is_other = false;
   options_.around_cameras = [&](Cameras& cameras) {
     test::put_around(
@@ -149,9 +113,8 @@ TEST_F(RigLive, ACameraOfAnotherSizeBeginsTheNextTakeAndIsShownAsItIs) {
   };
   run([&] {
     until([](const Shown& s) { return s.shot.samples == 2 && s.shot.picture->width == 24; });
-    press("record");
-    const int first = until([](const Shown& s) { return s.look.state.recording; }).count;
-    until([&](const Shown& s) { return s.count > first + 4; });
+    begin_take();
+    until_more(4);
     is_other = true;
     const int other = until([](const Shown& s) { return s.shot.picture->width == 64; }).count;
     const Shown shown =
@@ -160,14 +123,13 @@ TEST_F(RigLive, ACameraOfAnotherSizeBeginsTheNextTakeAndIsShownAsItIs) {
               "observer: a frame of 64x48 does not fit the calibration's 48x36");
     is_other = false;  // and back
     until([](const Shown& s) { return s.shot.samples == 2 && s.shot.picture->width == 24; });
-    press("record");
-    until_said("12A_take003 is finished");
+    end_take("12A_take003");
   });
-  for (const auto& [name, width] : {std::pair("1", 48), {"2", 64}, {"3", 48}}) {
-    session::Session take =
-        session::open_session(directory_ / ("takes/12A_take00" + std::string(name)));
-    EXPECT_TRUE(take.missing.empty()) << testing::PrintToString(take.missing);
-    EXPECT_EQ(session::open_stream(take, "observer")->width(), width);
+  for (const auto& [name, width] :
+       {std::pair("12A_take001", 48), {"12A_take002", 64}, {"12A_take003", 48}}) {
+    session::Session session = session::open_session(take_folder(name));
+    EXPECT_TRUE(session.missing.empty()) << testing::PrintToString(session.missing);
+    EXPECT_EQ(session::open_stream(session, "observer")->width(), width);
   }
 }
 
@@ -181,18 +143,14 @@ TEST_F(RigLive, ACameraThatThrowsIsAskedAgain) {
       return event;
     });
   };
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
-    press("record");
-    until([](const Shown& s) { return s.look.state.recording; });
+  run_rendering([&] {
+    begin_take();
     throws = true;
     until_said("has failed: lamp fell down; trying again");
-    const int before = until([](const Shown&) { return true; }).count;
-    until([&](const Shown& s) { return s.count > before + 8; });
-    press("record");
-    until_said("12A_take001 is finished");
+    until_more(8);
+    end_take();
   });
-  unbroken(directory_ / "takes/12A_take001");
+  unbroken(take_folder());
 }
 
 // A camera whose shutter time cannot be set, and whose driver throws rather than say so.
@@ -214,19 +172,15 @@ TEST_F(RigLive, ACameraThatThrowsWhereItsExposureIsSetIsAskedOnce) {
   options_.around_cameras = [&](Cameras& cameras) {
     cameras.observer = std::make_unique<StubbornCamera>(std::move(cameras.observer));
   };
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
-    press("record");
-    until([](const Shown& s) { return s.look.state.recording; });
+  run_rendering([&] {
+    begin_take();
     press("exposure_up");
     until_said("its exposure cannot be set: lamp fell down");
-    const int before = until([](const Shown&) { return true; }).count;
-    until([&](const Shown& s) { return s.count > before + 8; });
-    press("record");
-    until_said("12A_take001 is finished");
+    until_more(8);
+    end_take();
   });
   EXPECT_EQ(metrics_.counts.at("observer: device trouble"), 1u);
-  unbroken(directory_ / "takes/12A_take001");
+  unbroken(take_folder());
 }
 
 // What no keeper catches ends the rig, but not the recording: the next process records on.
@@ -241,10 +195,9 @@ TEST_F(RigLive, AStageThatEndsTheRigDoesNotEndTheRecording) {
   };
   const std::filesystem::path takes = directory_ / "takes";
   const auto script = [&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
-    press("record");
-    const int first = until([](const Shown& s) { return s.look.state.recording; }).count;
-    until([&](const Shown& s) { return s.count > first + 8; });
+    until_samples(2);
+    begin_take();
+    until_more(8);
     throws = true;
     test::must_come("the take is closed", [&] {
       const std::string text = session::read_file(takes / "12A_take001/session.toml");
@@ -256,37 +209,43 @@ TEST_F(RigLive, AStageThatEndsTheRigDoesNotEndTheRecording) {
   EXPECT_TRUE(std::filesystem::exists(takes / ".recording"));
 }
 
+// Returns why a call to the rig on the bus failed, "" if it did not.
+template <class... Arguments>
+std::string call(const char* method, const char* types, Arguments... arguments) {
+  sd_bus* client = nullptr;
+  sd_bus_error error = SD_BUS_ERROR_NULL;
+  std::string refused = "no bus";
+  if (sd_bus_open_system(&client) >= 0) {
+    const int result =
+        sd_bus_call_method(client, control::bus_name, control::object_path, control::interface_name,
+                           method, &error, nullptr, types, arguments...);
+    refused = result >= 0 ? "" : error.message ? error.message : "no answer";
+  }
+  sd_bus_error_free(&error);
+  sd_bus_flush_close_unref(client);
+  return refused;
+}
+
+bool rig_answers() {
+  return call("Metrics", "").empty();
+}
+
 // Where the set says so, whoever is on the bus may begin a take and not end one; a button may.
 TEST_F(RigLive, OnlyAButtonEndsATakeWhereTheSetSaysSo) {
   const test::PrivateBus bus;
   if (!bus.running()) GTEST_SKIP() << "dbus-daemon is not installed";
   write_set("end_over_bus = false\n");
   options_.bus = true;
-  const auto call = [](const char* method, const char* types, auto... arguments) {
-    sd_bus* client = nullptr;
-    sd_bus_error error = SD_BUS_ERROR_NULL;
-    std::string refused = "no bus";
-    if (sd_bus_open_system(&client) >= 0) {
-      const int result =
-          sd_bus_call_method(client, control::bus_name, control::object_path,
-                             control::interface_name, method, &error, nullptr, types, arguments...);
-      refused = result >= 0 ? "" : error.message ? error.message : "no answer";
-    }
-    sd_bus_error_free(&error);
-    sd_bus_flush_close_unref(client);
-    return refused;
-  };
   run([&] {
-    test::must_come("the rig answers", [&] { return call("Metrics", "").empty(); });
+    test::must_come("the rig answers", rig_answers);
     EXPECT_EQ(call("Record", "b", 1), "");
     until([](const Shown& s) { return s.look.state.recording; });
     const std::string refusal = "the set lets only buttons end a take (recording.end_over_bus)";
     EXPECT_EQ(call("Record", "b", 0), refusal);
     EXPECT_EQ(call("Action", "s", "record"), refusal);
     EXPECT_EQ(call("Record", "b", 1), "");
-    EXPECT_TRUE(until([](const Shown&) { return true; }).look.state.recording);
-    press("record");
-    until_said("12A_take001 is finished");
+    EXPECT_TRUE(shown_now().look.state.recording);
+    end_take();
     EXPECT_EQ(call("Action", "s", "record"), "");
     until([](const Shown& s) { return s.look.state.recording; });
   });
@@ -298,29 +257,16 @@ TEST_F(RigLive, ABusThatIsRestartedIsJoinedAgain) {
   if (!bus.running()) GTEST_SKIP() << "dbus-daemon is not installed";
   write_set();
   options_.bus = true;
-  const auto answers = [] {
-    sd_bus* client = nullptr;
-    sd_bus_message* reply = nullptr;
-    const bool is_there =
-        sd_bus_open_system(&client) >= 0 &&
-        sd_bus_call_method(client, control::bus_name, control::object_path, control::interface_name,
-                           "Metrics", nullptr, &reply, "") >= 0;
-    sd_bus_message_unref(reply);
-    sd_bus_flush_close_unref(client);
-    return is_there;
-  };
   run([&] {
-    test::must_come("the rig answers", answers);
-    press("record");
-    until([](const Shown& s) { return s.look.state.recording; });
+    test::must_come("the rig answers", rig_answers);
+    begin_take();
     bus.stop();
     until_said("bus: has failed and is restarting");
     bus.start();
-    test::must_come("the rig answers again", answers);
-    press("record");
-    until_said("12A_take001 is finished");
+    test::must_come("the rig answers again", rig_answers);
+    end_take();
   });
-  unbroken(directory_ / "takes/12A_take001");
+  unbroken(take_folder());
 }
 
 // Hangs until somebody lets it go, or the test has waited in vain.
@@ -360,7 +306,7 @@ TEST_P(RigStop, ClosesTheTakeBeforeADeviceThatHangs) {
                                                          return event;
                                                        });
   };
-  const std::filesystem::path take = directory_ / "takes/12A_take001";
+  const std::filesystem::path take = take_folder();
   std::jthread witness([&] {
     const auto is_closed = [&] {
       const std::filesystem::path file = take / "session.toml";
@@ -371,9 +317,8 @@ TEST_P(RigStop, ClosesTheTakeBeforeADeviceThatHangs) {
     gate.open();
   });
   run([&] {
-    press("record");
-    const int first = until([](const Shown& s) { return s.look.state.recording; }).count;
-    until([&](const Shown& s) { return s.count > first + 8; });
+    begin_take();
+    until_more(8);
     is_over = true;
   });
   EXPECT_GT(unbroken(take).size(), 4u);
@@ -384,13 +329,10 @@ INSTANTIATE_TEST_SUITE_P(InItsDestructorOrInNext, RigStop, testing::Bool());
 // Reviews that are begun and ended faster than a take is read.
 TEST_F(RigLive, ReviewsThatAreToggledFollowEachOther) {
   write_set();
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
-    press("record");
-    const int first = until([](const Shown& s) { return s.look.state.recording; }).count;
-    until([&](const Shown& s) { return s.count > first + 8; });
-    press("record");
-    until_said("12A_take001 is finished");
+  run_rendering([&] {
+    begin_take();
+    until_more(8);
+    end_take();
     for (int times = 0; times < 10; ++times) press(times % 2 == 0 ? "review" : "live");
     press("review");
     until([](const Shown& s) { return s.look.state.mode == Mode::review && s.shot.samples == 2; });

@@ -7,9 +7,6 @@
 //   --gtest_filter=KeptTakeRecording.*
 #include <nlohmann/json.hpp>
 
-#include "daemon/post/render.hpp"
-#include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
 
@@ -211,27 +208,24 @@ class KeptTakeRecording : public test::RigLive {};
 TEST_F(KeptTakeRecording, DISABLED_IsDoneOnceAVersion) {
   write_set("preroll_s = 0\ncomposite = true\n", 400'000'000);
   test::write_card_with_variants(directory_ / "card.gltf");
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     for (const char* button :
          {"move_right", "next_variant", "next_variant", "light_down", "light_warmer"})
       press(button);
     until([](const Shown& s) { return s.shot.scene.variants.contains("card"); });
-    press("record");
-    const Shown first = until([](const Shown& s) { return s.look.state.recording; });
+    const Shown first = begin_take();
     // A whole lap of the small take, in which the light camera's frames come once.
     until([&](const Shown& s) {
       return s.shot.frame->timestamp_ns >= first.shot.frame->timestamp_ns + 8 * 400'000'000ll;
     });
     press("mark_good");
-    press("record");
-    until_said("12A_take001 is finished");
+    end_take();
   });
   int number = 1;
   while (fs::exists(kept / std::to_string(number))) ++number;
   const fs::path folder = kept / std::to_string(number), take = folder / "take";
   fs::create_directories(folder);
-  fs::copy(directory_ / "takes/12A_take001", take, fs::copy_options::recursive);
+  fs::copy(take_folder(), take, fs::copy_options::recursive);
   const Json expected = {{"streams", streams_of(take)},
                          {"pictures", pictures_of(take, directory_ / "post")}};
   std::ofstream(folder / "expected.json") << expected.dump() << "\n";

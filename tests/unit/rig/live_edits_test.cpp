@@ -1,6 +1,5 @@
 // Takes in review, and what buttons change in them and in the live picture, from end to end.
 #include "daemon/set/load.hpp"
-#include "drivers/session/files.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
 
@@ -13,11 +12,10 @@ TEST_F(RigLive, MayEndOrChangeItsSetInAReview) {
   write_set();
   run([&] {
     const auto review = [&](const std::string& take) {
-      const int before = until([](const Shown& s) { return s.shot.samples == 2; }).count;
+      const int before = until_samples(2).count;
       press("record");
       until([&](const Shown& s) { return s.look.state.recording && s.count > before + 8; });
-      press("record");
-      until_said(take + " is finished");
+      end_take(take);
       press("review");
       until_said("button review: review");
     };
@@ -43,15 +41,12 @@ TEST_F(RigLive, ATakeInReviewIsChangedOnTopOfItsRecord) {
   const auto has = [](const Shown& s, const char* name) {
     return s.shot.scene.objects.contains(name);
   };
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     press("move_right");
     until([&](const Shown& s) { return has(s, "card"); });
-    press("record");
-    const Shown first = until([](const Shown& s) { return s.look.state.recording; });
+    const Shown first = begin_take();
     const Shown last = until([&](const Shown& s) { return is_long_after(s, first); });
-    press("record");
-    until_said("12A_take001 is finished");
+    end_take();
     press("move_right");  // live only: the take has one step
     until([&](const Shown& s) { return has(s, "card") && place_of(s, "card").x > 0.019; });
 
@@ -74,7 +69,7 @@ TEST_F(RigLive, ATakeInReviewIsChangedOnTopOfItsRecord) {
     EXPECT_TRUE(moved.look.edits.lights.empty());
 
     press("refine");
-    const Shown refined = until([](const Shown& s) { return s.shot.frozen; });
+    const Shown refined = until_frozen();
     EXPECT_EQ(refined.look.state.mode, Mode::refine);
     EXPECT_NEAR(place_of(refined, "card").x, 0.01, 1e-12);
     EXPECT_NEAR(place_of(refined, "card").z, 0.01, 1e-12);
@@ -91,7 +86,7 @@ TEST_F(RigLive, ATakeInReviewIsChangedOnTopOfItsRecord) {
     until([&](const Shown& s) { return in_review(s); });
     press("standby");
     press("refine");
-    const Shown again = until([](const Shown& s) { return s.shot.frozen; });
+    const Shown again = until_frozen();
     EXPECT_FALSE(again.look.of_take);
     EXPECT_NEAR(place_of(again, "card").x, 0.02, 1e-12);
   });
@@ -102,18 +97,16 @@ TEST_F(RigLive, ATakeInReviewIsChangedOnTopOfItsRecord) {
 TEST_F(RigLive, ChangesOutlastTheSetAndAreKeptInItsFile) {
   write_set();
   const std::filesystem::path file = directory_ / "set.toml";
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     press("move_right");
     press("light_down");
     until([](const Shown& s) {
       return s.shot.scene.objects.contains("card") && s.shot.scene.lights.contains("key");
     });
-    std::string other = session::read_file(file);
-    other.replace(other.find("samples = 2"), 11, "samples = 4");
-    std::ofstream(file) << other;
+    replace_in_set("samples = 2", "samples = 4");
+    const std::string other = session::read_file(file);
     press("reload_set");
-    const Shown again = until([](const Shown& s) { return s.shot.samples == 4; });
+    const Shown again = until_samples(4);
     EXPECT_NEAR(glm::dvec3(again.shot.scene.objects.at("card").value()[3]).x, 0.01, 1e-12);
     EXPECT_TRUE(again.shot.scene.lights.contains("key"));
     press("keep");
@@ -140,14 +133,13 @@ TEST_F(RigLive, VariantsAreShownRecordedReviewedAndKept) {
   };
   Shown taken;
   run([&] {
-    const Shown before = until([](const Shown& s) { return s.shot.samples == 2; });
+    const Shown before = until_samples(2);
     press("next_variant");
     const Shown black = until([&](const Shown& s) { return variant_of(s) == "black"; });
     press("record");
-    taken = until([&](const Shown& s) { return s.look.state.recording && s.shot.samples == 2; });
+    taken = until([&](const Shown& s) { return s.records(2); });
     until([&](const Shown& s) { return is_long_after(s, taken); });
-    press("record");
-    until_said("12A_take001 is finished");
+    end_take();
     press("next_variant");
     const Shown lamp = until(  // a frame that was only shown has no counters
         [&](const Shown& s) { return variant_of(s) == "lamp" && s.shot.samples == 2; });
@@ -175,10 +167,9 @@ TEST_F(RigLive, VariantsAreShownRecordedReviewedAndKept) {
   });
   EXPECT_EQ(set::load_set(directory_ / "set.toml").objects[1].variant, "lamp");
   EXPECT_GT(count_said("card: variant \"black\" (2 of 3)"), 0);
-  const session::Session take = session::open_session(directory_ / "takes/12A_take001");
+  const session::Session take = session::open_session(take_folder());
   EXPECT_EQ(take.track.back().scene.variants.at("card"), "black");
-  const render::Layers post =
-      rendered(directory_ / "takes/12A_take001", taken.shot.frame->timestamp_ns, 2);
+  const render::Layers post = rendered(take_folder(), taken.shot.frame->timestamp_ns, 2);
   // The middle of the picture shows the card, which is black.
   const std::size_t middle = post.mixed.size() / 2 + static_cast<std::size_t>(post.width) / 2;
   EXPECT_GT(post.mask[middle], 0.99f);
@@ -188,15 +179,13 @@ TEST_F(RigLive, VariantsAreShownRecordedReviewedAndKept) {
 // Reading a set again in which nothing but a colour is new builds no tree.
 TEST_F(RigLive, AColourThatIsNewInTheSetBuildsNoTree) {
   write_set();
-  const std::filesystem::path file = directory_ / "set.toml";
   run([&] {
-    const Shown before = until([](const Shown& s) { return s.shot.samples == 2; });
-    std::string other = session::read_file(file);
-    other += "[[surface]]\nmaterial = \"paper\"\nalbedo = [0.1, 0.2, 0.3]\n";
-    other.replace(other.find("samples = 2"), 11, "samples = 4");
-    std::ofstream(file) << other;
+    const Shown before = until_samples(2);
+    std::ofstream(directory_ / "set.toml", std::ios::app)
+        << "[[surface]]\nmaterial = \"paper\"\nalbedo = [0.1, 0.2, 0.3]\n";
+    replace_in_set("samples = 2", "samples = 4");
     press("reload_set");
-    const Shown after = until([](const Shown& s) { return s.shot.samples == 4; });
+    const Shown after = until_samples(4);
     EXPECT_EQ(after.shot.counters.built_trees, before.shot.counters.built_trees);
     EXPECT_EQ(after.shot.counters.uploaded_textures, before.shot.counters.uploaded_textures);
     EXPECT_EQ(after.shot.counters.uploaded_materials, before.shot.counters.uploaded_materials + 1);
@@ -206,14 +195,13 @@ TEST_F(RigLive, AColourThatIsNewInTheSetBuildsNoTree) {
 // What is moved while no picture is made is where it was put when the frozen one is refined.
 TEST_F(RigLive, ARefinementShowsWhatWasMovedInStandby) {
   write_set();
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     press("standby");
     until_said("button standby: standby");
     press("move_right");
     until_said("card moved by +0.010");
     press("refine");
-    const Shown refined = until([](const Shown& s) { return s.shot.frozen; });
+    const Shown refined = until_frozen();
     EXPECT_TRUE(refined.shot.scene.objects.contains("card"));
   });
 }

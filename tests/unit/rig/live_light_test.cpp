@@ -2,7 +2,6 @@
 #include "daemon/rig/live_light.hpp"
 
 #include "daemon/rig/live_output.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"

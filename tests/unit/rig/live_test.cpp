@@ -6,12 +6,8 @@
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
-#include "daemon/post/render.hpp"
-#include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/wait_until.hpp"
 
 namespace previz::rig::live_test {
 
@@ -28,112 +24,65 @@ void expect_same(const render::Layers& a, const render::Layers& b) {
   EXPECT_TRUE(a.depth == b.depth);
 }
 
-// The log's lines on what was done, in order.
-std::vector<std::string> deeds(const std::string& log) {
-  std::vector<std::string> lines;
-  std::istringstream text(log);
-  for (std::string line; std::getline(text, line);)
-    for (const char* who : {"button ", "recorder: ", "recording: ", "rig: "})
-      if (line.starts_with(who)) lines.push_back(line);
-  return lines;
-}
-
 TEST_F(RigLive, ThroughEveryModeByButtons) {
   write_set();
   Shown refined, reviewed;
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     press("move_right");
     until([](const Shown& s) { return s.shot.scene.objects.contains("card"); });
     press("light_up");
     until([](const Shown& s) { return s.shot.scene.lights.contains("key"); });
     press("samples_up");
-    until([](const Shown& s) { return s.shot.samples == 3; });
+    until_samples(3);
     press("debug_view");
     until([](const Shown& s) { return s.look.view == render::View::mixed; });
     for (std::size_t i = 1; i < render::all_views.size(); ++i) press("debug_view");
     until([](const Shown& s) { return s.look.view == render::View::composite; });
 
-    press("record");
-    const Shown first = until([](const Shown& s) { return s.look.state.recording; });
+    const Shown first = begin_take();
     until([&](const Shown& s) {  // long enough for a press to fall into its review
       return s.shot.frame->timestamp_ns > first.shot.frame->timestamp_ns + 2'000'000'000 &&
              s.shot.samples == 3;
     });
     press("refine");  // what is frozen is in the take, which goes on
-    refined = until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 9; });
+    refined = until_frozen(9);
     EXPECT_TRUE(refined.look.state.recording);
     press("snapshot");
     until_mode(Mode::live);
     until_said("snapshot_0001");
-    press("record");
-    until_said("12A_take001 is finished");
+    end_take();
     press("mark_good");
     until_said("marked good");
 
     std::set<std::int64_t> in_take;
-    for (const session::TrackRecord& record :
-         session::open_session(directory_ / "takes/12A_take001").track)
+    for (const session::TrackRecord& record : session::open_session(take_folder()).track)
       in_take.insert(record.timestamp_ns);
-    const int before = until([](const Shown&) { return true; }).count;
+    const int before = shown_now().count;
     press("review");
     until([&](const Shown& s) {
       return s.count > before + 2 && s.look.state.mode == Mode::review && s.shot.samples == 3 &&
              in_take.contains(s.shot.frame->timestamp_ns);
     });
     press("refine");
-    reviewed = until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 6; });
+    reviewed = until_frozen(6);
     press("snapshot");
     until_mode(Mode::live);
     until_said("snapshot_0002");
     press("standby");
     until_said("button standby: standby");
     press("standby");
-    const int dark = until([](const Shown&) { return true; }).count;
-    until([&](const Shown& s) { return s.count > dark; });
+    until_more(0);
   });
 
-  const std::vector<std::string> transcript = {
-      "button move_right: card moved by +0.010 +0.000 +0.000 m",
-      "button light_up: key +0.33 stops",
-      "button samples_up: 3 samples",
-      "button debug_view: view: mixed",
-      "button debug_view: view: real",
-      "button debug_view: view: difference",
-      "button debug_view: view: mask",
-      "button debug_view: view: depth",
-      "button debug_view: view: normal",
-      "button debug_view: view: noise",
-      "button debug_view: view: composite",
-      "button record: recording",
-      "button refine: refine",
-      "button snapshot: live",
-      "button snapshot: snapshot",
-      "button record: recording ended",
-      "recorder: take 12A_take001 is finished",
-      "button mark_good: take marked good",
-      "button review: review",
-      "button refine: refine",
-      "button snapshot: live",
-      "button snapshot: snapshot",
-      "button standby: standby",
-      "button standby: live"};
-  std::vector<std::string> lines = deeds(log_.text());
-  std::erase_if(lines, [](const std::string& line) { return line.starts_with("recording: "); });
-  EXPECT_EQ(lines, transcript);
-
   // Every frame of the take is the camera's, in an unbroken row.
-  const std::filesystem::path take = directory_ / "takes/12A_take001";
+  const std::filesystem::path take = take_folder();
+  const std::vector<session::FrameRecord> records = test::unbroken(take);
   session::Session session = session::open_session(take);
-  EXPECT_TRUE(session.missing.empty());
   EXPECT_TRUE(session.info.take->good);
   const auto stream = session::open_stream(session, "observer");
-  const auto& records = stream->records();
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    EXPECT_EQ(records[i].sequence, records[0].sequence + i);
+  for (std::size_t i = 0; i < records.size(); ++i)
     EXPECT_EQ(stream->read(i)->bytes,
               test::small_take_frame(static_cast<int>(records[i].sequence % 8)).bytes);
-  }
   EXPECT_EQ(session.track.back().scene.objects.count("card"), 1u);
   EXPECT_TRUE(session.track.back().captured_light);
 
@@ -155,33 +104,28 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
 TEST_F(RigLive, ALiveRefinementIsWhatRenderMakesOfItsFrame) {
   write_set("[lighting]\nfrom = \"set\"\n");
   Shown refined;
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
-    press("record");
-    const Shown first = until([](const Shown& s) { return s.look.state.recording; });
+  run_rendering([&] {
+    const Shown first = begin_take();
     until([&](const Shown& s) {  // the frame that is frozen then was captured after the press
       return s.shot.frame->timestamp_ns > first.shot.frame->timestamp_ns + 1'000'000'000 &&
              s.shot.samples == 2;
     });
     press("refine");
-    refined = until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 6; });
+    refined = until_frozen(6);
     press("snapshot");
     until_said("snapshot_0001");
-    press("record");
-    until_said("12A_take001 is finished");
+    end_take();
   });
   const render::Layers live = output::read_exr(directory_ / "live/snapshot_0001.exr");
   EXPECT_GE(live.samples, refined.shot.samples);
   EXPECT_GT(std::ranges::max(live.mask), 0.0f);  // there is something to compare
-  expect_same(live, rendered(directory_ / "takes/12A_take001", refined.shot.frame->timestamp_ns,
-                             live.samples));
+  expect_same(live, rendered(take_folder(), refined.shot.frame->timestamp_ns, live.samples));
 }
 
 // Without a take nobody needs the poses and the light of the frames that come while one is refined.
 TEST_F(RigLive, TrackingAndLightEstimationRestInARefinement) {
   write_set();
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     press("refine");
     until_mode(Mode::refine);
     until_counted("frames not tracked in this mode");
@@ -192,12 +136,10 @@ TEST_F(RigLive, TrackingAndLightEstimationRestInARefinement) {
 // A take gets the pose and the light of every frame, whatever is shown.
 TEST_F(RigLive, TrackingDoesNotRestInATake) {
   write_set();
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
-    press("record");
-    until([](const Shown& s) { return s.look.state.recording; });
+  run_rendering([&] {
+    begin_take();
     press("refine");
-    const Shown begun = until([](const Shown& s) { return s.shot.frozen; });
+    const Shown begun = until_frozen();
     until([&](const Shown& s) { return s.shot.frozen && s.count > begun.count + 8; });
     press("live");
     until_mode(Mode::live);
@@ -211,10 +153,9 @@ TEST_F(RigLive, TrackingDoesNotRestInATake) {
 TEST_F(RigLive, ASnapshotIsOfTheRefinementThatItsPressEnded) {
   write_set("[[button]]\nname = \"snapshot\"\npress = \"double\"\naction = \"standby\"\n");
   Shown refined;
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     press("refine");
-    refined = until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 6; });
+    refined = until_frozen(6);
     press("snapshot");
     until_mode(Mode::live);
     until_said("snapshot_0001");
@@ -232,20 +173,19 @@ TEST_F(RigLive, AButtonThatIsNotThereIsToldOfAndHoldsUpNobody) {
   write_set("[[button]]\nname = \"gpio:absent:3\"\naction = \"record\"\n");
   run([&] {
     until_said("gpio:absent");
-    const int before = until([](const Shown& s) { return s.shot.samples == 2; }).count;
+    const int before = until_samples(2).count;
     press("samples_up");  // the others are heard
     until([&](const Shown& s) { return s.shot.samples == 3 && s.count > before; });
   });
-  EXPECT_FALSE(std::filesystem::exists(directory_ / "takes/12A_take001"));
+  EXPECT_FALSE(std::filesystem::exists(take_folder()));
 }
 
 // Captured = rendered + dropped by cause, whatever was done in between.
 TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
   write_set();
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     press("refine");
-    until([](const Shown& s) { return s.shot.frozen && s.shot.samples >= 4; });
+    until_frozen(4);
     press("standby");  // only ends the refinement
     until_mode(Mode::live);
     press("standby");
@@ -263,13 +203,11 @@ TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
 // A disk that does not take picture.png is reported, and no reason to stop.
 TEST_F(RigLive, GoesOnWhereItsFilesCannotBeWritten) {
   write_set();
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     std::filesystem::rename(directory_ / "live", directory_ / "gone");
     std::ofstream(directory_ / "live") << "a file where the directory was";
     until_said((directory_ / "live").string());
-    const int before = until([](const Shown&) { return true; }).count;
-    until([&](const Shown& s) { return s.count > before + 2; });
+    until_more(2);
     std::filesystem::remove(directory_ / "live");
     std::filesystem::create_directory(directory_ / "live");  // and it is written again
     test::must_come("there is a picture.png again",
@@ -281,24 +219,21 @@ TEST_F(RigLive, GoesOnWhereItsFilesCannotBeWritten) {
 TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
   write_set();
   const std::string good = session::read_file(directory_ / "set.toml");
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     std::ofstream(directory_ / "set.toml") << "[quality]\nsamples = none\n";
     press("reload_set");
     until_said("the old set stays in use");
     until_said("button reload_set: the old set stays in use: ");  // and so says the bus
-    const int before = until([](const Shown&) { return true; }).count;
-    until([&](const Shown& s) { return s.count > before + 2; });  // it goes on
-    std::string other = good;
-    other.replace(other.find("samples = 2"), 11, "samples = 4");
-    std::ofstream(directory_ / "set.toml") << other;
+    until_more(2);                                                // it goes on
+    std::ofstream(directory_ / "set.toml") << good;
+    replace_in_set("samples = 2", "samples = 4");
     press("reload_set");
-    until([](const Shown& s) { return s.shot.samples == 4; });
+    until_samples(4);
     std::ofstream(directory_ / "z.toml") << good;
     press("next_set");
-    until([](const Shown& s) { return s.shot.samples == 2; });
+    until_samples(2);
     press("previous_set");
-    until([](const Shown& s) { return s.shot.samples == 4; });
+    until_samples(4);
   });
   EXPECT_THAT(log_.text(), HasSubstr("set.toml:2:"));
 }
@@ -306,22 +241,16 @@ TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
 // A set that can be read and cannot be started is not started again and again.
 TEST_F(RigLive, ASetThatCannotStartIsTriedOnce) {
   write_set();
-  const std::string good = session::read_file(directory_ / "set.toml");
-  const auto other = [&](const std::string& from, const std::string& to) {
-    std::string text = good;
-    EXPECT_THAT(text, HasSubstr(from)) << good;
-    return text.replace(text.find(from), from.size(), to);
-  };
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
-    std::ofstream(directory_ / "set.toml")
-        << other("[observer]\n", "[observer]\nfaults = [\"nonsense\"]\n");
+  run_rendering([&] {
+    const std::string good =
+        replace_in_set("[observer]\n", "[observer]\nfaults = [\"nonsense\"]\n");
     until_said("back to the previous set");  // the rig saw the file by itself
     // What must not happen cannot be waited for: its next looks at the file, one a second.
     std::this_thread::sleep_for(std::chrono::seconds(4));
     EXPECT_EQ(count_said("back to"), 1) << log_.text();
-    std::ofstream(directory_ / "set.toml") << other("samples = 2", "samples = 4");
-    until([](const Shown& s) { return s.shot.samples == 4; });
+    std::ofstream(directory_ / "set.toml") << good;
+    replace_in_set("samples = 2", "samples = 4");
+    until_samples(4);
   });
 }
 
@@ -333,10 +262,8 @@ TEST_F(RigLive, AFolderOfTakesThatCannotBeWrittenIsReportedBeforeATakeNeedsIt) {
       (directory_ / "second/takes").string() + ": is not writable for takes: it is not a folder";
   run([&] {
     until_said(trouble);
-    press("record");
-    until([](const Shown& s) { return s.look.state.recording; });
-    press("record");
-    until_said("12A_take001 is finished");  // in the first folder
+    begin_take();
+    end_take();  // in the first folder
   });
   EXPECT_EQ(count_said("is not writable for takes"), 1) << log_.text();
 }
@@ -354,7 +281,7 @@ TEST_F(RigLive, ARecordedTakePressesItsButtonsAgain) {
     const int first = until([](const Shown& s) { return s.look.state.recording; }).count;
     until([&](const Shown& s) { return s.count > first + 8; });
   });
-  session::Session session = session::open_session(directory_ / "takes/12A_take001");
+  session::Session session = session::open_session(take_folder());
   EXPECT_TRUE(session.missing.empty());
   EXPECT_GT(session::open_stream(session, "observer")->records().size(), 0u);
 }
@@ -379,22 +306,20 @@ TEST_F(RigLive, RecordsOnAfterARestartUntilSomebodyEndsIt) {
     until_recorded(true);
     press("acknowledge");
     until_said("button acknowledge: noted");
-    press("record");
-    until_said("12A_take002 is finished");
+    end_take("12A_take002");
   });
-  EXPECT_TRUE(session::open_session(directory_ / "takes/12A_take001").missing.empty());
-  EXPECT_GT(session::open_session(directory_ / "takes/12A_take002").track.size(), 0u);
+  EXPECT_TRUE(session::open_session(take_folder()).missing.empty());
+  EXPECT_GT(session::open_session(take_folder("12A_take002")).track.size(), 0u);
   before = shown_.count;
   run([&] { until_recorded(false); });
-  EXPECT_FALSE(std::filesystem::exists(directory_ / "takes/12A_take003"));
+  EXPECT_FALSE(std::filesystem::exists(take_folder("12A_take003")));
 }
 
 // The threads that Mesa's driver for the processor draws in yield to those of the recorder.
 TEST_F(RigLive, WhatDrawsOnTheProcessorYieldsToTheRecording) {
   write_set();
   int drawing = 0, yielding = 0;
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
       std::string name;
       std::ifstream(task.path() / "comm") >> name;

@@ -24,11 +24,12 @@ std::vector<State> reachable() {
   return states;
 }
 
-// The table as a person would write it: where each event leads from standby, live, refine, review;
-// none: it stays where it is.
+// The table as a person would write it: where each event leads from standby, live, refine, review,
+// and what else it changes.
 struct Row {
   Event event;
   std::array<Mode, 4> to;
+  void (*changes)(State&) = [](State&) {};
 };
 constexpr Row table[] = {
     {Event::wish_standby, {standby, standby, standby, standby}},
@@ -39,15 +40,17 @@ constexpr Row table[] = {
     {Event::toggle_refine, {refine, refine, live, refine}},
     {Event::toggle_review, {review, review, review, live}},
     {Event::press, {standby, live, live, review}},
-    {Event::record_on, {live, live, refine, live}},
-    {Event::record_off, {standby, live, refine, review}},
-    {Event::record_toggle, {live, live, refine, live}},
-    {Event::recorder_failed, {standby, live, refine, review}},
-    {Event::take_finished, {standby, live, refine, review}},
+    {Event::record_on, {live, live, refine, live}, [](State& s) { s.recording = true; }},
+    {Event::record_off, {standby, live, refine, review}, [](State& s) { s.recording = false; }},
+    {Event::record_toggle, {live, live, refine, live}, [](State& s) { s.recording ^= true; }},
+    {Event::recorder_failed,
+     {standby, live, refine, review},
+     [](State& s) { s.recording = false; }},
+    {Event::take_finished, {standby, live, refine, review}, [](State& s) { s.has_take = true; }},
     {Event::review_ended, {standby, live, refine, live}},
-    {Event::good_frame, {standby, live, refine, review}},
-    {Event::camera_lost, {standby, live, refine, review}},
-    {Event::camera_back, {standby, live, refine, review}},
+    {Event::good_frame, {standby, live, refine, review}, [](State& s) { s.has_good = true; }},
+    {Event::camera_lost, {standby, live, refine, review}, [](State& s) { s.camera_lost = true; }},
+    {Event::camera_back, {standby, live, refine, review}, [](State& s) { s.camera_lost = false; }},
 };
 
 bool must_be_refused(const State& from, Mode to) {
@@ -74,32 +77,7 @@ TEST(Modes, EveryEventDoesWhatTheTableSaysInEveryState) {
       }
       State wanted = from;
       wanted.mode = to;
-      switch (row.event) {
-        case Event::record_on:
-          wanted.recording = true;
-          break;
-        case Event::record_off:
-        case Event::recorder_failed:
-          wanted.recording = false;
-          break;
-        case Event::record_toggle:
-          wanted.recording = !from.recording;
-          break;
-        case Event::take_finished:
-          wanted.has_take = true;
-          break;
-        case Event::good_frame:
-          wanted.has_good = true;
-          break;
-        case Event::camera_lost:
-          wanted.camera_lost = true;
-          break;
-        case Event::camera_back:
-          wanted.camera_lost = false;
-          break;
-        default:
-          break;
-      }
+      row.changes(wanted);
       EXPECT_EQ(taken.refused, nullptr);
       EXPECT_EQ(taken.state, wanted);
     }

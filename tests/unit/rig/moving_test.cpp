@@ -2,14 +2,10 @@
 // animated; found in pictures whose poses the test knows, shown, recorded, and rendered again.
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "daemon/post/render.hpp"
-#include "daemon/rig/live.hpp"
 #include "drivers/plate.hpp"
-#include "drivers/session/session.hpp"
-#include "tests/support/crewed_rig.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/lighting.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
@@ -101,7 +97,7 @@ std::string set_text(const std::string& more) {
   return text.str() + more;
 }
 
-class MovingTake : public ::testing::Test {
+class MovingTake : public test::RigLive {
  protected:
   void write_take(const std::string& more = "") {
     write_square(directory_ / "floor.gltf", 4, 0, false);
@@ -118,8 +114,9 @@ class MovingTake : public ::testing::Test {
   }
 
   // Frames as `previzd render` makes them.
-  std::vector<Shot> rendered(const std::filesystem::path& take, const std::filesystem::path& set,
-                             const std::optional<post::FrameRange>& range = {}) {
+  std::vector<Shot> rendered_shots(const std::filesystem::path& take,
+                                   const std::filesystem::path& set,
+                                   const std::optional<post::FrameRange>& range = {}) {
     post::RenderOptions options;
     options.session = take;
     options.set_file = set;
@@ -134,7 +131,6 @@ class MovingTake : public ::testing::Test {
     return shots;
   }
 
-  test::TemporaryDirectory directory_;
   std::ostringstream out_;
 };
 
@@ -180,7 +176,7 @@ double sigma(const session::CarrierState& carrier, int first) {
 // P20 by hand: the lamp lights the floor from where the stick holds it, in every frame.
 TEST_F(MovingTake, ALampOnAStickLightsFromWhereItIsHeld) {
   write_take("[quality]\nsamples = 2\n");
-  const std::vector<Shot> shots = rendered(directory_ / "session", directory_ / "set.toml");
+  const std::vector<Shot> shots = rendered_shots(directory_ / "session", directory_ / "set.toml");
   ASSERT_EQ(shots.size(), std::size_t{frames});
   for (const Shot& shot : shots) {
     ASSERT_TRUE(shot.track.pose) << shot.index << ": " << shot.track.reason;
@@ -205,9 +201,9 @@ TEST_F(MovingTake, ALampOnAStickLightsFromWhereItIsHeld) {
 TEST_F(MovingTake, ARangeKnowsWhatCameBeforeIt) {
   write_take("[quality]\nsamples = 1\n");
   const auto stick_of = [](const Shot& shot) { return shot.motion.carriers.at("stick"); };
-  const std::vector<Shot> whole = rendered(directory_ / "session", directory_ / "set.toml");
-  const std::vector<Shot> alone = rendered(directory_ / "session", directory_ / "set.toml",
-                                           post::FrameRange{without_stick, without_stick});
+  const std::vector<Shot> whole = rendered_shots(directory_ / "session", directory_ / "set.toml");
+  const std::vector<Shot> alone = rendered_shots(directory_ / "session", directory_ / "set.toml",
+                                                 post::FrameRange{without_stick, without_stick});
   ASSERT_EQ(alone.size(), 1u);
   EXPECT_EQ(stick_of(alone[0]), stick_of(whole.at(without_stick)));
 }
@@ -227,41 +223,24 @@ int most_codes_between(const Plate& a, const Plate& b) {
 TEST_F(MovingTake, IsRenderedAsItWasShown) {
   const std::string more =
       "[quality]\nsamples = 2\naccumulate = false\n[recording]\npreroll_s = 0\nslate = "
-      "\"1\"\nreserve_mb = 1\n"
+      "\"12A\"\nreserve_mb = 1\n"
       "[[object]]\nname = \"card\"\nfile = \"card.gltf\"\npresence = \"virtual\"\n"
       "position_m = [-0.1, 0, 0]\nanimation = \"sway\"\n"
-      "[[button]]\nname = \"red\"\naction = \"record\"\n"
+      "[[button]]\nname = \"record\"\naction = \"record\"\n"
       "[tracking]\nsmooth = false\n";
   write_take(more);
-  std::ofstream events(directory_ / "session/events.jsonl");
-  for (const auto& [ms, pushed] : {std::pair(10, "true"), {15, "false"}})
-    events << "{\"timestamp_ns\":" << start_ns + ms * 1'000'000
-           << ",\"button\":\"red\",\"pressed\":" << pushed << "}\n";
-  events.close();
-
-  std::mutex mutex;
-  std::condition_variable changed;
   std::map<std::int64_t, Shot> shown;
-  int shown_in_take = 0;
-  rig::LiveOptions options;
-  options.on_shown = [&](const Shot& shot, const rig::Look& look) {
-    const std::lock_guard lock(mutex);
-    if (shot.untouched.empty()) shown[shot.frame->timestamp_ns] = shot;
-    shown_in_take += look.state.recording ? 1 : 0;
-    changed.notify_all();
+  while_shown_ = [&] {
+    const std::lock_guard lock(mutex_);
+    if (shown_.shot.untouched.empty()) shown[shown_.shot.frame->timestamp_ns] = shown_.shot;
   };
-  const auto crew = [&] {
-    std::unique_lock lock(mutex);
-    test::await(
-        changed, lock, [&] { return shown_in_take > 8; },
-        [&] { return std::to_string(shown_in_take) + " pictures in the take"; });
-  };
-  test::Hand nobody;
-  test::run_crewed(std::move(options), directory_.path(), nobody, crew, out_);
+  run([&] {
+    begin_take();
+    until_more(8);
+  });
 
-  std::string text = set_text(more);
-  std::ofstream(directory_ / "as_recorded.toml") << text + "enabled = false\n";
-  session::Session take = session::open_session(directory_ / "takes/1_take001");
+  std::ofstream(directory_ / "as_recorded.toml") << set_text(more) + "enabled = false\n";
+  session::Session take = session::open_session(take_folder());
   const auto stream = session::open_stream(take, "observer");
   const auto& records = stream->records();
   int compared = 0;
@@ -270,7 +249,8 @@ TEST_F(MovingTake, IsRenderedAsItWasShown) {
     const auto was = shown.find(records[i].timestamp_ns);
     if (was == shown.end()) continue;
     const Shot again =
-        rendered(take.directory, directory_ / "as_recorded.toml", post::FrameRange{i, i}).at(0);
+        rendered_shots(take.directory, directory_ / "as_recorded.toml", post::FrameRange{i, i})
+            .at(0);
     EXPECT_EQ(again.scene, was->second.scene);
     EXPECT_EQ(again.motion.carriers, was->second.motion.carriers);
     EXPECT_LE(most_codes_between(*again.picture, *was->second.picture), 1) << i;

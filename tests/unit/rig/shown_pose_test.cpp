@@ -1,10 +1,8 @@
 // A hand over the tags while the rig runs: the picture stays as it is, the take and a refinement
 // know nothing of it.
-#include "drivers/session/session.hpp"
-#include "tests/support/crewed_rig.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/lighting.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
@@ -47,8 +45,15 @@ void write_floor(const std::filesystem::path& file) {
   gltf.save(file);
 }
 
-class ShownPose : public ::testing::Test {
+class ShownPose : public test::RigLive {
  protected:
+  ShownPose() {
+    while_shown_ = [this] {
+      const std::lock_guard lock(mutex_);
+      shots_.push_back(shown_.shot);
+    };
+  }
+
   void write_set(const std::string& tracking) {
     std::ostringstream text;
     text << "[observer]\ndriver = \"replay\"\ndevice = \"session\"\n"
@@ -56,7 +61,7 @@ class ShownPose : public ::testing::Test {
             "[[object]]\nname = \"floor\"\nfile = \"floor.gltf\"\npresence = \"phantom\"\n"
             "[[light]]\nname = \"lamp\"\ntype = \"point\"\nemission = [1, 1, 1]\n"
             "position_m = [0, 0, 1]\n[quality]\nsamples = 1\n[recording]\npreroll_s = 0\n"
-            "slate = \"1\"\nreserve_mb = 1\ndirectory = \"takes\"\n"
+            "slate = \"12A\"\nreserve_mb = 1\ndirectory = \"takes\"\n"
             "[[button]]\nname = \"record\"\naction = \"record\"\n"
             "[[button]]\nname = \"refine\"\naction = \"refine\"\n"
          << "[tracking]\n"
@@ -78,65 +83,39 @@ class ShownPose : public ::testing::Test {
     writer.close();
   }
 
-  void run(const std::function<void()>& crew) {
-    LiveOptions options;
-    options.on_shown = [&](const Shot& shot, const Look& look) {
-      const std::lock_guard lock(mutex_);
-      shown_.push_back(shot);
-      recording_ = look.state.recording;
-      news_.notify_all();
-    };
-    test::run_crewed(std::move(options), directory_.path(), hand_, crew, out_);
-  }
-
-  // Waits for a picture that comes after this call.
-  Shot until(const std::function<bool(const Shot&)>& condition) {
-    std::unique_lock lock(mutex_);
-    const std::size_t from = shown_.size();
-    std::size_t at = from;
-    test::await(
-        news_, lock,
-        [&] {
-          while (at < shown_.size() && !condition(shown_[at])) ++at;
-          return at < shown_.size();
-        },
-        [&] { return std::to_string(shown_.size()) + " pictures\n" + out_.str(); });
-    return shown_[at];
-  }
-
-  test::TemporaryDirectory directory_;
-  test::Hand hand_;
-  std::ostringstream out_;
-  std::mutex mutex_;
-  std::condition_variable news_;
-  std::vector<Shot> shown_;
-  bool recording_ = false;
+  std::vector<Shot> shots_;  // all that were shown
 };
 
 bool is_held(const Shot& shot) {
   return shot.shown_pose && shot.shown_pose->held_s > 0;
 }
 
+bool is_tracked(const Shot& shot) {
+  return shot.track.pose.has_value();
+}
+
 TEST_F(ShownPose, AHandOverTheTagsDoesNotBlink) {
   write_set("hold_s = 3\nhold_error = 0.1\n");  // on a machine of any speed
   Shot refined;
   run([&] {
-    until([](const Shot& shot) { return shot.shown_pose && shot.track.pose; });
-    hand_.press("record");
-    until([&](const Shot& shot) { return recording_ && is_held(shot); });
-    until([&](const Shot& shot) { return recording_ && is_held(shot); });
-    hand_.press("record");
-    until([&](const Shot&) { return !recording_; });
-    until(is_held);
-    hand_.press("refine");
-    refined = until([](const Shot& shot) { return shot.frozen; });
+    until([](const Shown& s) { return s.shot.shown_pose && is_tracked(s.shot); });
+    begin_take();
+    const auto is_held_in_take = [](const Shown& s) {
+      return s.look.state.recording && is_held(s.shot);
+    };
+    const int first = until(is_held_in_take).count;
+    until([&](const Shown& s) { return s.count > first && is_held_in_take(s); });
+    press("record");
+    until([](const Shown& s) { return !s.look.state.recording && is_held(s.shot); });
+    press("refine");
+    refined = until_frozen().shot;
   });
 
   // Once there was a pose, no picture went back to the plate.
   bool began = false;
   int held = 0;
   std::map<std::int64_t, bool> tracked;
-  for (const Shot& shot : shown_) {
+  for (const Shot& shot : shots_) {
     began |= shot.untouched.empty();
     if (began) {
       EXPECT_EQ(shot.untouched, "");
@@ -153,7 +132,7 @@ TEST_F(ShownPose, AHandOverTheTagsDoesNotBlink) {
   EXPECT_GE(held, 3);
 
   // The take says that these frames were lost.
-  const session::Session take = session::open_session(directory_ / "takes/1_take001");
+  const session::Session take = session::open_session(take_folder());
   int lost = 0;
   for (const session::TrackRecord& record : take.track) {
     lost += !record.tracked;
@@ -173,11 +152,11 @@ TEST_F(ShownPose, AHandOverTheTagsDoesNotBlink) {
 TEST_F(ShownPose, OffShowsPosesAsTheyAreFound) {
   write_set("smooth = false\nhold_s = 0\n");
   run([&] {
-    until([](const Shot& shot) { return shot.track.pose.has_value(); });
-    until([](const Shot& shot) { return !shot.track.pose; });
-    until([](const Shot& shot) { return shot.track.pose.has_value(); });
+    until([](const Shown& s) { return is_tracked(s.shot); });
+    until([](const Shown& s) { return !is_tracked(s.shot); });
+    until([](const Shown& s) { return is_tracked(s.shot); });
   });
-  for (const Shot& shot : shown_) {
+  for (const Shot& shot : shots_) {
     EXPECT_FALSE(shot.shown_pose);
     EXPECT_EQ(shot.untouched.empty(), shot.track.pose.has_value());
   }

@@ -2,7 +2,6 @@
 #include "daemon/rig/snapshots.hpp"
 
 #include "daemon/rig/live_files.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 

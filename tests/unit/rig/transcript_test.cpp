@@ -1,26 +1,17 @@
 // The rig from end to end by a transcript: a replayed take is looped, a hand presses the button of
 // every action there is, and each line says what D-Bus signalled and what the crew then read on the
 // display. Afterwards the take has the same story.
-#include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <systemd/sd-bus.h>
 
 #include "daemon/control/bus.hpp"
-#include "daemon/rig/live.hpp"
-#include "daemon/set/actions.hpp"
-#include "drivers/plate.hpp"
-#include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
-#include "tests/support/crewed_rig.hpp"
+#include "tests/support/live_rig.hpp"
+#include "tests/support/pages.hpp"
 #include "tests/support/private_bus.hpp"
-#include "tests/support/small_take.hpp"
-#include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::rig::transcript_test {
 
 using output::OsdPage;
-using output::OsdText;
 
 // The overlay is switched off: a page without a word.
 constexpr const char* no_words = "(no words)";
@@ -163,28 +154,15 @@ class Listener {
   std::jthread thread_;
 };
 
-std::vector<std::string> words_on(const OsdPage& page) {
-  std::vector<std::string> words;
-  for (const auto* texts :
-       {&page.top_left, &page.top_right, &page.bottom_left, &page.bottom_right, &page.notices})
-    for (const OsdText& text : *texts) words.push_back(text.text);
-  return words;
-}
-
-class RigTranscript : public testing::Test {
+class RigTranscript : public test::RigLive {
  protected:
   void SetUp() override {
     if (!bus_.running()) GTEST_SKIP() << "dbus-daemon is not installed";
-    std::string text =
+    write_set(
+        "[display]\ndriver = \"headless\"\nmode = \"480x270\"\n"
         "[[object]]\nname = \"sign\"\nfile = \"card.gltf\"\npresence = \"virtual\"\n"
-        "[[light]]\nname = \"key\"\ntype = \"point\"\nposition_m = [0.3, 0, 0.6]\n"
-        "emission = [1, 1, 1]\n"
         "[[light]]\nname = \"fill\"\ntype = \"point\"\nposition_m = [-0.3, 0, 0.6]\n"
-        "emission = [1, 1, 1]\n"
-        "[recording]\nslate = \"12A\"\nreserve_mb = 1\ndirectory = \"takes\"\n"
-        "[display]\ndriver = \"headless\"\nmode = \"480x270\"\n";
-    text += test::button_for_every_action();
-    test::write_small_take(directory_.path(), true, text);
+        "emission = [1, 1, 1]\n");
     std::filesystem::copy_file(directory_ / "set.toml", directory_ / "z.toml");
   }
 
@@ -197,17 +175,11 @@ class RigTranscript : public testing::Test {
       remember_take(changes);
       if (changes.empty()) return;
       signals_.push_back(std::move(changes));
-      news_.notify_all();
+      seen_.notify_all();
     });
-    LiveOptions options;
-    options.bus = true;
-    options.on_screen = [this](const Plate&, const OsdPage& page) {
-      const std::lock_guard lock(mutex_);
-      pages_.push_back(page);
-      news_.notify_all();
-    };
-    test::run_crewed(
-        std::move(options), directory_.path(), hand_, [this] { follow(); }, log_);
+    options_.bus = true;
+    options_.on_screen = [this](const Plate&, const OsdPage& page) { pages_.show(page); };
+    run([this] { follow(); });
   }
 
   // Which signal says what of the take depends on how far the recorder's thread is: it is no part
@@ -222,7 +194,7 @@ class RigTranscript : public testing::Test {
   }
 
   void follow() {
-    next_page_with("2 samples");  // it runs
+    pages_.until_words("2 samples");  // it runs
     for (const Line& line : transcript) {
       SCOPED_TRACE(line.message);
       if (line.button) press(line.button);
@@ -243,47 +215,29 @@ class RigTranscript : public testing::Test {
 
   // The pages before it are of no interest any more.
   void press(const std::string& button) {
-    const std::lock_guard lock(mutex_);
-    pages_.clear();
+    pages_.skip();
     hand_.press(button);
   }
   Changes next_signal() {
     std::unique_lock lock(mutex_);
     test::await(
-        news_, lock, [&] { return !signals_.empty(); }, [] { return std::string("no signal"); });
+        seen_, lock, [&] { return !signals_.empty(); }, [] { return std::string("no signal"); });
     Changes changes = signals_.front();
     signals_.pop_front();
     return changes;
   }
   void next_page_with(const std::string& words) {
     if (words == dark) return;
-    std::unique_lock lock(mutex_);
-    std::string last;
-    const auto found = [&] {
-      while (!pages_.empty()) {
-        const std::vector<std::string> page = words_on(pages_.front());
-        last = fmt::format("{}", fmt::join(page, " | "));
-        if (words == no_words ? page.empty()
-                              : std::ranges::any_of(page, [&](const std::string& text) {
-                                  return text.find(words) != text.npos;
-                                }))
-          return true;
-        pages_.pop_front();
-      }
-      return false;
-    };
-    test::await(news_, lock, found, [&] { return "\"" + words + "\" is not in: " + last; });
+    if (words == no_words)
+      pages_.until([](const OsdPage& page) { return page == OsdPage{}; });
+    else
+      pages_.until_words(words);
   }
 
   test::PrivateBus bus_;
-  test::TemporaryDirectory directory_;
-  test::Hand hand_;
-  std::mutex mutex_;
-  std::condition_variable news_;
-  std::deque<OsdPage> pages_;
+  test::Pages pages_;
   std::deque<Changes> signals_;
   std::map<std::string, std::vector<std::string>> take_;  // of its properties what was signalled
-  std::ostringstream log_;
 };
 
 TEST_F(RigTranscript, EveryActionIsSignalledShownAndRecorded) {
@@ -298,7 +252,7 @@ TEST_F(RigTranscript, EveryActionIsSignalledShownAndRecorded) {
   EXPECT_TRUE(signals_.empty());
 
   // The take tells the same, from its first word to its last.
-  session::Session take = session::open_session(directory_ / "takes/12A_take001");
+  session::Session take = session::open_session(take_folder());
   std::erase(take_["Take"], "");  // of the sets that were read afterwards, which have none yet
   std::erase(take_["TakeFrames"], "0");
   EXPECT_EQ(take_["Take"], std::vector<std::string>{"12A_take001"});

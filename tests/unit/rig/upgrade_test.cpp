@@ -28,14 +28,7 @@ TEST(Upgrade, WaitsForTheEndOfTheTake) {
   std::ostringstream out;
   report::Reports reports(report::lines_to(out));
   LiveOptions options;
-  options.set_file = directory / "set.toml";
   options.loop = options.bus = true;
-  options.stop = stop.get_token();
-  options.buttons = [&] {
-    std::vector<std::unique_ptr<Buttons>> buttons;
-    buttons.push_back(std::make_unique<test::Hand::Device>(hand));
-    return buttons;
-  };
   options.on_shown = [&](const pipeline::Shot&, const Look& look) {
     ++shown;
     if (look.state.recording) ++recorded;
@@ -61,7 +54,7 @@ TEST(Upgrade, WaitsForTheEndOfTheTake) {
     EXPECT_TRUE(test::wait_until("the rig has ended", [&] { return ended.load(); }));
     stop.request_stop();
   });
-  run_live(options, reports);
+  run_live(test::with_hand(options, directory.path(), hand, stop), reports);
   ended = true;
   EXPECT_FALSE(stop.stop_requested()) << "the rig was stopped by the test";
   EXPECT_THAT(out.str(), HasSubstr("another version was installed"));

@@ -1,13 +1,5 @@
 // What systemd hears of the rig: its watchdog is fed by threads that are live, not by frames.
-#include <poll.h>
-#include <sys/socket.h>
-#include <sys/stat.h>
-#include <sys/un.h>
-
-#include "daemon/rig/live.hpp"
 #include "daemon/rig/service.hpp"
-#include "drivers/descriptor.hpp"
-#include "drivers/session/files.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/notify_socket.hpp"
 #include "tests/support/other_camera.hpp"
@@ -59,14 +51,12 @@ TEST_F(RigLive, TheWatchdogIsFedWhileTheCameraIsSilent) {
       return NoFrame{};
     });
   };
-  run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2; });
+  run_rendering([&] {
     is_silent = true;
     systemd.skip();
     EXPECT_GE(systemd.fed_within(while_fed), often);
     is_silent = false;
-    const int before = until([](const Shown&) { return true; }).count;
-    until([&](const Shown& s) { return s.count > before; });
+    until_more(0);
   });
 }
 
@@ -155,15 +145,7 @@ TEST_F(RigLive, AStopThatComesWithASetThatWasReadOpensNoDevicesForIt) {
   NotifySocket systemd(directory_ / "notify");
   std::stop_source stop;
   int opened = 0;
-  options_.set_file = directory_ / "set.toml";
-  options_.directory = directory_ / "live";
   options_.loop = true;
-  options_.stop = stop.get_token();
-  options_.buttons = [&] {
-    std::vector<std::unique_ptr<Buttons>> buttons;
-    buttons.push_back(std::make_unique<test::Hand::Device>(hand_));
-    return buttons;
-  };
   options_.around_cameras = [&](Cameras& cameras) {
     ++opened;
     cameras.observer = std::make_unique<StoppingCamera>(std::move(cameras.observer), stop);
@@ -171,7 +153,7 @@ TEST_F(RigLive, AStopThatComesWithASetThatWasReadOpensNoDevicesForIt) {
   press("reload_set");
   std::ostream out(&log_);
   report::Reports reports(report::lines_to(out));
-  run_live(options_, reports);
+  run_live(test::with_hand(options_, directory_.path(), hand_, stop), reports);
   EXPECT_EQ(opened, 1) << log_.text();
   systemd.until("STOPPING=1");
 }
