@@ -45,4 +45,20 @@ std::vector<Held> careful_capture() {
   return how;
 }
 
+void record(const std::filesystem::path& session, const session::SessionInfo& info,
+            const std::string& source, const std::vector<calibrate::BracketPicture>& pictures) {
+  session::SessionWriter writer(session, info);
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    Frame frame;
+    frame.source = source;
+    frame.sequence = i;
+    frame.timestamp_ns = frame.arrival_ns = std::int64_t(i) * 40'000'000;
+    frame.exposure = frame.exposure_s = pictures[i].exposure;
+    frame.width = pictures[i].width;
+    frame.height = pictures[i].height;
+    frame.bytes = pictures[i].rgb;
+    writer.write(frame);
+  }
+}
+
 }  // namespace previz::test

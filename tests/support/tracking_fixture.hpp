@@ -36,10 +36,15 @@ inline set::Tracking settings_for(const TagScene& scene) {
 
 inline Frame picture(const TagScene& scene, std::mt19937& random, double full_well_e = 20000,
                      PixelFormat format = PixelFormat::rgb8) {
-  test::Sensor sensor;
-  sensor.full_well_e = full_well_e;
-  sensor.format = format;
-  return test::expose(test::render(scene), sensor, random);
+  return test::expose(test::render(scene),
+                      {.full_well_e = full_well_e, .response = {}, .format = format}, random);
+}
+
+// What a new tracker finds in one picture of what is `seen`.
+inline Track track_once(const set::Tracking& settings, const TagScene& seen, unsigned seed,
+                        PixelFormat format = PixelFormat::rgb8) {
+  std::mt19937 random(seed);
+  return make_apriltag_tracker(settings, seen.lens)->track(picture(seen, random, 20000, format));
 }
 
 inline double angle_between(const glm::dmat4& a, const glm::dmat4& b) {

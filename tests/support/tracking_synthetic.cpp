@@ -201,6 +201,16 @@ Frame expose(const LinearPicture& picture, const Sensor& sensor, std::mt19937& r
   return frame;
 }
 
+Frame gray_frame(int width, int height, std::vector<std::uint8_t> bytes) {
+  Frame frame;
+  frame.format = PixelFormat::gray8;
+  frame.width = width;
+  frame.height = height;
+  frame.bytes = std::move(bytes);
+  frame.bytes.resize(frame_bytes(frame.format, width, height));
+  return frame;
+}
+
 std::array<glm::dvec2, 4> exact_corners(const TagScene& scene, const set::Tag& tag) {
   std::array<glm::dvec2, 4> corners;
   const double h = tag.size_m / 2;
@@ -219,22 +229,12 @@ glm::dmat4 camera_looking(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up) {
 }
 
 set::Tag flat_tag(int id, double size_m, glm::dvec3 centre, double turn_rad) {
-  set::Tag tag;
-  tag.id = id;
-  tag.size_m = size_m;
-  tag.world_from_tag =
-      glm::rotate(glm::translate(glm::dmat4(1.0), centre), turn_rad, glm::dvec3(0, 0, 1));
-  return tag;
+  return {id, size_m,
+          glm::rotate(glm::translate(glm::dmat4(1.0), centre), turn_rad, glm::dvec3(0, 0, 1))};
 }
 
 PinholeIntrinsics plain_lens(int width, int height, double focal_px) {
-  PinholeIntrinsics lens;
-  lens.width = width;
-  lens.height = height;
-  lens.fx = lens.fy = focal_px;
-  lens.cx = (width - 1) / 2.0;
-  lens.cy = (height - 1) / 2.0;
-  return lens;
+  return {width, height, focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0};
 }
 
 }  // namespace previz::test

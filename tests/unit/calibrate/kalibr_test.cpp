@@ -12,6 +12,7 @@
 #include "daemon/calibrate/lens/views.hpp"
 #include "daemon/tracking/photometry.hpp"
 #include "tests/support/test.hpp"
+#include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::calibrate::kalibr_test {
 
@@ -86,12 +87,7 @@ glm::dvec2 pixel_of(const glm::dvec3& point, const Held& held) {
 }
 
 Frame frame_of(const cv::Mat1b& picture) {
-  Frame frame;
-  frame.format = PixelFormat::gray8;
-  frame.width = picture.cols;
-  frame.height = picture.rows;
-  frame.bytes.assign(picture.datastart, picture.dataend);
-  return frame;
+  return test::gray_frame(picture.cols, picture.rows, {picture.datastart, picture.dataend});
 }
 
 // Returns the board as a camera with the sRGB curve sees it: 4x4 samples per pixel, the light
@@ -156,7 +152,7 @@ void look(BoardFinder& finder, const Frame& frame, const Held& held, Seen& seen)
   if (!view.points.empty()) seen.views.views.push_back(std::move(view));
 }
 
-class KalibrsAprilgrid : public ::testing::TestWithParam<Form> {};
+class KalibrsAprilgrid : public testing::TestWithParam<Form> {};
 
 // 0.3 px, 0.2 % and nine tags in ten are the promised bounds. A corner is measured to 0.1 px or
 // better, and a view of 36 tags then gives the focal length to about 0.1 %: four views suffice.
@@ -213,9 +209,7 @@ Frame kept_picture(int i) {
 // The pictures' values are linear in light, which a folder of pictures does not say: they are read
 // by the sRGB curve as well.
 TEST(KeptKalibrBoard, CornersAreFound) {
-  for (const auto kind : {ResponseCurve::Kind::linear, ResponseCurve::Kind::srgb}) {
-    ResponseCurve response;
-    response.kind = kind;
+  for (const ResponseCurve& response : {test::linear_response, ResponseCurve{}}) {
     const auto finder = make_board_finder(parse_board(board_text), response);
     for (int i = 0; i < 3; ++i) {
       Seen seen;
@@ -232,10 +226,8 @@ TEST(KeptKalibrBoard, CornersAreFound) {
 TEST(KeptKalibrBoard, CornersAreFoundInAMosaic) {
   Frame mosaic = kept_picture(1);
   mosaic.bayer = BayerPattern::rggb;
-  ResponseCurve response;
-  response.kind = ResponseCurve::Kind::linear;
   Seen seen;
-  look(*make_board_finder(parse_board(board_text), response), mosaic, poses[1], seen);
+  look(*make_board_finder(parse_board(board_text), test::linear_response), mosaic, poses[1], seen);
   EXPECT_EQ(seen.corners, 144u);
   EXPECT_LT(seen.largest_px, 0.3);
   std::printf("mosaic: largest %.3f px\n", seen.largest_px);

@@ -6,7 +6,6 @@
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "daemon/set/set.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/tag_walks.hpp"
 #include "tests/support/test.hpp"
@@ -139,9 +138,8 @@ TEST(TagLens, IsWrittenIntoItsTableAlone) {
 }
 
 std::string refusal(const std::string& table) {
-  PinholeIntrinsics lens = test::plain_lens(640, 480, 600);
   ObserverCalibration camera;
-  camera.intrinsics = lens;
+  camera.intrinsics = test::plain_lens(640, 480, 600);
   return test::error_of(
       [&] { set::parse_set(set::intrinsics_toml(camera) + table, "stage.toml"); });
 }

@@ -1,7 +1,4 @@
 // Videos of others: what their tags say of colour.
-#include <opencv2/imgproc.hpp>
-
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
@@ -11,7 +8,6 @@ namespace previz::exchange::import_video_color_test {
 
 using Rgb = std::array<double, 3>;
 using Matrix = std::array<Rgb, 3>;
-using Bytes = std::vector<std::uint8_t>;
 
 Rgb operator*(const Matrix& m, const Rgb& v) {
   Rgb product{};
@@ -226,10 +222,8 @@ Rgb pixel(const Frame& frame, int x, int y) {
 // half of its chroma's up to 1.8556 times as much; what is decoded with other curves has 10 bits.
 TEST_P(ImportVideoColors, ComeInAsTheTagsSay) {
   const ColorForm& form = GetParam();
-  VideoForm video;
-  video.encoder = form.encoder;
-  video.pixel_format = form.pixel_format;
-  video.width = video.height = side;
+  VideoForm video = {
+      .pixel_format = form.pixel_format, .width = side, .height = side, .encoder = form.encoder};
   if (video.encoder == "libx264") video.options = {{"qp", "0"}};
   if (video.encoder == "libx265")
     video.options = {{"x265-params", "lossless=1:log-level=none:pools=none:bframes=0"}};
@@ -242,12 +236,11 @@ TEST_P(ImportVideoColors, ComeInAsTheTagsSay) {
   }
   Shoot shoot;
   const std::string file = video.encoder == "libx265" ? "take.mp4" : "take.mkv";
-  write_video(shoot.folder() / file, video, {frame_of(form)});
-  shoot.json["observer"] = {{"video", file}, {"fps", 25}, {"exposure", 1}};
+  shoot.film(file, video, {frame_of(form)});
   const ImportReport report = shoot.import();
   EXPECT_EQ(report.notes.at(0).find("(assumed)") == std::string::npos, form.tagged)
       << report.notes.at(0);
-  const FramePtr frame = shoot.open_observer()->read(0);
+  const FramePtr frame = shoot.open()->read(0);
   for (std::size_t i = 0; i < 4; ++i) {
     const Rgb is = pixel(*frame, i % 2 ? 48 : 16, i / 2 ? 48 : 16);
     const Rgb signal = signals_of(form)[i];
@@ -317,18 +310,17 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(ImportVideo, PrimariesOfSmallDifferenceAreConvertedToo) {
   for (const AVColorPrimaries primaries : {pri525, pri625, p3}) {
     ColorForm form{"", "ffv1", "gbrp16le", 16, true, no_matrix, trc_srgb, primaries, true, 1, 1};
-    VideoForm video;
-    video.pixel_format = form.pixel_format;
-    video.width = video.height = side;
-    video.matrix = no_matrix;
-    video.range = AVCOL_RANGE_JPEG;
-    video.transfer = trc_srgb;
-    video.primaries = primaries;
+    const VideoForm video = {.pixel_format = form.pixel_format,
+                             .width = side,
+                             .height = side,
+                             .range = AVCOL_RANGE_JPEG,
+                             .matrix = no_matrix,
+                             .transfer = trc_srgb,
+                             .primaries = primaries};
     Shoot shoot;
-    write_video(shoot.folder() / "take.mkv", video, {frame_of(form)});
-    shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
+    shoot.film("take.mkv", video, {frame_of(form)});
     ASSERT_EQ(shoot.error(), "");
-    const FramePtr frame = shoot.open_observer()->read(0);
+    const FramePtr frame = shoot.open()->read(0);
     for (std::size_t i = 0; i < 4; ++i)
       for (std::size_t c = 0; c < 3; ++c)
         // The published matrices have four digits.

@@ -1,12 +1,9 @@
 #include <ImfChannelList.h>
-#include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
-#include <half.h>
 
 #include "daemon/lighting/exr_picture.hpp"
 #include "daemon/lighting/lighting.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -129,20 +126,15 @@ TEST(LoadEnvironment, SeesTheLayoutFromInside) {
     settings.environment_rotation_rad = turn_deg * pi / 180;
     settings.environment_gain = 2;
     const EnvironmentMap map = load_environment(settings).environment;
-    for (int j = 0; j < map.size; ++j) {
-      for (int i = 0; i < map.size; ++i) {
-        const glm::dvec3 d(texel_direction(map.size, i, j));
-        const double c = std::cos(-turn_deg * pi / 180), s = std::sin(-turn_deg * pi / 180);
-        const glm::dvec3 unturned(c * d.x - s * d.y, s * d.x + c * d.y, d.z);
-        // Slopes are 1/2: a texel's mean and a pixel's chord are off by their squared size, next to
-        // a pole by a pixel, where azimuth is lost.
-        const double limit = std::abs(d.z) > 0.999 ? 0.03 : 0.002;
-        ASSERT_LT(glm::length(glm::dvec3(map.radiance[static_cast<std::size_t>(j * map.size + i)]) -
-                              2.0 * (0.5 * unturned + 0.5)),
-                  limit)
-            << i << " " << j;
-      }
-    }
+    const double c = std::cos(-turn_deg * pi / 180), s = std::sin(-turn_deg * pi / 180);
+    for_each_texel(map, [&](const glm::dvec3& d, const glm::dvec3& radiance) {
+      const glm::dvec3 unturned(c * d.x - s * d.y, s * d.x + c * d.y, d.z);
+      // Slopes are 1/2: a texel's mean and a pixel's chord are off by their squared size, next to
+      // a pole by a pixel, where azimuth is lost.
+      const double limit = std::abs(d.z) > 0.999 ? 0.03 : 0.002;
+      ASSERT_LT(glm::length(radiance - 2.0 * (0.5 * unturned + 0.5)), limit)
+          << d.x << " " << d.y << " " << d.z;
+    });
     // The picture for people is the same way around.
     if (turn_deg == 0) {
       const LinearPicture shown = to_latitude_longitude(map, 256);
@@ -152,45 +144,25 @@ TEST(LoadEnvironment, SeesTheLayoutFromInside) {
   }
 }
 
-struct NamedChannel {
-  const char* name;
-  float value;
-  Imf::PixelType type = Imf::HALF;
-};
+// A channel of one value.
+ExrChannel channel(const char* name, float value, bool is_half = true) {
+  return {name, std::vector<float>(64 * 32, value), is_half};
+}
 
-void write_channels(const std::filesystem::path& file, const std::vector<NamedChannel>& channels) {
-  constexpr int width = 64, height = 32;
-  Imf::Header header(width, height);
-  Imf::FrameBuffer buffer;
-  std::vector<std::vector<float>> floats(channels.size());
-  std::vector<std::vector<half>> halves(channels.size());
-  for (std::size_t c = 0; c < channels.size(); ++c) {
-    header.channels().insert(channels[c].name, Imf::Channel(channels[c].type));
-    if (channels[c].type == Imf::HALF) {
-      halves[c].assign(width * height, half(channels[c].value));
-      buffer.insert(channels[c].name,
-                    Imf::Slice(Imf::HALF, reinterpret_cast<char*>(halves[c].data()), sizeof(half),
-                               sizeof(half) * width));
-    } else {
-      floats[c].assign(width * height, channels[c].value);
-      buffer.insert(channels[c].name,
-                    Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(floats[c].data()), sizeof(float),
-                               sizeof(float) * width));
-    }
-  }
-  Imf::OutputFile output(file.c_str(), header);
-  output.setFrameBuffer(buffer);
-  output.writePixels(height);
+void write_channels(const std::filesystem::path& file, const std::vector<ExrChannel>& channels) {
+  write_exr_channels(file, 64, 32, channels);
 }
 
 TEST(LoadEnvironment, ReadsTheUsualChannels) {
   const previz::test::TemporaryDirectory directory;
-  const std::vector<std::pair<std::vector<NamedChannel>, glm::vec3>> files{
-      {{{"R", 1}, {"G", 2}, {"B", 4}}, {1, 2, 4}},
-      {{{"A", 1}, {"B", 4}, {"G", 2}, {"R", 1}}, {1, 2, 4}},
-      {{{"Z", 9, Imf::FLOAT}, {"R", 1, Imf::FLOAT}, {"G", 2}, {"B", 4, Imf::FLOAT}}, {1, 2, 4}},
-      {{{"Y", 3}}, {3, 3, 3}},
-      {{{"Y", 3}, {"A", 1}}, {3, 3, 3}}};
+  const ExrChannel r = channel("R", 1), g = channel("G", 2), b = channel("B", 4),
+                   y = channel("Y", 3), a = channel("A", 1);
+  const std::vector<std::pair<std::vector<ExrChannel>, glm::vec3>> files{
+      {{r, g, b}, {1, 2, 4}},
+      {{a, b, g, r}, {1, 2, 4}},
+      {{channel("Z", 9, false), channel("R", 1, false), g, channel("B", 4, false)}, {1, 2, 4}},
+      {{y}, {3, 3, 3}},
+      {{y, a}, {3, 3, 3}}};
   for (const auto& [channels, expected] : files) {
     write_channels(directory / "sky.exr", channels);
     const Lighting lighting = load_environment(settings_for(directory / "sky.exr"));
@@ -208,9 +180,9 @@ std::string message_of(const std::filesystem::path& file) {
 TEST(LoadEnvironment, SaysWhatIsWrongWithAFile) {
   const previz::test::TemporaryDirectory directory;
   const auto file = directory / "sky.exr";
-  write_channels(file, {{"R", 1}, {"G", 1}, {"left.B", 1}});
+  write_channels(file, {channel("R", 1), channel("G", 1), channel("left.B", 1)});
   EXPECT_THAT(message_of(file), HasSubstr("found G, R, left.B"));
-  write_channels(file, {{"Y", 1}, {"RY", 0}, {"BY", 0}});
+  write_channels(file, {channel("Y", 1), channel("RY", 0), channel("BY", 0)});
   EXPECT_THAT(message_of(file), HasSubstr("found BY, RY, Y"));
   write_exr_picture(file, {30, 20, std::vector<glm::vec3>(600)});
   EXPECT_THAT(message_of(file), HasSubstr("30x20"));

@@ -1,6 +1,6 @@
 // From made-up skies through made-up fisheye pictures to the map, and back to the sky.
 #include "daemon/lighting/lighting.hpp"
-#include "drivers/error.hpp"
+#include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"
 
@@ -21,16 +21,7 @@ constexpr double pixel_diagonal_rad = 1.5 / 153.3;
 const Sky uniform = [](const glm::dvec3&) { return glm::dvec3(1, 2, 3); };
 
 set::Lighting constant_fill(double radiance) {
-  set::Lighting settings;
-  settings.unseen = set::UnseenRule::constant;
-  settings.unseen_radiance = glm::dvec3(radiance);
-  return settings;
-}
-
-set::Lighting with_rule(set::UnseenRule rule) {
-  set::Lighting settings;
-  settings.unseen = rule;
-  return settings;
+  return test::unseen_as(set::UnseenRule::constant, radiance);
 }
 
 Lighting estimate_one(const LightCameraCalibration& camera, const Sky& sky, double exposure,
@@ -41,13 +32,15 @@ Lighting estimate_one(const LightCameraCalibration& camera, const Sky& sky, doub
 
 template <typename Body>  // body(direction, radiance, angle to `axis` in rad)
 void for_each_texel(const EnvironmentMap& map, const glm::dvec3& axis, const Body& body) {
-  for (int j = 0; j < map.size; ++j) {
-    for (int i = 0; i < map.size; ++i) {
-      const glm::dvec3 direction(texel_direction(map.size, i, j));
-      body(direction, glm::dvec3(map.radiance[static_cast<std::size_t>(j * map.size + i)]),
-           std::acos(std::clamp(glm::dot(direction, axis), -1.0, 1.0)));
-    }
-  }
+  lighting::for_each_texel(map, [&](const glm::dvec3& direction, const glm::dvec3& radiance) {
+    body(direction, radiance, std::acos(std::clamp(glm::dot(direction, axis), -1.0, 1.0)));
+  });
+}
+
+// The light of `uniform`, to half a code of a quarter of it.
+void expect_uniform(const EnvironmentMap& map) {
+  for (const glm::vec3& radiance : map.radiance)
+    ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
 }
 
 TEST(Estimate, UniformSkyIsUniformWhereSeen) {
@@ -108,8 +101,7 @@ TEST(Estimate, LampsKeepFluxAndDirection) {
       if (glm::length(d - place) < 2 * std::sin(radius / 2)) return glm::dvec3(lamp);
     return glm::dvec3(ambient);
   };
-  LightCameraCalibration camera = fisheye_camera();
-  camera.world_from_camera = looking(17, 90);
+  const LightCameraCalibration camera = fisheye_camera(512, looking(17, 90));
   const std::vector<FramePtr> frames{photograph(camera, sky, 0.8 / 256, test::Detail::fine),
                                      photograph(camera, sky, 0.8, test::Detail::fine)};
   for (int resolution : {0, 256, 64}) {
@@ -142,8 +134,7 @@ TEST(Estimate, LampsKeepFluxAndDirection) {
 TEST(Estimate, DirectionsAreWhereTheyWere) {
   const Sky sky = [](const glm::dvec3& d) { return 0.5 * d + 0.5; };
   for (const glm::dmat4& pose : {looking(0, 90), looking(30, 90, 45), looking(-100, 25, -20)}) {
-    LightCameraCalibration camera = fisheye_camera();
-    camera.world_from_camera = pose;
+    const LightCameraCalibration camera = fisheye_camera(512, pose);
     const EnvironmentMap map = estimate_one(camera, sky, 0.9, constant_fill(0)).environment;
     for_each_texel(map, glm::dvec3(pose[2]),
                    [&](const glm::dvec3& direction, const glm::dvec3& radiance, double angle) {
@@ -163,11 +154,7 @@ TEST(Estimate, ReportsClippedAndBlackSolidAngles) {
     if (glm::dot(d, hole) > std::cos(10 * degree)) return glm::dvec3(0);
     return glm::dvec3(0.5);
   };
-  const LightCameraCalibration camera = [] {
-    auto c = fisheye_camera();
-    c.world_from_camera = looking(0, 90);
-    return c;
-  }();
+  const LightCameraCalibration camera = fisheye_camera(512, looking(0, 90));
   const EnvironmentReport report = estimate_one(camera, sky, 1, constant_fill(0)).report;
   // Any pixel that the lamp clips when it covers a hundredth of it is counted: up to a pixel's
   // diagonal more. Holes count where a pixel lies wholly inside.
@@ -191,12 +178,10 @@ TEST(AreaWords, AreDegreesOrAShareOfAllDirections) {
 
 TEST(UnseenHorizon, ContinuesAUniformSky) {
   for (const glm::dmat4& pose : {looking(0, 90), looking(50, 10)}) {
-    LightCameraCalibration camera = fisheye_camera();
-    camera.world_from_camera = pose;
+    const LightCameraCalibration camera = fisheye_camera(512, pose);
     const Lighting lighting =
-        estimate_one(camera, uniform, 0.25, with_rule(set::UnseenRule::horizon));
-    for (const glm::vec3& radiance : lighting.environment.radiance)
-      ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
+        estimate_one(camera, uniform, 0.25, test::unseen_as(set::UnseenRule::horizon));
+    expect_uniform(lighting.environment);
   }
 }
 
@@ -204,10 +189,9 @@ TEST(UnseenHorizon, FollowsTheAzimuthAndCalmsDown) {
   const Sky sky = [](const glm::dvec3& d) {
     return glm::dvec3(1 + 0.5 * d.x / std::max(1e-9, std::hypot(d.x, d.y)));
   };
-  LightCameraCalibration camera = fisheye_camera();
-  camera.world_from_camera = looking(20, 90);
+  const LightCameraCalibration camera = fisheye_camera(512, looking(20, 90));
   const EnvironmentMap map =
-      estimate_one(camera, sky, 0.5, with_rule(set::UnseenRule::horizon)).environment;
+      estimate_one(camera, sky, 0.5, test::unseen_as(set::UnseenRule::horizon)).environment;
   const auto at = [&](double azimuth, double elevation) {
     return map.radiance[texel_index(map.size, glm::vec3(towards(azimuth, elevation)))].r;
   };
@@ -226,11 +210,10 @@ TEST(UnseenHorizon, DoesNotSmearALampAtTheEdge) {
   const Sky sky = [&](const glm::dvec3& d) {
     return glm::dvec3(glm::dot(d, lamp) > std::cos(1.5 * degree) ? 1000.0 : 0.25);
   };
-  LightCameraCalibration camera = fisheye_camera();
-  camera.world_from_camera = looking(0, 90);
+  const LightCameraCalibration camera = fisheye_camera(512, looking(0, 90));
   const std::vector<FramePtr> frames{photograph(camera, sky, 1, test::Detail::fine),
                                      photograph(camera, sky, 5e-4, test::Detail::fine)};
-  const Lighting lighting = estimate(frames, camera, with_rule(set::UnseenRule::horizon));
+  const Lighting lighting = estimate(frames, camera, test::unseen_as(set::UnseenRule::horizon));
   for_each_texel(lighting.environment, glm::dvec3(0, 0, 1),
                  [&](const glm::dvec3&, const glm::dvec3& radiance, double angle) {
                    // Pixels on the lamp's rim of up to eight times the median may remain.
@@ -244,10 +227,10 @@ TEST(UnseenHorizon, DoesNotSmearALampAtTheEdge) {
 TEST(UnseenMirror, ShowsTheUpperHalfBelow) {
   const Sky sky = [](const glm::dvec3& d) { return 0.4 * d + 0.5; };
   for (const glm::dmat4& pose : {looking(0, 90, 25), looking(30, 20)}) {
-    LightCameraCalibration camera = fisheye_camera();
-    camera.world_from_camera = pose;
+    const LightCameraCalibration camera = fisheye_camera(512, pose);
     const glm::dvec3 axis(pose[2]);
-    const Lighting lighting = estimate_one(camera, sky, 0.9, with_rule(set::UnseenRule::mirror));
+    const Lighting lighting =
+        estimate_one(camera, sky, 0.9, test::unseen_as(set::UnseenRule::mirror));
     for_each_texel(lighting.environment, axis,
                    [&](const glm::dvec3& d, const glm::dvec3& radiance, double angle) {
                      if (angle < 101 * degree) return;
@@ -258,25 +241,22 @@ TEST(UnseenMirror, ShowsTheUpperHalfBelow) {
 }
 
 TEST(UnseenMirror, FallsBackToTheHorizonWhereTheMirrorIsUnseenToo) {
-  LightCameraCalibration camera = fisheye_camera();
+  LightCameraCalibration camera = fisheye_camera(512, looking(0, 90));
   camera.intrinsics.max_angle_rad = 80 * degree;
-  camera.world_from_camera = looking(0, 90);
-  const Lighting lighting = estimate_one(camera, uniform, 0.25, with_rule(set::UnseenRule::mirror));
-  for (const glm::vec3& radiance : lighting.environment.radiance)
-    ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
+  const Lighting lighting =
+      estimate_one(camera, uniform, 0.25, test::unseen_as(set::UnseenRule::mirror));
+  expect_uniform(lighting.environment);
   EXPECT_THAT(lighting.report.notes.back(), HasSubstr("not in the mirrored picture either"));
 }
 
 // A lens whose circle is wider than the picture: the edge is where the picture ends.
 TEST(Estimate, ThePictureMayCutTheCircle) {
-  LightCameraCalibration camera = fisheye_camera();
+  LightCameraCalibration camera = fisheye_camera(512, looking(0, 90));
   camera.intrinsics.width = 400;
   camera.intrinsics.cx = 190;
-  camera.world_from_camera = looking(0, 90);
   const Lighting lighting =
-      estimate_one(camera, uniform, 0.25, with_rule(set::UnseenRule::horizon));
-  for (const glm::vec3& radiance : lighting.environment.radiance)
-    ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
+      estimate_one(camera, uniform, 0.25, test::unseen_as(set::UnseenRule::horizon));
+  expect_uniform(lighting.environment);
   EXPECT_LT(lighting.report.seen_sr, 2 * pi * (1 - std::cos(100 * degree)) * 0.95);
 }
 
@@ -292,13 +272,10 @@ TEST(Estimate, ResolutionFollowsTheSourceOrTheSet) {
 TEST(Estimate, RefusesFramesThatDoNotFit) {
   const LightCameraCalibration camera = fisheye_camera();
   const FramePtr frame = make_frame(2, 2, 1, std::vector<glm::dvec3>(4));
-  try {
-    estimate({&frame, 1}, camera, {});
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "light frame 0 has 2x2 pixels, the light camera's calibration 512x512");
-  }
+  EXPECT_EQ(test::error_of([&] {
+              estimate({&frame, 1}, camera, {});
+            }),
+            "light frame 0 has 2x2 pixels, the light camera's calibration 512x512");
   EXPECT_THROW(estimate({}, camera, {}), Error);  // no frame
 }
 

@@ -9,14 +9,7 @@ using std::numbers::pi;
 using test::degree;
 
 FisheyeIntrinsics wide(std::array<double, 4> k, double max_angle_deg = 130) {
-  return {.width = 512,
-          .height = 480,
-          .fx = 150.5,
-          .fy = 149.25,
-          .cx = 250.125,
-          .cy = 241.75,
-          .k = k,
-          .max_angle_rad = max_angle_deg * degree};
+  return {512, 480, 150.5, 149.25, 250.125, 241.75, k, max_angle_deg * degree};
 }
 
 glm::dvec3 direction(double off_axis, double psi) {

@@ -1,7 +1,6 @@
 #include "daemon/lighting/hdr.hpp"
 
 #include "daemon/lighting/response.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"
@@ -14,10 +13,16 @@ const ResponseCurve linear{
     .kind = ResponseCurve::Kind::linear, .inverse_table = {}, .clip_share = 1};
 const ResponseCurve srgb = LightCameraCalibration{}.response;
 
-FramePtr frame_of(double exposure, const std::vector<glm::dvec3>& radiances) {
+// The signals of a sensor that saturates at this share of white.
+FramePtr saturated_frame(double exposure, const std::vector<glm::dvec3>& radiances, double share) {
   std::vector<glm::dvec3> signals;
-  for (const glm::dvec3& radiance : radiances) signals.push_back(exposure * radiance);
+  for (const glm::dvec3& radiance : radiances)
+    signals.push_back(glm::min(exposure * radiance, glm::dvec3(share)));
   return make_frame(static_cast<int>(radiances.size()), 1, exposure, signals);
+}
+
+FramePtr frame_of(double exposure, const std::vector<glm::dvec3>& radiances) {
+  return saturated_frame(exposure, radiances, 1);
 }
 
 FramePtr srgb8_frame(int width, double exposure, std::vector<std::uint8_t> codes) {
@@ -84,14 +89,6 @@ TEST(MergeExposures, AClippedChannelLeavesTheOthers) {
   EXPECT_NEAR(picture.radiance[0].b, 0.25, 2e-5);
 }
 
-// The signals of a sensor that saturates at this share of white.
-FramePtr saturated_frame(double exposure, const std::vector<glm::dvec3>& radiances, double share) {
-  std::vector<glm::dvec3> signals;
-  for (const glm::dvec3& radiance : radiances)
-    signals.push_back(glm::min(exposure * radiance, glm::dvec3(share)));
-  return make_frame(static_cast<int>(radiances.size()), 1, exposure, signals);
-}
-
 // A wall that the longest exposure shows, a lamp that only the shortest does, and one that none
 // does. In every order, since the newest exposure is believed.
 TEST(MergeExposures, WhatIsClippedBelowWhiteIsAtLeastSoMuchLight) {
@@ -122,12 +119,10 @@ TEST(MergeExposures, ADarkLevelAtWhatIsClippedIsRefused) {
   half.clip_share = 0.5;
   const FramePtr frame = frame_of(1, {glm::dvec3(0.3)});
   EXPECT_NO_THROW(Bracket({&frame, 1}, half, glm::dvec3(0.4)));
-  try {
+  const std::string refusal = test::error_of([&] {
     const Bracket refused({&frame, 1}, half, glm::dvec3(0, 0, 0.501));
-    FAIL() << "not refused";
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("dark_level is 0.501"));
-  }
+  });
+  EXPECT_THAT(refusal, HasSubstr("dark_level is 0.501"));
 }
 
 // Without a share that was measured, only the largest code is clipped, whatever the depth.

@@ -23,23 +23,18 @@ TEST(Vignetting, LeastIlluminationIsTheLeastOfManyAngles) {
 
 // A lens that darkens towards its edge, a sensor that shows light in the dark: the sky as it is.
 TEST(Estimate, UndoesVignettingAndDarkLevel) {
-  LightCameraCalibration camera = test::fisheye_camera(128);
-  camera.world_from_camera = test::looking(30, 90);
+  LightCameraCalibration camera = test::fisheye_camera(128, test::looking(30, 90));
   camera.vignetting = {-0.12, 0.01, -0.002};
   camera.dark_level = {0.03, 0.02, 0.04};
   const glm::dvec3 radiance(1, 2, 3);
   const double exposure = 0.25;
   const Fisheye lens(camera.intrinsics);
-  std::vector<glm::dvec3> signals;
-  for (int y = 0; y < 128; ++y) {
-    for (int x = 0; x < 128; ++x) {
-      const auto ray = lens.unproject({x, y});
-      const double falloff =
-          ray ? relative_illumination(camera.vignetting, std::acos(glm::normalize(*ray).z)) : 0;
-      signals.push_back(exposure * falloff * radiance + camera.dark_level);
-    }
-  }
-  const FramePtr frame = test::make_frame(128, 128, exposure, signals);
+  const FramePtr frame = test::make_frame(128, 128, exposure, [&](int x, int y) {
+    const auto ray = lens.unproject({x, y});
+    const double falloff =
+        ray ? relative_illumination(camera.vignetting, std::acos(glm::normalize(*ray).z)) : 0;
+    return exposure * falloff * radiance + camera.dark_level;
+  });
   const Lighting lighting = estimate({&frame, 1}, camera, {});
   for (const glm::vec3& texel : lighting.environment.radiance)  // half a code is 3e-5
     ASSERT_LT(glm::length(glm::dvec3(texel) - radiance), 3e-4);
@@ -87,8 +82,7 @@ TEST(ExpandClipped, IsBoundedKeepsColourAndTouchesNothingElse) {
 
 // P5: one exposure only, a lamp that clips it; the report says how much the light is a guess.
 TEST(Estimate, ExpandsWhatOneExposureClipsAndSaysSo) {
-  LightCameraCalibration camera = test::fisheye_camera(256);
-  camera.world_from_camera = test::looking(0, 90);
+  const LightCameraCalibration camera = test::fisheye_camera(256, test::looking(0, 90));
   const glm::dvec3 lamp = test::towards(0, 60);
   constexpr double radius = 6 * degree, white = 1;
   const test::Sky sky = [&](const glm::dvec3& d) {

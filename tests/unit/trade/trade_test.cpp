@@ -2,7 +2,6 @@
 #include "daemon/trade/trade.hpp"
 
 #include "daemon/set/load.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -12,6 +11,8 @@ namespace previz::trade::trade_test {
 
 class Trade : public testing::Test {
  protected:
+  Trade() { test::write_small_take(directory_.path()); }
+
   // 32x24, as little as a sweep can be.
   TradeOptions options() const {
     TradeOptions options;
@@ -24,12 +25,7 @@ class Trade : public testing::Test {
     return options;
   }
   void expect_refused(const TradeOptions& refused, const std::string& words) {
-    try {
-      run_trade(refused, out_);
-      ADD_FAILURE() << "not refused: " << words;
-    } catch (const Error& error) {
-      EXPECT_THAT(error.what(), HasSubstr(words));
-    }
+    EXPECT_THAT(test::error_of([&] { run_trade(refused, out_); }), HasSubstr(words));
   }
   void rewrite_set(const std::string& from, const std::string& to) {
     std::string text = session::read_file(directory_ / "set.toml");
@@ -42,7 +38,6 @@ class Trade : public testing::Test {
 };
 
 TEST_F(Trade, SweepsAndWritesTableAndPage) {
-  test::write_small_take(directory_.path());
   const TradeReport report = run_trade(options(), out_);
   EXPECT_EQ(report.frame, 1u);  // frame 0 has no light yet
   EXPECT_EQ(report.width, 32);
@@ -73,7 +68,6 @@ TEST_F(Trade, SweepsAndWritesTableAndPage) {
 // back. A plate of independent pixels of standard deviation s, averaged by fours and enlarged, is
 // off by about s itself: far more than any noise of the render.
 TEST_F(Trade, AHalfSizedPictureStaysOff) {
-  test::write_small_take(directory_.path());
   TradeOptions only = options();
   only.axes = {"resolution"};
   const TradeReport report = run_trade(only, out_);
@@ -83,7 +77,6 @@ TEST_F(Trade, AHalfSizedPictureStaysOff) {
 }
 
 TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
-  test::write_small_take(directory_.path());
   TradeOptions only = options();
   only.axes = {"parts"};
   only.rounds = 1;
@@ -104,7 +97,6 @@ TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
 }
 
 TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
-  test::write_small_take(directory_.path());
   TradeOptions asking = options();
   asking.answers = true;
   asking.fps = 2;
@@ -133,7 +125,6 @@ TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
 }
 
 TEST_F(Trade, TakesASessionOrTheNewestTakeOfALiveSet) {
-  test::write_small_take(directory_.path());
   const auto frame_of = [](const TradeSource& source) { return TradeFrame(source, {}).index(); };
   EXPECT_EQ(frame_of({directory_ / "session"}), 1u);
   EXPECT_EQ(frame_of({directory_ / "session", directory_ / "set.toml"}), 1u);
@@ -152,7 +143,6 @@ TEST_F(Trade, SharesAreWrittenInTwoWays) {
 }
 
 TEST_F(Trade, RefusesWhatCannotBeTraded) {
-  test::write_small_take(directory_.path());
   TradeOptions wrong = options();
   wrong.frame = test::small_take_lost;
   expect_refused(wrong, "frame 3: pose lost");
@@ -177,21 +167,21 @@ TEST_F(Trade, RefusesWhatCannotBeTraded) {
 }
 
 TEST_F(Trade, RefusesASetWithoutAReplayedCamera) {
-  test::write_small_take(directory_.path());
   rewrite_set("driver = \"replay\"\ndevice = \"session\"", "driver = \"none\"");
   expect_refused(options(), "observer: a trade needs a take; ");
 }
 
 TEST_F(Trade, RefusesAPictureWithNothingVirtualInIt) {
-  test::write_small_take(directory_.path(), false);
+  const test::TemporaryDirectory bare;
+  test::write_small_take(bare.path(), false);
   TradeOptions none = options();
+  none.source.set_or_session = bare / "set.toml";
   none.reference_samples = 2;
   expect_refused(none, "nothing virtual");
 }
 
 // A page of what is known by then: the reference at least.
 TEST_F(Trade, AStopLeavesWhatIsKnown) {
-  test::write_small_take(directory_.path());
   std::stop_source stop;
   stop.request_stop();
   TradeOptions stopped = options();
@@ -207,7 +197,6 @@ TEST_F(Trade, AStopLeavesWhatIsKnown) {
 
 // Whatever the time, the set's own settings are measured and judged; the rest is named.
 TEST_F(Trade, TakesTheTimeThatItIsGiven) {
-  test::write_small_take(directory_.path());
   TradeOptions hurried = options();
   hurried.minutes = 1e-3;
   hurried.answers = true;
@@ -233,7 +222,6 @@ TEST_F(Trade, TakesTheTimeThatItIsGiven) {
 // The second trade of the same frame and set measures only what the first did not: no method, and
 // with a reference that is whole no sample of it. Another depth is another picture.
 TEST_F(Trade, GoesOnFromItsLastTable) {
-  test::write_small_take(directory_.path());
   TradeOptions once = options();
   once.rounds = 1;
   const TradeReport first = run_trade(once, out_);
@@ -265,7 +253,6 @@ TEST_F(Trade, GoesOnFromItsLastTable) {
 }
 
 TEST_F(Trade, ADamagedMemoryIsSaidAndNotUsed) {
-  test::write_small_take(directory_.path());
   TradeOptions once = options();
   once.rounds = 1;
   run_trade(once, out_);
