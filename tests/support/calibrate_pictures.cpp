@@ -1,7 +1,9 @@
 #include "tests/support/calibrate_pictures.hpp"
 
 #include <glm/gtc/matrix_transform.hpp>
-#include <glm/matrix.hpp>
+
+#include "daemon/calibrate/lens/observer.hpp"
+#include "daemon/calibrate/tags/tag_lens.hpp"
 
 namespace previz::test {
 namespace {
@@ -34,6 +36,17 @@ calibrate::Views hold(const calibrate::Board& board, const std::vector<Held>& ho
     views.views.push_back(std::move(view));
   }
   return views;
+}
+
+calibrate::Views hold(const std::vector<Held>& how, const PinholeIntrinsics& lens, double noise_px,
+                      unsigned seed) {
+  std::mt19937 random(seed);
+  const calibrate::LensVector all = calibrate::lens_vector(lens);
+  const Lens through = [&](const glm::dvec3& point) {
+    return calibrate::project_pinhole({all.val, calibrate::lens_size}, point);
+  };
+  return hold(calibrate::parse_board("chessboard:9x6:25mm"), how, through, lens.width, lens.height,
+              noise_px, random);
 }
 
 std::vector<Held> careful_capture() {

@@ -26,6 +26,10 @@ struct Held {
 calibrate::Views hold(const calibrate::Board& board, const std::vector<Held>& how, const Lens& lens,
                       int width, int height, double noise_px, std::mt19937& random);
 
+// A 9x6 chessboard of 25 mm, seen through a pinhole lens.
+calibrate::Views hold(const std::vector<Held>& how, const PinholeIntrinsics& lens, double noise_px,
+                      unsigned seed);
+
 // A capture that a careful operator would make of a 9x6 board of 25 mm for a lens of about 60
 // degrees: near and tilted all over the picture.
 std::vector<Held> careful_capture();

@@ -158,6 +158,11 @@ std::string Shoot::error() const {
   return message;
 }
 
+FramePtr Shoot::first_frame() const {
+  import();
+  return open()->read(0);
+}
+
 std::unique_ptr<session::StreamReader> Shoot::open(const std::string& source) const {
   session::Session opened = session::open_session(session());
   auto stream = session::open_stream(opened, source);

@@ -65,6 +65,8 @@ class Shoot {
   ImportReport import() const;
   // The message, or "" if the import succeeded; checks that a failure leaves nothing.
   std::string error() const;
+  // Imports, and returns the film camera's first frame.
+  FramePtr first_frame() const;
   // Returns the frames of a camera that were imported.
   std::unique_ptr<session::StreamReader> open(const std::string& source = "observer") const;
 

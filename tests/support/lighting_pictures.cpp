@@ -40,6 +40,18 @@ FramePtr make_frame(int width, int height, double exposure,
   return make_frame(width, height, exposure, signals);
 }
 
+FramePtr rgb8_frame(int width, double exposure, std::vector<std::uint8_t> codes,
+                    std::uint64_t sequence) {
+  Frame frame;
+  frame.source = "light";
+  frame.sequence = sequence;
+  frame.exposure = exposure;
+  frame.width = width;
+  frame.height = static_cast<int>(codes.size()) / 3 / width;
+  frame.bytes = std::move(codes);
+  return std::make_shared<Frame>(std::move(frame));
+}
+
 LightCameraCalibration fisheye_camera(int size, const glm::dmat4& world_from_camera) {
   LightCameraCalibration camera;
   const double focal_px = 153.3 * size / 512, centre_px = (size - 1) / 2.0;

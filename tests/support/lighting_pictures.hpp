@@ -21,6 +21,10 @@ FramePtr make_frame(int width, int height, double exposure, const std::vector<gl
 FramePtr make_frame(int width, int height, double exposure,
                     const std::function<glm::dvec3(int x, int y)>& signal_at);
 
+// An rgb8 frame of the light camera.
+FramePtr rgb8_frame(int width, double exposure, std::vector<std::uint8_t> codes,
+                    std::uint64_t sequence = 12);
+
 // A fisheye of 200 degrees and size x size pixels with the truth sets' kind of polynomial and a
 // linear response, looking up.
 LightCameraCalibration fisheye_camera(int size = 512,

@@ -22,6 +22,14 @@ struct LinearPicture {
   std::vector<double> value;
 };
 
+// A tag of a family: its cells as libapriltag draws them, and how many of them its border is wide.
+struct TagCells {
+  int total = 0, border = 0;
+  std::vector<std::uint8_t> cells;  // row-major from the top, 0 black
+};
+
+TagCells cells_of(const std::string& family, int id);
+
 // Adds `amount` times the fraction of each pixel inside the polygon: exact areas, any winding.
 // OpenCV pixel coordinates.
 void add_polygon(LinearPicture& picture, const std::vector<glm::dvec2>& polygon, double amount);

@@ -6,11 +6,9 @@
 #include "daemon/lighting/response.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
-#include "daemon/set/set.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/shared_data.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::calibrate::clip_test {
 

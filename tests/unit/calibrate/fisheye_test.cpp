@@ -1,7 +1,4 @@
 // The light camera's calibration: its lens on boards seen beyond 90 degrees, its pose by tags.
-#include <apriltag/apriltag.h>
-#include <apriltag/tag36h11.h>
-
 #include <glm/gtc/quaternion.hpp>
 
 #include "daemon/calibrate/lens/coverage.hpp"
@@ -11,7 +8,6 @@
 #include "daemon/set/print.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "tests/support/calibrate_pictures.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::calibrate::fisheye_test {
@@ -122,18 +118,7 @@ TEST(FisheyeCapture, AsksForMoreViews) {
 class TagRoom {
  public:
   explicit TagRoom(std::vector<set::Tag> tags) : tags_(std::move(tags)) {
-    apriltag_family_t* family = tag36h11_create();
-    for (const set::Tag& tag : tags_) {
-      image_u8_t* code = apriltag_to_image(family, std::uint32_t(tag.id));
-      cells_ = code->width;
-      codes_.emplace_back();
-      for (int y = 0; y < cells_; ++y)
-        for (int x = 0; x < cells_; ++x) codes_.back().push_back(code->buf[y * code->stride + x]);
-      // The packaged library does not export image_u8_destroy.
-      std::free(code->buf);
-      std::free(code);
-    }
-    tag36h11_destroy(family);
+    for (const set::Tag& tag : tags_) codes_.push_back(test::cells_of("tag36h11", tag.id));
   }
 
   FramePtr photograph(const FisheyeIntrinsics& intrinsics, const glm::dmat4& world_from_camera,
@@ -167,18 +152,18 @@ class TagRoom {
       const glm::dvec3 hit = origin + way * (glm::dot(normal, centre - origin) / along) - centre;
       if (!(glm::dot(hit + centre - origin, way) > 0)) continue;
       // The code's picture has a white ring of one cell around the black border (8 cells).
-      const double cell = tags_[t].size_m / (cells_ - 2);
-      const int x = int(std::floor(glm::dot(hit, glm::dvec3(pose[0])) / cell + 0.5 * cells_));
-      const int y = int(std::floor(-glm::dot(hit, glm::dvec3(pose[1])) / cell + 0.5 * cells_));
-      if (x >= 0 && y >= 0 && x < cells_ && y < cells_)
-        return codes_[t][std::size_t(y * cells_ + x)] ? 0.75 : 0.04;
+      const auto& [cells, border, code] = codes_[t];
+      const double cell = tags_[t].size_m / border;
+      const int x = int(std::floor(glm::dot(hit, glm::dvec3(pose[0])) / cell + 0.5 * cells));
+      const int y = int(std::floor(-glm::dot(hit, glm::dvec3(pose[1])) / cell + 0.5 * cells));
+      if (x >= 0 && y >= 0 && x < cells && y < cells)
+        return code[std::size_t(y * cells + x)] ? 0.75 : 0.04;
     }
     return 0.75;
   }
 
   std::vector<set::Tag> tags_;
-  std::vector<std::vector<std::uint8_t>> codes_;
-  int cells_ = 0;
+  std::vector<test::TagCells> codes_;
 };
 
 // Facing the camera from `direction` at a distance.

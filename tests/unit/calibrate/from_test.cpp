@@ -8,7 +8,6 @@
 #include "daemon/calibrate/lens/lens_file_check.hpp"
 #include "daemon/calibrate/lens/lens_refit.hpp"
 #include "daemon/set/load.hpp"
-#include "daemon/set/set.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "tests/support/session_fixture.hpp"

@@ -1,7 +1,4 @@
 // Kalibr's AprilGrid: tags with a black border of two cells, and squares at their corners.
-#include <apriltag/apriltag.h>
-#include <apriltag/tag36h11.h>
-
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -31,30 +28,26 @@ struct Form {
   bool has_squares = true;
 };
 
-cv::Mat1b draw_tag(apriltag_family_t* family, int id, int border) {
+cv::Mat1b draw_tag(int id, int border) {
   const int cells = 6 + 2 * border, cell_px = 2 * tag_px / cells;
   cv::Mat1b fine(2 * tag_px, 2 * tag_px, std::uint8_t(0)), drawn;
-  image_u8_t* tag = apriltag_to_image(family, std::uint32_t(id));
+  const test::TagCells tag = test::cells_of("tag36h11", id);
   for (int y = 0; y < 6; ++y)
     for (int x = 0; x < 6; ++x) {
       const cv::Point at(cell_px * (x + border), cell_px * (y + border));
-      if (tag->buf[(y + 2) * tag->stride + x + 2])
+      if (tag.cells[std::size_t((y + 2) * tag.total + x + 2)])
         fine(cv::Rect(at.x, at.y, cell_px, cell_px)) = 255;
     }
-  std::free(tag->buf);  // the packaged library does not export image_u8_destroy
-  std::free(tag);
   cv::resize(fine, drawn, {tag_px, tag_px}, 0, 0, cv::INTER_AREA);
   return drawn;
 }
 
 cv::Mat1b draw_board(const Form& form) {
-  apriltag_family_t* family = tag36h11_create();
   cv::Mat1b board(drawing_px, drawing_px, std::uint8_t(255));
   for (int id = 0; id < 36; ++id) {
     const cv::Point at(2 * gap_px + id % 6 * pitch_px, 2 * gap_px + (5 - id / 6) * pitch_px);
-    draw_tag(family, id, form.border).copyTo(board(cv::Rect(at.x, at.y, tag_px, tag_px)));
+    draw_tag(id, form.border).copyTo(board(cv::Rect(at.x, at.y, tag_px, tag_px)));
   }
-  tag36h11_destroy(family);
   for (int y = 0; form.has_squares && y <= 6; ++y)
     for (int x = 0; x <= 6; ++x)
       board(cv::Rect(gap_px + x * pitch_px, gap_px + y * pitch_px, gap_px, gap_px)) = 0;

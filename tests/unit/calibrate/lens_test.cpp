@@ -2,7 +2,6 @@
 #include "daemon/calibrate/lens/lens_fit.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
-#include "daemon/set/set.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::calibrate::lens_test {

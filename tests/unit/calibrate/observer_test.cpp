@@ -8,10 +8,8 @@
 #include "daemon/calibrate/lens/residual_plot.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
-#include "daemon/set/set.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "tests/support/calibrate_pictures.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::calibrate::observer_test {
 
@@ -31,12 +29,7 @@ std::optional<glm::dvec2> through(const PinholeIntrinsics& lens, const glm::dvec
 }
 
 Views captured(const std::vector<Held>& how, unsigned seed = 1) {
-  std::mt19937 random(seed);
-  const PinholeIntrinsics lens = film_lens();
-  return test::hold(
-      parse_board("chessboard:9x6:25mm"), how,
-      [&](const glm::dvec3& point) { return through(lens, point); }, width, height, noise_px,
-      random);
+  return test::hold(how, film_lens(), noise_px, seed);
 }
 
 std::string first_missing(const std::vector<Held>& how) {

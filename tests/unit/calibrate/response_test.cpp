@@ -6,11 +6,9 @@
 #include "daemon/lighting/response.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
-#include "daemon/set/set.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_directory.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::calibrate::response_test {
 

@@ -4,7 +4,6 @@
 #include "drivers/calibration/fisheye.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/lighting_pictures.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::calibrate::sensor_test {
 

@@ -125,8 +125,7 @@ TEST(CameraTrack, FramesThatWereNotTrackedHaveNoKey) {
 // A session in which `from` stands for what `to` says, wherever it is written.
 void rewrite(const std::filesystem::path& session, const std::string& from, const std::string& to) {
   std::string text = session::read_file(session / "session.toml");
-  for (std::size_t at = text.find(from); at != std::string::npos;
-       at = text.find(from, at + to.size()))
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
     text.replace(at, from.size(), to);
   session::replace_file(session / "session.toml", text);
 }

@@ -5,7 +5,6 @@
 #include "daemon/exchange/import_description.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
-#include "daemon/set/set.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/session/session_toml.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -1,8 +1,4 @@
-#include <opencv2/core.hpp>
-
-#include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::exchange::import_description_test {
 
@@ -284,10 +280,10 @@ TEST(ImportDescription, ANameThatIsTooLongIsAMissingFile) {
   const test::TemporaryDirectory folder;
   const Json observer = {{"video", std::string(300, 'b')}, {"exposure", 1}};
   session::write_content(folder / "F.json", Json{{"name", "a"}, {"observer", observer}}.dump());
-  EXPECT_THAT(test::error_of([&] {
-                import_session({folder / "F.json", folder / "take"});
-              }),
-              HasSubstr("observer.video"));
+  const std::string error = test::error_of([&] {
+    import_session({folder / "F.json", folder / "take"});
+  });
+  EXPECT_THAT(error, HasSubstr("observer.video"));
 }
 
 TEST(ImportDescription, WhatIsNotJsonIsAnError) {

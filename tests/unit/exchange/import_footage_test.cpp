@@ -1,9 +1,7 @@
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/picture_header.hpp"
 #include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::exchange::import_footage_test {
 
@@ -38,8 +36,7 @@ TEST_P(ImportKinds, KeepTheirBits) {
   const std::string name = std::string("deep.") + extension;
   write_picture(shoot.folder() / name, noise_picture(7, type, 20, 10));
   shoot.json["observer"]["pictures"] = {name};
-  ASSERT_EQ(shoot.error(), "");
-  const FramePtr frame = shoot.open()->read(0);
+  const FramePtr frame = shoot.first_frame();
   EXPECT_EQ(frame->format, format);
   EXPECT_EQ(frame->bytes, frame_bytes_of(noise_picture(7, type, 20, 10)));
 }
@@ -56,8 +53,7 @@ TEST(Import, JpegIsWhatItsDecoderSays) {
   Shoot shoot;
   write_picture(shoot.folder() / "a.jpg", cv::Mat(16, 24, CV_8UC3, cv::Scalar(30, 90, 200)));
   shoot.json["observer"]["pictures"] = {"a.jpg"};
-  ASSERT_EQ(shoot.error(), "");
-  const FramePtr frame = shoot.open()->read(0);
+  const FramePtr frame = shoot.first_frame();
   // One flat block: only its mean is coded, to a step of at most 2 at OpenCV's quality 95, and
   // Y'CbCr to RGB multiplies a chroma step by at most 1.8.
   EXPECT_NEAR(frame->bytes[0], 200, 6);
@@ -206,8 +202,7 @@ TEST(Import, AVideoOfRgbKeepsItsSamples) {
   for (std::size_t i = 0; i < rgb.size(); i += 3)
     bgr0.insert(bgr0.end(), {rgb[i + 2], rgb[i + 1], rgb[i], 0});
   shoot.film("take.mkv", {.pixel_format = "bgr0"}, {bgr0});
-  ASSERT_EQ(shoot.error(), "");
-  const FramePtr frame = shoot.open()->read(0);
+  const FramePtr frame = shoot.first_frame();
   EXPECT_EQ(frame->format, PixelFormat::rgb8);
   EXPECT_EQ(frame->bytes, rgb);
 }
@@ -217,35 +212,28 @@ TEST(Import, AVideoOfRgbKeepsItsSamples) {
 // y' = (Y - 16)/219 and p = (C - 128)/224; BT.709 likewise with 1.5748, 0.187324, 0.468124, 1.8556.
 // swscale's tables are fixed point: one code of rounding on top of the half.
 TEST(Import, AnyOtherVideoBecomesRgb) {
-  struct Case {
-    bool bt709;
-    double red, green, blue;
-  };
   const double y = (120 - 16) / 219.0, pb = (100 - 128) / 224.0, pr = (180 - 128) / 224.0;
-  for (const Case& matrix :
-       {Case{false, y + 1.402 * pr, y - 0.344136 * pb - 0.714136 * pr, y + 1.772 * pb},
-        Case{true, y + 1.5748 * pr, y - 0.187324 * pb - 0.468124 * pr, y + 1.8556 * pb}}) {
+  const std::array bt601{y + 1.402 * pr, y - 0.344136 * pb - 0.714136 * pr, y + 1.772 * pb};
+  const std::array bt709{y + 1.5748 * pr, y - 0.187324 * pb - 0.468124 * pr, y + 1.8556 * pb};
+  for (const bool is_bt709 : {false, true}) {
     Shoot shoot;
     Bytes frame(64 * 48, 120);
     frame.insert(frame.end(), 32 * 24, 100);
     frame.insert(frame.end(), 32 * 24, 180);
     VideoForm form = {.pixel_format = "yuv420p", .width = 64, .height = 48};
-    if (matrix.bt709) {
+    if (is_bt709) {
       form.range = AVCOL_RANGE_MPEG;
       form.matrix = AVCOL_SPC_BT709;
     }
     shoot.film("take.mkv", form, {frame});
     const ImportReport report = shoot.import();
     EXPECT_THAT(report.notes.at(0), HasSubstr("converted to rgb8"));
-    EXPECT_EQ(report.notes.at(0).find("matrix smpte170m (assumed)") == std::string::npos,
-              matrix.bt709);
+    EXPECT_NE(testing::Value(report.notes.at(0), HasSubstr("matrix smpte170m (assumed)")),
+              is_bt709);
     const FramePtr rgb = shoot.open()->read(0);
     ASSERT_EQ(rgb->format, PixelFormat::rgb8);
-    for (std::size_t i = 0; i < rgb->bytes.size(); i += 3) {
-      ASSERT_NEAR(rgb->bytes[i], 255 * matrix.red, 1.5);
-      ASSERT_NEAR(rgb->bytes[i + 1], 255 * matrix.green, 1.5);
-      ASSERT_NEAR(rgb->bytes[i + 2], 255 * matrix.blue, 1.5);
-    }
+    for (std::size_t i = 0; i < rgb->bytes.size(); ++i)
+      ASSERT_NEAR(rgb->bytes[i], 255 * (is_bt709 ? bt709 : bt601)[i % 3], 1.5);
   }
 }
 
@@ -253,8 +241,7 @@ TEST(Import, AVideoDeeperThan8BitsKeepsItsDepth) {
   Shoot shoot;
   const Bytes samples = noise_bytes(2 * 3 * 32 * 16, 5);
   shoot.film("take.mkv", {.pixel_format = "gbrp16le"}, {samples});
-  ASSERT_EQ(shoot.error(), "");
-  const FramePtr frame = shoot.open()->read(0);
+  const FramePtr frame = shoot.first_frame();
   ASSERT_EQ(frame->format, PixelFormat::rgb16);
   for (std::size_t pixel = 0; pixel < 32 * 16; ++pixel)
     for (int channel = 0; channel < 3; ++channel) {

@@ -1,8 +1,5 @@
 // Videos of others that are damaged, cut or lack frames: what comes in, when, and with which poses.
-#include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::exchange::import_lost_frames_test {
 

@@ -1,10 +1,7 @@
 // Videos and photographs of others: which side is up, the shape of a pixel, and what is refused.
 #include <opencv2/imgproc.hpp>
 
-#include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::exchange::import_video_test {
 
@@ -83,8 +80,7 @@ TEST(ImportVideo, PixelsBecomeSquare) {
     form.pixel_aspect = shape.aspect;
     Shoot shoot;
     shoot.film("take.mov", form, {marked_picture(48, 16)});
-    ASSERT_EQ(shoot.error(), "");
-    const FramePtr frame = shoot.open()->read(0);
+    const FramePtr frame = shoot.first_frame();
     ASSERT_EQ(frame->width, shape.width);
     ASSERT_EQ(frame->height, shape.height);
     for (int i = 0; i < 4; ++i)

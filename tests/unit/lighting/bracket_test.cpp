@@ -69,7 +69,7 @@ TEST(MergeMoving, TheNewestLongExposureShowsTheWallWhereTheLampWas) {
   // The long exposure alone sees the wall well: 5 of its standard deviations.
   const double sigma =
       std::sqrt(wall_radiance * noise.signal_per_electron + noise.read_noise * noise.read_noise);
-  for (int row = 0; row < strip_height; ++row) {
+  for (int row = 0; row < strip_height; ++row)
     for (int column = 0; column < strip_width; ++column) {
       const auto is_lit = [column](int frame) {
         return moving_lamp(frame, column) == lamp_radiance;
@@ -86,7 +86,6 @@ TEST(MergeMoving, TheNewestLongExposureShowsTheWallWhereTheLampWas) {
         EXPECT_EQ(flags_at(picture, column, row), lit_before ? moved : 0) << column;
       }
     }
-  }
 }
 
 TEST(MergeMoving, TheNewestShortExposureShowsTheLampWhereItIsNowAndNowhereElse) {
@@ -97,14 +96,13 @@ TEST(MergeMoving, TheNewestShortExposureShowsTheLampWhereItIsNowAndNowhereElse) 
   const double sigma =
       std::sqrt(signal * noise.signal_per_electron + noise.read_noise * noise.read_noise) /
       exposures.back();
-  for (int row = 0; row < strip_height; ++row) {
+  for (int row = 0; row < strip_height; ++row)
     for (int column = 0; column < strip_width; ++column) {
       if (moving_lamp(3, column) == lamp_radiance)
         EXPECT_NEAR(at(picture, column, row).r, lamp_radiance, 5 * sigma) << column;
       else  // at most the white of the long exposure, which no newer one can deny there
         EXPECT_LE(at(picture, column, row).r, 1.0f) << column;
     }
-  }
 }
 
 TEST(MergeMoving, ASwitchedOffLampIsGoneWithTheFirstExposureWithoutIt) {
@@ -215,7 +213,7 @@ std::vector<FramePtr> static_bracket(const std::vector<double>& true_exposures,
 TEST(Disagreements, AnExposureThatIsTwoStopsWrongIsNamed) {
   const std::vector<double> right{1.0 / 64, 1.0 / 8, 1};
   EXPECT_TRUE(disagreements(Bracket(static_bracket(right, right), linear_curve, {})).empty());
-  for (std::size_t wrong = 0; wrong < right.size(); ++wrong) {
+  for (std::size_t wrong = 0; wrong < right.size(); ++wrong)
     for (const double stops : {2.0, -2.0}) {
       std::vector<double> stated = right;
       stated[wrong] *= std::exp2(stops);
@@ -227,7 +225,6 @@ TEST(Disagreements, AnExposureThatIsTwoStopsWrongIsNamed) {
         EXPECT_NEAR(d.stops, d.shorter == wrong ? -stops : stops, 0.1);
       }
     }
-  }
 }
 
 TEST(Disagreements, AMovingLampIsNone) {

@@ -14,11 +14,18 @@ namespace previz::lighting::environment_file_test {
 using std::numbers::pi;
 using test::towards;
 
-set::Lighting settings_for(const std::filesystem::path& file) {
+class LoadEnvironment : public testing::Test {
+ protected:
+  LoadEnvironment() { settings.environment = file; }
+
+  std::string refusal() {
+    return test::error_of([&] { load_environment(settings); });
+  }
+
+  test::TemporaryDirectory directory;
+  const std::filesystem::path file = directory / "sky.exr";
   set::Lighting settings;
-  settings.environment = file;
-  return settings;
-}
+};
 
 // Rough texture in every pixel and a few pixels a hundred thousand times as bright.
 LinearPicture rough_sky(int width) {
@@ -44,7 +51,7 @@ void integrate(const LinearPicture& picture, const Body& body) {
     x = (x + picture.width) % picture.width;
     return glm::dvec3(picture.radiance[static_cast<std::size_t>(y * picture.width + x)]);
   };
-  for (int r = 0; r < 4 * picture.height; ++r) {
+  for (int r = 0; r < 4 * picture.height; ++r)
     for (int c = 0; c < 4 * picture.width; ++c) {
       const double x = (c + 0.5) / 4, y = (r + 0.5) / 4;
       const double azimuth = 2 * pi * (0.5 - x / picture.width);
@@ -59,7 +66,6 @@ void integrate(const LinearPicture& picture, const Body& body) {
                       std::cos(elevation) * std::sin(azimuth), std::sin(elevation)),
            radiance, std::cos(elevation) * pi * pi / 8 / picture.height / picture.width);
     }
-  }
 }
 
 double largest_relative_error(const glm::dvec3& value, const glm::dvec3& expected) {
@@ -67,10 +73,9 @@ double largest_relative_error(const glm::dvec3& value, const glm::dvec3& expecte
   return std::max({error.x, error.y, error.z});
 }
 
-TEST(LoadEnvironment, KeepsFluxAndIrradiance) {
-  const previz::test::TemporaryDirectory directory;
+TEST_F(LoadEnvironment, KeepsFluxAndIrradiance) {
   const LinearPicture sky = rough_sky(256);
-  write_exr_picture(directory / "sky.exr", sky);
+  write_exr_picture(file, sky);
   const std::vector<glm::dvec3> normals = test::upper_normals();
   glm::dvec3 flux(0);
   std::vector<glm::dvec3> expected(normals.size(), glm::dvec3(0));
@@ -81,7 +86,6 @@ TEST(LoadEnvironment, KeepsFluxAndIrradiance) {
         expected[n] += radiance * (sr * cosine);
   });
   for (int resolution : {0, 64, 1024}) {
-    set::Lighting settings = settings_for(directory / "sky.exr");
     settings.resolution = resolution;
     const EnvironmentMap map = load_environment(settings).environment;
     EXPECT_EQ(map.size, resolution == 0 ? 256 : resolution);
@@ -100,10 +104,8 @@ TEST(LoadEnvironment, KeepsFluxAndIrradiance) {
 }
 
 // What `previzd calibrate balance` prints makes up for an environment that does not fit the camera.
-TEST(LoadEnvironment, IsMultipliedByTheBalanceAndTheGain) {
-  const previz::test::TemporaryDirectory directory;
-  write_exr_picture(directory / "sky.exr", rough_sky(64));
-  set::Lighting settings = settings_for(directory / "sky.exr");
+TEST_F(LoadEnvironment, IsMultipliedByTheBalanceAndTheGain) {
+  write_exr_picture(file, rough_sky(64));
   const EnvironmentMap plain = load_environment(settings).environment;
   settings.environment_gain = 2;
   settings.balance = {0.5, 0.25, 4};
@@ -112,17 +114,15 @@ TEST(LoadEnvironment, IsMultipliedByTheBalanceAndTheGain) {
     ASSERT_EQ(balanced.radiance[i], plain.radiance[i] * glm::vec3(1, 0.5f, 8));
 }
 
-TEST(LoadEnvironment, SeesTheLayoutFromInside) {
-  const previz::test::TemporaryDirectory directory;
+TEST_F(LoadEnvironment, SeesTheLayoutFromInside) {
   // Red grows with x, green with y, blue with z.
   LinearPicture sky{256, 128, {}};
   for (int r = 0; r < 128; ++r)
     for (int c = 0; c < 256; ++c)
       sky.radiance.emplace_back(
           0.5 * towards(360 * (0.5 - (c + 0.5) / 256), 180 * (0.5 - (r + 0.5) / 128)) + 0.5);
-  write_exr_picture(directory / "sky.exr", sky);
+  write_exr_picture(file, sky);
   for (double turn_deg : {0.0, 90.0, -133.0, 725.0}) {
-    set::Lighting settings = settings_for(directory / "sky.exr");
     settings.environment_rotation_rad = turn_deg * pi / 180;
     settings.environment_gain = 2;
     const EnvironmentMap map = load_environment(settings).environment;
@@ -153,8 +153,7 @@ void write_channels(const std::filesystem::path& file, const std::vector<ExrChan
   write_exr_channels(file, 64, 32, channels);
 }
 
-TEST(LoadEnvironment, ReadsTheUsualChannels) {
-  const previz::test::TemporaryDirectory directory;
+TEST_F(LoadEnvironment, ReadsTheUsualChannels) {
   const ExrChannel r = channel("R", 1), g = channel("G", 2), b = channel("B", 4),
                    y = channel("Y", 3), a = channel("A", 1);
   const std::vector<std::pair<std::vector<ExrChannel>, glm::vec3>> files{
@@ -164,8 +163,8 @@ TEST(LoadEnvironment, ReadsTheUsualChannels) {
       {{y}, {3, 3, 3}},
       {{y, a}, {3, 3, 3}}};
   for (const auto& [channels, expected] : files) {
-    write_channels(directory / "sky.exr", channels);
-    const Lighting lighting = load_environment(settings_for(directory / "sky.exr"));
+    write_channels(file, channels);
+    const Lighting lighting = load_environment(settings);
     for (const glm::vec3& radiance : lighting.environment.radiance)
       ASSERT_LT(glm::length(radiance - expected), 1e-5f);
     EXPECT_NEAR(lighting.report.seen_sr, 4 * pi, 1e-12);
@@ -173,27 +172,21 @@ TEST(LoadEnvironment, ReadsTheUsualChannels) {
   }
 }
 
-std::string message_of(const std::filesystem::path& file) {
-  return test::error_of([&] { load_environment(settings_for(file)); });
-}
-
-TEST(LoadEnvironment, SaysWhatIsWrongWithAFile) {
-  const previz::test::TemporaryDirectory directory;
-  const auto file = directory / "sky.exr";
+TEST_F(LoadEnvironment, SaysWhatIsWrongWithAFile) {
   write_channels(file, {channel("R", 1), channel("G", 1), channel("left.B", 1)});
-  EXPECT_THAT(message_of(file), HasSubstr("found G, R, left.B"));
+  EXPECT_THAT(refusal(), HasSubstr("found G, R, left.B"));
   write_channels(file, {channel("Y", 1), channel("RY", 0), channel("BY", 0)});
-  EXPECT_THAT(message_of(file), HasSubstr("found BY, RY, Y"));
+  EXPECT_THAT(refusal(), HasSubstr("found BY, RY, Y"));
   write_exr_picture(file, {30, 20, std::vector<glm::vec3>(600)});
-  EXPECT_THAT(message_of(file), HasSubstr("30x20"));
-  EXPECT_THAT(message_of(directory / "none.exr"), HasSubstr("none.exr"));
-  EXPECT_THAT(message_of(directory.path()), HasSubstr("cannot be read"));
+  EXPECT_THAT(refusal(), HasSubstr("30x20"));
+  settings.environment = directory / "none.exr";
+  EXPECT_THAT(refusal(), HasSubstr("none.exr"));
+  settings.environment = directory.path();
+  EXPECT_THAT(refusal(), HasSubstr("cannot be read"));
 }
 
 // A file of some kilobytes may claim to hold a picture that no memory holds.
-TEST(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
-  const previz::test::TemporaryDirectory directory;
-  const auto file = directory / "sky.exr";
+TEST_F(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
   {
     Imf::Header header(65536, 32768);
     header.compression() = Imf::ZIP_COMPRESSION;
@@ -201,17 +194,15 @@ TEST(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
       header.channels().insert(channel, Imf::Channel(Imf::HALF));
     const Imf::OutputFile without_pixels(file.c_str(), header);
   }
-  EXPECT_THAT(message_of(file), HasSubstr("65536x32768 pixels; allowed: at most"));
+  EXPECT_THAT(refusal(), HasSubstr("65536x32768 pixels; allowed: at most"));
 }
 
 // So may an attribute of its header, which OpenEXR would ask as much memory for.
-TEST(LoadEnvironment, AHugeAttributeIsRefusedBeforeMemoryIsAskedFor) {
-  const previz::test::TemporaryDirectory directory;
-  const auto file = directory / "sky.exr";
+TEST_F(LoadEnvironment, AHugeAttributeIsRefusedBeforeMemoryIsAskedFor) {
   const std::string name("owner\0string\0", 13);
   std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name
                                         << std::string("\xff\xff\xff\x7f", 4) << "and little more";
-  EXPECT_THAT(message_of(file), HasSubstr("its header is damaged"));
+  EXPECT_THAT(refusal(), HasSubstr("its header is damaged"));
 }
 
 }  // namespace previz::lighting::environment_file_test

@@ -14,14 +14,19 @@ using test::make_frame;
 using test::photograph;
 using test::Sky;
 using test::towards;
+using test::unseen_as;
 
 // A pixel's diagonal on the axis: what is closer than this to an edge may be mixed with it.
 constexpr double pixel_diagonal_rad = 1.5 / 153.3;
 
+double cap_sr(double radius_rad) {
+  return 2 * pi * (1 - std::cos(radius_rad));
+}
+
 const Sky uniform = [](const glm::dvec3&) { return glm::dvec3(1, 2, 3); };
 
 set::Lighting constant_fill(double radiance) {
-  return test::unseen_as(set::UnseenRule::constant, radiance);
+  return unseen_as(set::UnseenRule::constant, radiance);
 }
 
 Lighting estimate_one(const LightCameraCalibration& camera, const Sky& sky, double exposure,
@@ -61,7 +66,6 @@ TEST(Estimate, UniformSkyIsUniformWhereSeen) {
                        ASSERT_EQ(radiance, glm::dvec3(9));
                      }
                    });
-    const auto cap_sr = [](double angle) { return 2 * pi * (1 - std::cos(angle)); };
     EXPECT_LT(lighting.report.seen_sr, cap_sr(100 * degree));
     EXPECT_GT(lighting.report.seen_sr, cap_sr(100 * degree - pixel_diagonal_rad));
     EXPECT_NEAR(lighting.report.seen_sr + lighting.report.filled_sr, 4 * pi, 1e-6);
@@ -85,7 +89,7 @@ TEST(Estimate, OneTexelHoldsTheWholeSphere) {
 // they stand, on the map's folds and poles too, at any resolution.
 TEST(Estimate, LampsKeepFluxAndDirection) {
   constexpr double radius = 2 * degree, lamp = 300, ambient = 0.05;
-  const double solid_angle = 2 * pi * (1 - std::cos(radius));
+  const double solid_angle = cap_sr(radius);
   std::vector<glm::dvec3> places;
   for (const auto& [azimuth, elevation] : {std::pair{0.0, 90.0},
                                            {33.0, 78.0},
@@ -158,11 +162,10 @@ TEST(Estimate, ReportsClippedAndBlackSolidAngles) {
   const EnvironmentReport report = estimate_one(camera, sky, 1, constant_fill(0)).report;
   // Any pixel that the lamp clips when it covers a hundredth of it is counted: up to a pixel's
   // diagonal more. Holes count where a pixel lies wholly inside.
-  const auto cap = [](double radius) { return 2 * pi * (1 - std::cos(radius)); };
-  EXPECT_GT(report.overexposed_sr, cap(5 * degree) * 0.999);
-  EXPECT_LT(report.overexposed_sr, cap(5 * degree + pixel_diagonal_rad));
-  EXPECT_LT(report.underexposed_sr, cap(10 * degree) * 1.001);
-  EXPECT_GT(report.underexposed_sr, cap(10 * degree - pixel_diagonal_rad));
+  EXPECT_GT(report.overexposed_sr, cap_sr(5 * degree) * 0.999);
+  EXPECT_LT(report.overexposed_sr, cap_sr(5 * degree + pixel_diagonal_rad));
+  EXPECT_LT(report.underexposed_sr, cap_sr(10 * degree) * 1.001);
+  EXPECT_GT(report.underexposed_sr, cap_sr(10 * degree - pixel_diagonal_rad));
   ASSERT_GE(report.notes.size(), 3u);
   EXPECT_THAT(report.notes[0], HasSubstr("clipped in every exposure"));
   EXPECT_THAT(report.notes[1], HasSubstr("black in every exposure"));
@@ -171,7 +174,7 @@ TEST(Estimate, ReportsClippedAndBlackSolidAngles) {
 
 // A cap of half angle r has a solid angle of 2 pi (1 - cos r).
 TEST(AreaWords, AreDegreesOrAShareOfAllDirections) {
-  EXPECT_EQ(area_words(2 * pi * (1 - std::cos(2 * degree))), "an area 4.0 degrees wide");
+  EXPECT_EQ(area_words(cap_sr(2 * degree)), "an area 4.0 degrees wide");
   EXPECT_EQ(area_words(pi), "an area of 25 % of all directions");
   EXPECT_EQ(area_words(4 * pi), "an area of 100 % of all directions");
 }
@@ -180,7 +183,7 @@ TEST(UnseenHorizon, ContinuesAUniformSky) {
   for (const glm::dmat4& pose : {looking(0, 90), looking(50, 10)}) {
     const LightCameraCalibration camera = fisheye_camera(512, pose);
     const Lighting lighting =
-        estimate_one(camera, uniform, 0.25, test::unseen_as(set::UnseenRule::horizon));
+        estimate_one(camera, uniform, 0.25, unseen_as(set::UnseenRule::horizon));
     expect_uniform(lighting.environment);
   }
 }
@@ -191,7 +194,7 @@ TEST(UnseenHorizon, FollowsTheAzimuthAndCalmsDown) {
   };
   const LightCameraCalibration camera = fisheye_camera(512, looking(20, 90));
   const EnvironmentMap map =
-      estimate_one(camera, sky, 0.5, test::unseen_as(set::UnseenRule::horizon)).environment;
+      estimate_one(camera, sky, 0.5, unseen_as(set::UnseenRule::horizon)).environment;
   const auto at = [&](double azimuth, double elevation) {
     return map.radiance[texel_index(map.size, glm::vec3(towards(azimuth, elevation)))].r;
   };
@@ -213,7 +216,7 @@ TEST(UnseenHorizon, DoesNotSmearALampAtTheEdge) {
   const LightCameraCalibration camera = fisheye_camera(512, looking(0, 90));
   const std::vector<FramePtr> frames{photograph(camera, sky, 1, test::Detail::fine),
                                      photograph(camera, sky, 5e-4, test::Detail::fine)};
-  const Lighting lighting = estimate(frames, camera, test::unseen_as(set::UnseenRule::horizon));
+  const Lighting lighting = estimate(frames, camera, unseen_as(set::UnseenRule::horizon));
   for_each_texel(lighting.environment, glm::dvec3(0, 0, 1),
                  [&](const glm::dvec3&, const glm::dvec3& radiance, double angle) {
                    // Pixels on the lamp's rim of up to eight times the median may remain.
@@ -229,8 +232,7 @@ TEST(UnseenMirror, ShowsTheUpperHalfBelow) {
   for (const glm::dmat4& pose : {looking(0, 90, 25), looking(30, 20)}) {
     const LightCameraCalibration camera = fisheye_camera(512, pose);
     const glm::dvec3 axis(pose[2]);
-    const Lighting lighting =
-        estimate_one(camera, sky, 0.9, test::unseen_as(set::UnseenRule::mirror));
+    const Lighting lighting = estimate_one(camera, sky, 0.9, unseen_as(set::UnseenRule::mirror));
     for_each_texel(lighting.environment, axis,
                    [&](const glm::dvec3& d, const glm::dvec3& radiance, double angle) {
                      if (angle < 101 * degree) return;
@@ -243,8 +245,7 @@ TEST(UnseenMirror, ShowsTheUpperHalfBelow) {
 TEST(UnseenMirror, FallsBackToTheHorizonWhereTheMirrorIsUnseenToo) {
   LightCameraCalibration camera = fisheye_camera(512, looking(0, 90));
   camera.intrinsics.max_angle_rad = 80 * degree;
-  const Lighting lighting =
-      estimate_one(camera, uniform, 0.25, test::unseen_as(set::UnseenRule::mirror));
+  const Lighting lighting = estimate_one(camera, uniform, 0.25, unseen_as(set::UnseenRule::mirror));
   expect_uniform(lighting.environment);
   EXPECT_THAT(lighting.report.notes.back(), HasSubstr("not in the mirrored picture either"));
 }
@@ -255,9 +256,9 @@ TEST(Estimate, ThePictureMayCutTheCircle) {
   camera.intrinsics.width = 400;
   camera.intrinsics.cx = 190;
   const Lighting lighting =
-      estimate_one(camera, uniform, 0.25, test::unseen_as(set::UnseenRule::horizon));
+      estimate_one(camera, uniform, 0.25, unseen_as(set::UnseenRule::horizon));
   expect_uniform(lighting.environment);
-  EXPECT_LT(lighting.report.seen_sr, 2 * pi * (1 - std::cos(100 * degree)) * 0.95);
+  EXPECT_LT(lighting.report.seen_sr, cap_sr(100 * degree) * 0.95);
 }
 
 TEST(Estimate, ResolutionFollowsTheSourceOrTheSet) {
@@ -272,10 +273,8 @@ TEST(Estimate, ResolutionFollowsTheSourceOrTheSet) {
 TEST(Estimate, RefusesFramesThatDoNotFit) {
   const LightCameraCalibration camera = fisheye_camera();
   const FramePtr frame = make_frame(2, 2, 1, std::vector<glm::dvec3>(4));
-  EXPECT_EQ(test::error_of([&] {
-              estimate({&frame, 1}, camera, {});
-            }),
-            "light frame 0 has 2x2 pixels, the light camera's calibration 512x512");
+  const std::string refusal = test::error_of([&] { estimate({&frame, 1}, camera, {}); });
+  EXPECT_EQ(refusal, "light frame 0 has 2x2 pixels, the light camera's calibration 512x512");
   EXPECT_THROW(estimate({}, camera, {}), Error);  // no frame
 }
 

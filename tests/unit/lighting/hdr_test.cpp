@@ -8,6 +8,7 @@
 namespace previz::lighting::hdr_test {
 
 using test::make_frame;
+using test::rgb8_frame;
 
 const ResponseCurve linear{
     .kind = ResponseCurve::Kind::linear, .inverse_table = {}, .clip_share = 1};
@@ -25,21 +26,10 @@ FramePtr frame_of(double exposure, const std::vector<glm::dvec3>& radiances) {
   return saturated_frame(exposure, radiances, 1);
 }
 
-FramePtr srgb8_frame(int width, double exposure, std::vector<std::uint8_t> codes) {
-  Frame frame;
-  frame.source = "light";
-  frame.sequence = 12;
-  frame.exposure = exposure;
-  frame.width = width;
-  frame.height = static_cast<int>(codes.size()) / 3 / width;
-  frame.bytes = std::move(codes);
-  return std::make_shared<Frame>(std::move(frame));
-}
-
 TEST(MergeExposures, OneExposureIsTheInverseResponse) {
   std::vector<std::uint8_t> codes;
   for (int code = 0; code < 255; ++code) codes.insert(codes.end(), 3, static_cast<uint8_t>(code));
-  const FramePtr frame = srgb8_frame(255, 0.5, codes);
+  const FramePtr frame = rgb8_frame(255, 0.5, codes);
   const HdrPicture picture = merge_exposures({&frame, 1}, srgb);
   const Response response({}, 8);
   for (std::size_t code = 0; code < 255; ++code) {
@@ -129,7 +119,7 @@ TEST(MergeExposures, ADarkLevelAtWhatIsClippedIsRefused) {
 TEST(MergeExposures, OnlyTheLargestCodeIsClippedUnlessTheCalibrationSaysOtherwise) {
   for (const int bits : {1, 8, 10, 12, 16})
     EXPECT_EQ(Response(srgb, bits).clipping().at, (1u << bits) - 1) << bits;
-  const FramePtr frame = srgb8_frame(2, 1, {254, 254, 254, 255, 255, 255});
+  const FramePtr frame = rgb8_frame(2, 1, {254, 254, 254, 255, 255, 255});
   EXPECT_EQ(merge_exposures({&frame, 1}, srgb).flags, (std::vector<std::uint8_t>{0, overexposed}));
 }
 
@@ -162,7 +152,7 @@ TEST(MergeExposures, IsUnbiasedAndNearTheBestUnderSensorNoise) {
       for (int i = 0; i < pixels; ++i)
         codes.insert(codes.end(), 3,
                      static_cast<std::uint8_t>(response.forward(signal + sigma * normal(random))));
-      frames.push_back(srgb8_frame(pixels, exposure, codes));
+      frames.push_back(rgb8_frame(pixels, exposure, codes));
       const int code = response.forward(signal);
       if (code > 1 && code < 250) {
         const double step = response.inverse()[static_cast<std::size_t>(code + 1)] -
@@ -194,9 +184,9 @@ std::string merge_error(const std::vector<FramePtr>& frames) {
 
 TEST(MergeExposures, RefusesWhatCannotBeUsed) {
   EXPECT_THAT(merge_error({}), HasSubstr("at least one"));
-  EXPECT_THAT(merge_error({srgb8_frame(1, 0, {1, 2, 3})}), HasSubstr("light frame 12: exposure"));
-  EXPECT_THAT(merge_error({srgb8_frame(1, std::nan(""), {1, 2, 3})}), HasSubstr("exposure"));
-  EXPECT_THAT(merge_error({srgb8_frame(1, 1, {1, 2, 3}), srgb8_frame(2, 1, {1, 2, 3, 1, 2, 3})}),
+  EXPECT_THAT(merge_error({rgb8_frame(1, 0, {1, 2, 3})}), HasSubstr("light frame 12: exposure"));
+  EXPECT_THAT(merge_error({rgb8_frame(1, std::nan(""), {1, 2, 3})}), HasSubstr("exposure"));
+  EXPECT_THAT(merge_error({rgb8_frame(1, 1, {1, 2, 3}), rgb8_frame(2, 1, {1, 2, 3, 1, 2, 3})}),
               HasSubstr("2x1"));
 }
 

@@ -24,14 +24,13 @@ Plate film(const ObserverCalibration& camera, const glm::dmat4& pose, double exp
   const PinholeIntrinsics& lens = camera.intrinsics;
   const Response response(camera.response, 8);
   Plate plate{lens.width, lens.height, 8, {}};
-  for (int y = 0; y < lens.height; ++y) {
+  for (int y = 0; y < lens.height; ++y)
     for (int x = 0; x < lens.width; ++x) {
       const glm::dvec2 n = undistort(lens, {x, y}).value();
       const glm::dvec3 direction = glm::normalize(glm::dmat3(pose) * glm::dvec3(n, 1));
       for (int c = 0; c < 3; ++c)
         plate.samples.push_back(response.forward(exposure * sky(direction)[c]));
     }
-  }
   return plate;
 }
 

@@ -48,12 +48,11 @@ HdrPicture clipped_square(int size, int side) {
                      std::vector<glm::vec3>(pixels, glm::vec3(0.2f)),
                      std::vector<std::uint8_t>(pixels),
                      {}};
-  for (int y = 8; y < 8 + side; ++y) {
+  for (int y = 8; y < 8 + side; ++y)
     for (int x = 8; x < 8 + side; ++x) {
       picture.radiance[static_cast<std::size_t>(y * size + x)] = glm::vec3(2, 2, 1);
       picture.flags[static_cast<std::size_t>(y * size + x)] = overexposed;
     }
-  }
   return picture;
 }
 

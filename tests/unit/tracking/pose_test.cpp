@@ -42,7 +42,7 @@ double distance_m(const FittedPose& fit, const glm::dmat4& truth) {
 // Rounding alone: 1e-9 m at 1 m, at every scale and 1 km from the origin.
 TEST(TrackingPose, ExactCornersGiveTheExactPose) {
   std::mt19937 random(1);
-  for (double scale : {1e-3, 1.0, 1e3}) {
+  for (double scale : {1e-3, 1.0, 1e3})
     for (double offset : {0.0, 1000.0}) {
       TagScene scene = three_tags();
       for (set::Tag& tag : scene.tags) {
@@ -59,7 +59,6 @@ TEST(TrackingPose, ExactCornersGiveTheExactPose) {
       EXPECT_LT(distance_m(poses[0], scene.world_from_camera), tolerance);
       EXPECT_EQ(poses[0].used.size(), 3u);
     }
-  }
 }
 
 // The normalised error squared of n trials has mean 6 and standard error sqrt(12/n). The covariance

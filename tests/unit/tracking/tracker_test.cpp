@@ -179,7 +179,7 @@ TEST(Tracker, PicturesOfAnySizeAndContent) {
   for (const auto& [w, h] :
        {std::pair(1, 1), std::pair(2, 3), std::pair(7, 5), std::pair(15, 40), std::pair(16, 16),
         std::pair(17, 19), std::pair(33, 31), std::pair(101, 67), std::pair(400, 3)}) {
-    for (double decimate : {1.0, 2.0, 3.0}) {
+    for (double decimate : {1.0, 2.0, 3.0})
       for (PixelFormat format : {PixelFormat::rgb8, PixelFormat::gray8, PixelFormat::gray16}) {
         TagScene scene = table();
         scene.lens = test::plain_lens(w, h, 100);
@@ -194,7 +194,6 @@ TEST(Tracker, PicturesOfAnySizeAndContent) {
           EXPECT_EQ(tracker->track(frame).status, TrackStatus::lost);
         }
       }
-    }
   }
 }
 
