@@ -1,12 +1,10 @@
 // What the tests of the whole tracker share: a table with tags, its pictures, and errors of poses.
 #pragma once
 
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
-#include <glm/matrix.hpp>
 
 #include "daemon/tracking/apriltag_tracker.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::tracking {

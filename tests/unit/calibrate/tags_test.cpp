@@ -13,7 +13,6 @@
 #include "drivers/session/files.hpp"
 #include "tests/support/tag_walks.hpp"
 #include "tests/support/temporary_directory.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 #include "tests/support/units.hpp"
 

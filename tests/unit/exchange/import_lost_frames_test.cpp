@@ -35,11 +35,13 @@ Timed import_video(const Shoot& shoot) {
   return timed;
 }
 
+using Options = std::map<std::string, std::string>;  // of an encoder
+
 struct Damage {
   const char* name;
   const char* encoder;
   const char* file;
-  std::map<std::string, std::string> options;
+  Options options;
   std::size_t at_least;  // so many frames come in
 };
 
@@ -140,14 +142,12 @@ TEST_P(ImportTruncatedVideo, NoFrameThatRefersToALostOneComesIn) {
 
 // The most that may be lost: a group of 12, and the frames before the next key frame in time.
 constexpr std::size_t all_but_a_group = texture_frames - 15;
-const std::map<std::string, std::string> groups = {{"g", "12"}, {"bf", "2"}};
+const Options groups = {{"g", "12"}, {"bf", "2"}};
+const Options groups_of_hevc = {{"g", "12"},
+                                {"x265-params", "log-level=none:pools=none:bframes=2"}};
 const Damage mjpeg{"mjpeg", "mjpeg", "take.avi", {}, texture_frames - 1};
 const Damage h264{"h264", "libx264", "take.mp4", groups, all_but_a_group};
-const Damage hevc{"hevc",
-                  "libx265",
-                  "take.mkv",
-                  {{"g", "12"}, {"x265-params", "log-level=none:pools=none:bframes=2"}},
-                  all_but_a_group};
+const Damage hevc{"hevc", "libx265", "take.mkv", groups_of_hevc, all_but_a_group};
 const Damage mpeg4{"mpeg4", "mpeg4", "take.mp4", groups, all_but_a_group};
 const Damage mpeg2{"mpeg2", "mpeg2video", "take.mkv", groups, all_but_a_group};
 
@@ -193,11 +193,9 @@ TEST(ImportVideo, ATransportStreamThatLostPacketsComesInWithoutTheirFrames) {
 // What was cut away before an open group's key frame is lost at the beginning; the numbers and
 // times of the others count from what is in the file.
 TEST(ImportVideo, ACutAtAnOpenGroupOfPicturesComesIn) {
-  const Damage open_group{"",
-                          "libx264",
-                          "take.mkv",
-                          {{"g", "12"}, {"bf", "2"}, {"x264-params", "open-gop=1:scenecut=0"}},
-                          0};
+  Options options = groups;
+  options["x264-params"] = "open-gop=1:scenecut=0";
+  const Damage open_group{"", "libx264", "take.mkv", options, 0};
   Packets packets;
   const Timed whole = import_video(open_group, packets.kept());
   ASSERT_EQ(whole.frames.size(), std::size_t{texture_frames});

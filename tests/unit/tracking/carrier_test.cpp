@@ -1,10 +1,8 @@
 // Carriers: things with tags that are moved by hand, on pictures whose poses the test knows.
 #include <glm/gtc/matrix_transform.hpp>
-#include <opencv2/core.hpp>
 
 #include "daemon/tracking/carrier_pose.hpp"
 #include "tests/support/pose_error.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::carrier_test {

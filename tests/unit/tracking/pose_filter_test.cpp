@@ -2,10 +2,7 @@
 // the tags are covered for a moment.
 #include "daemon/tracking/pose_filter.hpp"
 
-#include <opencv2/core.hpp>
-
 #include "tests/support/pose_error.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::pose_filter_test {

@@ -3,7 +3,6 @@
 
 #include "daemon/tracking/joint_pose.hpp"
 #include "tests/support/pose_error.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::tracking::pose_test {

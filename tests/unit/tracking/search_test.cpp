@@ -2,7 +2,6 @@
 // the whole picture shows.
 #include "daemon/tracking/search_plan.hpp"
 #include "daemon/tracking/tag_detector.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::search_test {

@@ -2,7 +2,6 @@
 // filter of what is shown.
 #include "daemon/tracking/pose_filter.hpp"
 #include "tests/support/pose_error.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::shown_pose_test {

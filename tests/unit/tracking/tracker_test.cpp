@@ -1,7 +1,6 @@
 // The whole tracker on pictures made by the test: poses, formats, loss. Extremes: tests/extremes.
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::tracker_test {
