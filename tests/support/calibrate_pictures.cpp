@@ -1,7 +1,9 @@
 #include "tests/support/calibrate_pictures.hpp"
 
 #include <glm/gtc/matrix_transform.hpp>
-#include <glm/matrix.hpp>
+
+#include "daemon/calibrate/lens/observer.hpp"
+#include "daemon/calibrate/tags/tag_lens.hpp"
 
 namespace previz::test {
 namespace {
@@ -36,6 +38,17 @@ calibrate::Views hold(const calibrate::Board& board, const std::vector<Held>& ho
   return views;
 }
 
+calibrate::Views hold(const std::vector<Held>& how, const PinholeIntrinsics& lens, double noise_px,
+                      unsigned seed) {
+  std::mt19937 random(seed);
+  const calibrate::LensVector all = calibrate::lens_vector(lens);
+  const Lens through = [&](const glm::dvec3& point) {
+    return calibrate::project_pinhole({all.val, calibrate::lens_size}, point);
+  };
+  return hold(calibrate::parse_board("chessboard:9x6:25mm"), how, through, lens.width, lens.height,
+              noise_px, random);
+}
+
 std::vector<Held> careful_capture() {
   std::vector<Held> how;
   for (const double turn : {-35.0, 0.0, 35.0})
@@ -43,6 +56,22 @@ std::vector<Held> careful_capture() {
       for (const double depth : {0.30, 0.45})
         how.push_back({turn, tip, 10 * turn / 35 + 5, {0.12 * turn / 35, 0.09 * tip / 35, depth}});
   return how;
+}
+
+void record(const std::filesystem::path& session, const session::SessionInfo& info,
+            const std::string& source, const std::vector<calibrate::BracketPicture>& pictures) {
+  session::SessionWriter writer(session, info);
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    Frame frame;
+    frame.source = source;
+    frame.sequence = i;
+    frame.timestamp_ns = frame.arrival_ns = std::int64_t(i) * 40'000'000;
+    frame.exposure = frame.exposure_s = pictures[i].exposure;
+    frame.width = pictures[i].width;
+    frame.height = pictures[i].height;
+    frame.bytes = pictures[i].rgb;
+    writer.write(frame);
+  }
 }
 
 }  // namespace previz::test

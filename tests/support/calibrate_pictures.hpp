@@ -2,12 +2,12 @@
 // calibrations.
 #pragma once
 
-#include <functional>
-#include <optional>
-#include <random>
-
+#include "daemon/calibrate/lens/source.hpp"
 #include "daemon/calibrate/lens/views.hpp"
+#include "daemon/calibrate/sensor/brackets.hpp"
 #include "daemon/tracking/joint_pose.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/units.hpp"
 
 namespace previz::test {
@@ -26,8 +26,32 @@ struct Held {
 calibrate::Views hold(const calibrate::Board& board, const std::vector<Held>& how, const Lens& lens,
                       int width, int height, double noise_px, std::mt19937& random);
 
+// A 9x6 chessboard of 25 mm, seen through a pinhole lens.
+calibrate::Views hold(const std::vector<Held>& how, const PinholeIntrinsics& lens, double noise_px,
+                      unsigned seed);
+
 // A capture that a careful operator would make of a 9x6 board of 25 mm for a lens of about 60
 // degrees: near and tilted all over the picture.
 std::vector<Held> careful_capture();
+
+// Footage that is not in files.
+class Pictures final : public calibrate::PictureSource {
+ public:
+  explicit Pictures(std::vector<FramePtr> frames) : frames_(std::move(frames)) {}
+  std::optional<calibrate::NamedFrame> next() override {
+    if (index_ == frames_.size()) return std::nullopt;
+    const std::string name = "picture " + std::to_string(index_);
+    return calibrate::NamedFrame{frames_[index_++], name};
+  }
+  std::optional<std::size_t> count() const override { return frames_.size(); }
+
+ private:
+  std::vector<FramePtr> frames_;
+  std::size_t index_ = 0;
+};
+
+// Writes a session of these pictures, 40 ms apart, as one camera ("observer" or "light") has them.
+void record(const std::filesystem::path& session, const session::SessionInfo& info,
+            const std::string& source, const std::vector<calibrate::BracketPicture>& pictures);
 
 }  // namespace previz::test

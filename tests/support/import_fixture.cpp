@@ -1,5 +1,4 @@
 #include "tests/support/import_fixture.hpp"
-#include "tests/support/test.hpp"
 
 extern "C" {
 #include <libavutil/imgutils.h>
@@ -23,7 +22,7 @@ cv::Mat noise_picture(int seed, int type, int width, int height) {
   return picture;
 }
 
-std::vector<std::uint8_t> frame_bytes_of(const cv::Mat& picture) {
+Bytes frame_bytes_of(const cv::Mat& picture) {
   cv::Mat rgb = picture;
   if (picture.channels() == 3) cv::cvtColor(picture, rgb, cv::COLOR_BGR2RGB);
   return {rgb.datastart, rgb.dataend};
@@ -79,7 +78,7 @@ AVStream& add_stream(AVFormatContext& context, const AVCodecContext& encoder,
   return *stream;
 }
 
-av::Picture picture_of(const std::vector<std::uint8_t>& bytes, const AVCodecContext& encoder) {
+av::Picture picture_of(const Bytes& bytes, const AVCodecContext& encoder) {
   av::Picture picture(av_frame_alloc());
   picture->width = encoder.width;
   picture->height = encoder.height;
@@ -97,7 +96,7 @@ av::Picture picture_of(const std::vector<std::uint8_t>& bytes, const AVCodecCont
 }  // namespace
 
 void write_video(const std::filesystem::path& file, const VideoForm& form,
-                 const std::vector<std::vector<std::uint8_t>>& frames) {
+                 const std::vector<Bytes>& frames) {
   av_log_set_level(AV_LOG_ERROR);  // encoders talk
   AVFormatContext* context = nullptr;
   ASSERT_GE(avformat_alloc_output_context2(&context, nullptr, nullptr, file.c_str()), 0);
@@ -130,26 +129,18 @@ void write_video(const std::filesystem::path& file, const VideoForm& form,
   ASSERT_EQ(av_write_trailer(context), 0);
 }
 
-void write_video(const std::filesystem::path& file, const std::string& pixel_format,
-                 const std::vector<std::vector<std::uint8_t>>& frames, int width, int height,
-                 int fps, bool bt709) {
-  VideoForm form;
-  form.pixel_format = pixel_format;
-  form.width = width;
-  form.height = height;
-  form.fps = fps;
-  if (bt709) {
-    form.matrix = AVCOL_SPC_BT709;
-    form.range = AVCOL_RANGE_MPEG;
-  }
-  write_video(file, form, frames);
-}
-
 Shoot::Shoot() {
   for (int i = 0; i < 3; ++i)
     write_picture(folder() / "observer" / numbered("000", i, ".png"),
                   noise_picture(i, CV_8UC3, 32, 24));
   json = {{"observer", {{"pictures", "observer/%04d.png"}, {"fps", 25}, {"exposure", 0.5}}}};
+}
+
+void Shoot::film(const std::string& name, const VideoForm& form, const std::vector<Bytes>& frames,
+                 const Json& more) {
+  write_video(folder() / name, form, frames);
+  json["observer"] = {{"video", name}, {"exposure", 1}};
+  json["observer"].update(more);
 }
 
 ImportReport Shoot::import() const {
@@ -159,20 +150,24 @@ ImportReport Shoot::import() const {
 }
 
 std::string Shoot::error() const {
-  try {
-    import();
-    return "";
-  } catch (const Error& error) {
-    EXPECT_FALSE(std::filesystem::exists(session()));
-    for (const auto& entry : std::filesystem::directory_iterator(folder()))
-      EXPECT_FALSE(entry.path().filename().string().starts_with(".")) << entry.path();
-    return error.what();
-  }
+  const std::string message = test::error_of([&] { import(); });
+  if (message.empty()) return "";
+  EXPECT_FALSE(std::filesystem::exists(session()));
+  for (const auto& entry : std::filesystem::directory_iterator(folder()))
+    EXPECT_FALSE(entry.path().filename().string().starts_with(".")) << entry.path();
+  return message;
 }
 
-std::unique_ptr<session::StreamReader> Shoot::open_observer() const {
+FramePtr Shoot::first_frame() const {
+  import();
+  return open()->read(0);
+}
+
+std::unique_ptr<session::StreamReader> Shoot::open(const std::string& source) const {
   session::Session opened = session::open_session(session());
-  return session::open_stream(opened, "observer");
+  auto stream = session::open_stream(opened, source);
+  EXPECT_TRUE(opened.missing.empty());
+  return stream;
 }
 
 }  // namespace previz::exchange

@@ -4,8 +4,9 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
+#include <half.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -26,36 +27,42 @@ HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve
 
 glm::dvec3 irradiance(const EnvironmentMap& map, const glm::dvec3& normal) {
   glm::dvec3 sum(0);
-  for (int j = 0; j < map.size; ++j) {
-    for (int i = 0; i < map.size; ++i) {
-      const glm::dvec3 direction(texel_direction(map.size, i, j));
-      const double cosine = glm::dot(direction, normal);
-      if (cosine > 0)
-        sum += cosine * glm::dvec3(map.radiance[static_cast<std::size_t>(j * map.size + i)]);
-    }
-  }
+  for_each_texel(map, [&](const glm::dvec3& direction, const glm::dvec3& radiance) {
+    sum += std::max(0.0, glm::dot(direction, normal)) * radiance;
+  });
   return sum * texel_sr(map.size);
 }
 
-void write_exr_picture(const std::filesystem::path& path, const LinearPicture& picture) {
+void write_exr_channels(const std::filesystem::path& path, int width, int height,
+                        const std::vector<ExrChannel>& channels) {
   try {
-    Imf::Header header(picture.width, picture.height);
+    Imf::Header header(width, height);
     header.compression() = Imf::ZIP_COMPRESSION;
     Imf::FrameBuffer buffer;
-    const std::array<const char*, 3> names{"R", "G", "B"};
-    for (std::size_t c = 0; c < 3; ++c) {
-      header.channels().insert(names[c], Imf::Channel(Imf::FLOAT));
-      buffer.insert(names[c],
-                    Imf::Slice::Make(Imf::FLOAT, &picture.radiance[0][static_cast<int>(c)],
-                                     header.dataWindow(), sizeof(glm::vec3),
-                                     sizeof(glm::vec3) * static_cast<std::size_t>(picture.width)));
+    std::vector<std::vector<half>> halves;
+    for (const auto& [name, values, is_half] : channels) {
+      const Imf::PixelType type = is_half ? Imf::HALF : Imf::FLOAT;
+      halves.emplace_back(values.begin(), values.end());
+      const void* first = is_half ? static_cast<const void*>(halves.back().data()) : values.data();
+      const std::size_t bytes = is_half ? sizeof(half) : sizeof(float);
+      header.channels().insert(name, Imf::Channel(type));
+      buffer.insert(name, Imf::Slice::Make(type, first, header.dataWindow(), bytes,
+                                           bytes * static_cast<std::size_t>(width)));
     }
     Imf::OutputFile file(path.c_str(), header);
     file.setFrameBuffer(buffer);
-    file.writePixels(picture.height);
+    file.writePixels(height);
   } catch (const std::exception& error) {
     throw Error(path.string() + ": cannot be written: " + error.what());
   }
+}
+
+void write_exr_picture(const std::filesystem::path& path, const LinearPicture& picture,
+                       bool is_half) {
+  std::vector<ExrChannel> channels{{"R", {}, is_half}, {"G", {}, is_half}, {"B", {}, is_half}};
+  for (const glm::vec3& radiance : picture.radiance)
+    for (int c = 0; c < 3; ++c) channels[static_cast<std::size_t>(c)].values.push_back(radiance[c]);
+  write_exr_channels(path, picture.width, picture.height, channels);
 }
 
 LinearPicture to_latitude_longitude(const EnvironmentMap& map, int width) {

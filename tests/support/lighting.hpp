@@ -5,6 +5,8 @@
 #include <glm/vec3.hpp>
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "daemon/lighting/environment.hpp"
 #include "daemon/lighting/exr_picture.hpp"
@@ -19,6 +21,14 @@ HdrPicture merge_exposures(std::span<const FramePtr> frames, const ResponseCurve
                            const glm::dvec3& dark_level = glm::dvec3(0),
                            const SensorNoise& noise = {});
 
+// Calls body(direction, radiance) for each texel.
+template <typename Body>
+void for_each_texel(const EnvironmentMap& map, const Body& body) {
+  for (int t = 0; t < map.size * map.size; ++t)
+    body(glm::dvec3(texel_direction(map.size, t % map.size, t / map.size)),
+         glm::dvec3(map.radiance[static_cast<std::size_t>(t)]));
+}
+
 // Irradiance on a plane of this unit normal, per channel.
 glm::dvec3 irradiance(const EnvironmentMap& map, const glm::dvec3& normal);
 
@@ -27,8 +37,18 @@ inline std::optional<double> at_infinity(const glm::dvec3&) {
   return std::nullopt;
 }
 
-// 32-bit float RGB. Throws previz::Error naming the file.
-void write_exr_picture(const std::filesystem::path& path, const LinearPicture& picture);
+struct ExrChannel {
+  std::string name;
+  std::vector<float> values;  // a pixel each
+  bool is_half = false;
+};
+
+// Throws previz::Error naming the file.
+void write_exr_channels(const std::filesystem::path& path, int width, int height,
+                        const std::vector<ExrChannel>& channels);
+// RGB, 32-bit float unless halves are asked for. Throws as write_exr_channels().
+void write_exr_picture(const std::filesystem::path& path, const LinearPicture& picture,
+                       bool is_half = false);
 
 // Latitude-longitude picture, twice as wide as high, laid out as load_environment reads it: means
 // over 4x4 directions a pixel.

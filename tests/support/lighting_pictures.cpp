@@ -1,6 +1,7 @@
 #include "tests/support/lighting_pictures.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <numbers>
@@ -31,17 +32,33 @@ FramePtr make_frame(int width, int height, double exposure,
   return std::make_shared<Frame>(std::move(frame));
 }
 
-LightCameraCalibration fisheye_camera(int size) {
+FramePtr make_frame(int width, int height, double exposure,
+                    const std::function<glm::dvec3(int x, int y)>& signal_at) {
+  std::vector<glm::dvec3> signals;
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) signals.push_back(signal_at(x, y));
+  return make_frame(width, height, exposure, signals);
+}
+
+FramePtr rgb8_frame(int width, double exposure, std::vector<std::uint8_t> codes,
+                    std::uint64_t sequence) {
+  Frame frame;
+  frame.source = "light";
+  frame.sequence = sequence;
+  frame.exposure = exposure;
+  frame.width = width;
+  frame.height = static_cast<int>(codes.size()) / 3 / width;
+  frame.bytes = std::move(codes);
+  return std::make_shared<Frame>(std::move(frame));
+}
+
+LightCameraCalibration fisheye_camera(int size, const glm::dmat4& world_from_camera) {
   LightCameraCalibration camera;
-  camera.intrinsics = {.width = size,
-                       .height = size,
-                       .fx = 153.3 * size / 512,
-                       .fy = 153.3 * size / 512,
-                       .cx = (size - 1) / 2.0,
-                       .cy = (size - 1) / 2.0,
-                       .k = {-0.02, 0.002, -0.0003, 0},
-                       .max_angle_rad = 100 * degree};
+  const double focal_px = 153.3 * size / 512, centre_px = (size - 1) / 2.0;
+  const std::array k{-0.02, 0.002, -0.0003, 0.0};
+  camera.intrinsics = {size, size, focal_px, focal_px, centre_px, centre_px, k, 100 * degree};
   camera.response.kind = ResponseCurve::Kind::linear;
+  camera.world_from_camera = world_from_camera;
   return camera;
 }
 
@@ -83,15 +100,19 @@ FramePtr photograph(const LightCameraCalibration& camera, const Sky& sky, double
     mean.radiance = sum / static_cast<double>(samples * samples);
     return mean;
   };
-  std::vector<glm::dvec3> signals;
-  for (int y = 0; y < camera.intrinsics.height; ++y) {
-    for (int x = 0; x < camera.intrinsics.width; ++x) {
-      Mean mean = mean_of(x, y, 2);
-      if (mean.varies && detail == Detail::fine) mean = mean_of(x, y, 8);
-      signals.push_back(exposure * mean.radiance);
-    }
-  }
-  return make_frame(camera.intrinsics.width, camera.intrinsics.height, exposure, signals);
+  const FisheyeIntrinsics& size = camera.intrinsics;
+  return make_frame(size.width, size.height, exposure, [&](int x, int y) {
+    Mean mean = mean_of(x, y, 2);
+    if (mean.varies && detail == Detail::fine) mean = mean_of(x, y, 8);
+    return exposure * mean.radiance;
+  });
+}
+
+set::Lighting unseen_as(set::UnseenRule rule, double radiance) {
+  set::Lighting settings;
+  settings.unseen = rule;
+  settings.unseen_radiance = glm::dvec3(radiance);
+  return settings;
 }
 
 std::vector<glm::dvec3> upper_normals() {

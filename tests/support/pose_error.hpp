@@ -1,10 +1,9 @@
 // How far one pose is from another, and how likely that is.
 #pragma once
 
-#include <array>
-#include <glm/mat4x4.hpp>
-#include <glm/matrix.hpp>
 #include <opencv2/core.hpp>
+
+#include "tests/support/test.hpp"
 
 namespace previz::tracking {
 

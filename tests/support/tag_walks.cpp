@@ -1,10 +1,6 @@
 #include "tests/support/tag_walks.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <glm/gtc/matrix_transform.hpp>
-#include <glm/matrix.hpp>
 
 #include "tests/support/tracking_synthetic.hpp"
 #include "tests/support/units.hpp"
@@ -75,15 +71,14 @@ calibrate::TagWalk walk_of(const PinholeIntrinsics& lens, const std::vector<glm:
       seen.corners = calibrate::projected_tag(lens, tracking::camera_from_world(cameras[p]),
                                               tags[t].world_from_tag, tags[t].size_m);
       seen.variance_px2 = noise_px * noise_px;
-      double side = HUGE_VAL;
-      bool inside = true;
+      bool is_seen = true;
       for (std::size_t i = 0; i < 4; ++i) {
         const glm::dvec2& corner = seen.corners[i];
-        side = std::min(side, glm::distance(corner, seen.corners[(i + 1) % 4]));
-        inside = inside && corner.x > border_px && corner.y > border_px &&
-                 corner.x < lens.width - border_px && corner.y < lens.height - border_px;
+        is_seen = is_seen && corner.x > border_px && corner.y > border_px &&
+                  corner.x < lens.width - border_px && corner.y < lens.height - border_px &&
+                  glm::distance(corner, seen.corners[(i + 1) % 4]) >= least_side_px;
       }
-      if (!inside || side < least_side_px) continue;
+      if (!is_seen) continue;
       for (glm::dvec2& corner : seen.corners) corner += glm::dvec2(noise(random), noise(random));
       walk.sightings.push_back(seen);
     }

@@ -1,12 +1,9 @@
 // What a camera would see of tags on a walk, made by the tests: corners with noise, no pictures.
 #pragma once
 
-#include <functional>
-#include <random>
-#include <vector>
-
 #include "daemon/calibrate/tags/tag_bundle.hpp"
 #include "daemon/set/set.hpp"
+#include "tests/support/test.hpp"
 
 namespace previz::test {
 

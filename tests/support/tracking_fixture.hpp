@@ -1,12 +1,10 @@
 // What the tests of the whole tracker share: a table with tags, its pictures, and errors of poses.
 #pragma once
 
-#include <cmath>
-#include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
-#include <glm/matrix.hpp>
 
 #include "daemon/tracking/apriltag_tracker.hpp"
+#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::tracking {
@@ -36,10 +34,15 @@ inline set::Tracking settings_for(const TagScene& scene) {
 
 inline Frame picture(const TagScene& scene, std::mt19937& random, double full_well_e = 20000,
                      PixelFormat format = PixelFormat::rgb8) {
-  test::Sensor sensor;
-  sensor.full_well_e = full_well_e;
-  sensor.format = format;
-  return test::expose(test::render(scene), sensor, random);
+  return test::expose(test::render(scene),
+                      {.full_well_e = full_well_e, .response = {}, .format = format}, random);
+}
+
+// What a new tracker finds in one picture of what is `seen`.
+inline Track track_once(const set::Tracking& settings, const TagScene& seen, unsigned seed,
+                        PixelFormat format = PixelFormat::rgb8) {
+  std::mt19937 random(seed);
+  return make_apriltag_tracker(settings, seen.lens)->track(picture(seen, random, 20000, format));
 }
 
 inline double angle_between(const glm::dmat4& a, const glm::dmat4& b) {

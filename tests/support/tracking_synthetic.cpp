@@ -17,23 +17,6 @@
 namespace previz::test {
 namespace {
 
-// A family's layout: cells of each code as libapriltag draws them, and the border's width.
-struct Layout {
-  int total = 0, border = 0;
-  std::vector<std::uint8_t> cells;  // row-major from the top, 0 black
-};
-
-Layout layout(const std::string& name, int id) {
-  const tracking::TagFamily family = tracking::make_tag_family(name);
-  image_u8_t* image = apriltag_to_image(family.get(), id);
-  Layout l{family->total_width, family->width_at_border, {}};
-  for (int y = 0; y < l.total; ++y)
-    for (int x = 0; x < l.total; ++x) l.cells.push_back(image->buf[y * image->stride + x]);
-  std::free(image->buf);  // the packaged library does not export image_u8_destroy
-  std::free(image);
-  return l;
-}
-
 glm::dvec2 project(const TagScene& scene, glm::dvec3 world) {
   const glm::dvec4 x = glm::inverse(scene.world_from_camera) * glm::dvec4(world, 1);
   if (!(x.z > 0)) throw std::logic_error("the test's tag is behind its camera");
@@ -81,6 +64,17 @@ double forward(const ResponseCurve& curve, double signal) {
 }
 
 }  // namespace
+
+TagCells cells_of(const std::string& name, int id) {
+  const tracking::TagFamily family = tracking::make_tag_family(name);
+  image_u8_t* image = apriltag_to_image(family.get(), id);
+  TagCells tag{family->total_width, family->width_at_border, {}};
+  for (int y = 0; y < tag.total; ++y)
+    for (int x = 0; x < tag.total; ++x) tag.cells.push_back(image->buf[y * image->stride + x]);
+  std::free(image->buf);  // the packaged library does not export image_u8_destroy
+  std::free(image);
+  return tag;
+}
 
 void add_polygon(LinearPicture& picture, const std::vector<glm::dvec2>& polygon, double amount) {
   // Signed area to the right of every edge, by pixel; summed along rows it is the coverage. Pixel
@@ -144,7 +138,7 @@ LinearPicture render(const TagScene& scene) {
   }
   const double share = 1.0 / double(shifts.size());
   for (const set::Tag& tag : scene.tags) {
-    const Layout l = layout(scene.family, tag.id);
+    const TagCells l = cells_of(scene.family, tag.id);
     const double cell = tag.size_m / l.border, half = cell * l.total / 2;
     const auto add = [&](double x0, double y0, double x1, double y1, double amount) {
       const auto points = outline(scene, tag, x0, y0, x1, y1);
@@ -201,6 +195,16 @@ Frame expose(const LinearPicture& picture, const Sensor& sensor, std::mt19937& r
   return frame;
 }
 
+Frame gray_frame(int width, int height, std::vector<std::uint8_t> bytes) {
+  Frame frame;
+  frame.format = PixelFormat::gray8;
+  frame.width = width;
+  frame.height = height;
+  frame.bytes = std::move(bytes);
+  frame.bytes.resize(frame_bytes(frame.format, width, height));
+  return frame;
+}
+
 std::array<glm::dvec2, 4> exact_corners(const TagScene& scene, const set::Tag& tag) {
   std::array<glm::dvec2, 4> corners;
   const double h = tag.size_m / 2;
@@ -219,22 +223,12 @@ glm::dmat4 camera_looking(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up) {
 }
 
 set::Tag flat_tag(int id, double size_m, glm::dvec3 centre, double turn_rad) {
-  set::Tag tag;
-  tag.id = id;
-  tag.size_m = size_m;
-  tag.world_from_tag =
-      glm::rotate(glm::translate(glm::dmat4(1.0), centre), turn_rad, glm::dvec3(0, 0, 1));
-  return tag;
+  return {id, size_m,
+          glm::rotate(glm::translate(glm::dmat4(1.0), centre), turn_rad, glm::dvec3(0, 0, 1))};
 }
 
 PinholeIntrinsics plain_lens(int width, int height, double focal_px) {
-  PinholeIntrinsics lens;
-  lens.width = width;
-  lens.height = height;
-  lens.fx = lens.fy = focal_px;
-  lens.cx = (width - 1) / 2.0;
-  lens.cy = (height - 1) / 2.0;
-  return lens;
+  return {width, height, focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0};
 }
 
 }  // namespace previz::test

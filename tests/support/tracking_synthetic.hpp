@@ -22,6 +22,14 @@ struct LinearPicture {
   std::vector<double> value;
 };
 
+// A tag of a family: its cells as libapriltag draws them, and how many of them its border is wide.
+struct TagCells {
+  int total = 0, border = 0;
+  std::vector<std::uint8_t> cells;  // row-major from the top, 0 black
+};
+
+TagCells cells_of(const std::string& family, int id);
+
 // Adds `amount` times the fraction of each pixel inside the polygon: exact areas, any winding.
 // OpenCV pixel coordinates.
 void add_polygon(LinearPicture& picture, const std::vector<glm::dvec2>& polygon, double amount);
@@ -49,6 +57,9 @@ struct Sensor {
 // Shot and read noise, clipping, the response curve, rounding. yuv422p8 has even width.
 Frame expose(const LinearPicture& picture, const Sensor& sensor, std::mt19937& random);
 
+// A gray8 frame; without bytes it is black.
+Frame gray_frame(int width, int height, std::vector<std::uint8_t> bytes = {});
+
 // Where a tag's corners are in the picture.
 std::array<glm::dvec2, 4> exact_corners(const TagScene& scene, const set::Tag& tag);
 
@@ -57,6 +68,10 @@ glm::dmat4 camera_looking(glm::dvec3 eye, glm::dvec3 target, glm::dvec3 up = {0,
 
 // A tag lying at `centre`, turned about its normal, normal along the world's Z unless tilted.
 set::Tag flat_tag(int id, double size_m, glm::dvec3 centre, double turn_rad = 0);
+
+// A curve that shows the light as it is.
+inline const ResponseCurve linear_response{.kind = ResponseCurve::Kind::linear,
+                                           .inverse_table = {}};
 
 PinholeIntrinsics plain_lens(int width, int height, double focal_px);
 

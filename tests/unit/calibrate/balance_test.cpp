@@ -5,8 +5,6 @@
 #include "daemon/scene/load.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
-#include "daemon/set/set.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 #include "tests/truth/truth_take.hpp"
@@ -90,12 +88,8 @@ TEST(BalanceFit, ReferencesAloneCountWhereTheyAreNamed) {
   const auto seen = make_pixels({1, 2, 2, 2}, glm::dvec3(1));
   const Balance balance = fit_balance(seen, {"surface 0"});
   EXPECT_NEAR(std::log(balance.scale.r), 0, 4 * balance.sigma.r);
-  try {
-    fit_balance(seen, {"grey card"});
-    FAIL() << "an unknown reference was taken";
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("surface 0, surface 1"));
-  }
+  const std::string unknown = test::error_of([&] { fit_balance(seen, {"grey card"}); });
+  EXPECT_THAT(unknown, HasSubstr("surface 0, surface 1"));
 }
 
 TEST(BalanceFit, NothingSeenIsSaid) {
@@ -119,8 +113,9 @@ TEST(BalanceTables, AreWhatASetFileTakes) {
 // more in its set file.
 class TruthBalance : public testing::Test {
  protected:
-  SurfacePixels probe(const fs::path& set_directory, double light_factor, const std::string& more) {
-    truth::TruthSet set = truth::load_truth_set(set_directory);
+  SurfacePixels probe(double light_factor, const std::string& more = "") {
+    truth::TruthSet set =
+        truth::load_truth_set(fs::path(PREVIZ_SOURCE_DIR) / "tests/truth/data/glass");
     for (truth::LightFrame& frame : set.light_frames) frame.exposure *= light_factor;
     truth::TakeOptions options;
     options.light = truth::LightFrom::captured;
@@ -130,19 +125,14 @@ class TruthBalance : public testing::Test {
     std::ofstream(set_file) << truth::set_file_text(set, options) << more;
     pipeline::Take take = pipeline::open_take(session, set_file);
     if (!device_) device_ = render::open_device();
-    ProbeOptions few;
-    few.frames = 1;
-    few.width = 80;
-    few.samples = 16;
-    return probe_surfaces(take, scene::load_scene(take.set), device_, few);
+    return probe_surfaces(take, scene::load_scene(take.set), device_,
+                          {.frames = 1, .width = 80, .samples = 16});
   }
 
   test::TemporaryDirectory directory_;
   std::shared_ptr<render::Device> device_;
   int takes_ = 0;
 };
-
-const fs::path bundled = fs::path(PREVIZ_SOURCE_DIR) / "tests/truth/data/glass";
 
 void print(const SurfacePixels& seen, const Balance& balance) {
   for (const SurfaceRatio& surface : balance.surfaces)
@@ -154,7 +144,7 @@ void print(const SurfacePixels& seen, const Balance& balance) {
 }
 
 TEST_F(TruthBalance, CamerasOfOneScaleAreFoundToBe) {
-  const SurfacePixels seen = probe(bundled, 1, "");
+  const SurfacePixels seen = probe(1);
   const Balance balance = fit_balance(seen, {});
   print(seen, balance);
   // Captured light is right to 3 % of irradiance (what the light stage is held to).
@@ -164,17 +154,16 @@ TEST_F(TruthBalance, CamerasOfOneScaleAreFoundToBe) {
 // What is not real is left out before the surfaces are looked at; a deformed one had named its
 // place among the instances, which was then another's or none.
 TEST_F(TruthBalance, AMovingVirtualObjectDoesNoHarm) {
-  const SurfacePixels without = probe(bundled, 1, "");
+  const SurfacePixels without = probe(1);
   const SurfacePixels with =
-      probe(bundled, 1,
-            "\n[[object]]\nname = \"sprout\"\nfile = \"" PREVIZ_SOURCE_DIR
-            "/config/demo/sprout.glb\"\npresence = \"virtual\"\nanimation = \"sway\"\n");
+      probe(1, "\n[[object]]\nname = \"sprout\"\nfile = \"" PREVIZ_SOURCE_DIR
+               "/config/demo/sprout.glb\"\npresence = \"virtual\"\nanimation = \"sway\"\n");
   ASSERT_EQ(with.surfaces.size(), without.surfaces.size());
   EXPECT_EQ(with.pixels.size(), without.pixels.size());
 }
 
 TEST_F(TruthBalance, ExposuresWrongByTwoStopsAreFound) {
-  const Balance balance = fit_balance(probe(bundled, 4, ""), {});
+  const Balance balance = fit_balance(probe(4), {});
   EXPECT_NEAR(exposure_error_stops(balance), 2, 0.1);
   EXPECT_LT(exposure_error_sigma_stops(balance), 0.1);
 }
@@ -183,7 +172,7 @@ TEST_F(TruthBalance, ExposuresWrongByTwoStopsAreFound) {
 // comes back, to the 3 % of captured light and what the guess throws on itself.
 TEST_F(TruthBalance, TheAlbedoOfAGuessedSurfaceIsFound) {
   const SurfacePixels seen =
-      probe(bundled, 1, "[[surface]]\nmaterial = \"red\"\nalbedo = [0.3, 0.3, 0.3]\n");
+      probe(1, "[[surface]]\nmaterial = \"red\"\nalbedo = [0.3, 0.3, 0.3]\n");
   const Balance balance = fit_balance(seen, {"table"});
   const auto red = std::ranges::find_if(balance.surfaces, [&](const SurfaceRatio& surface) {
     return seen.surfaces[surface.surface].material == "red";

@@ -5,7 +5,6 @@
 #include "daemon/calibrate/lens/board.hpp"
 #include "daemon/calibrate/lens/board_finder.hpp"
 #include "daemon/calibrate/lens/board_guess.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
@@ -108,12 +107,9 @@ TEST(BoardFinder, ChessboardCornersLieWhereTheyAre) {
 }
 
 TEST(BoardFinder, SeesNoBoardInNoise) {
-  Frame frame;
-  frame.format = PixelFormat::gray8;
-  frame.width = 160;
-  frame.height = 120;
+  Frame frame = test::gray_frame(160, 120);
   std::mt19937 random(3);
-  for (int i = 0; i < 160 * 120; ++i) frame.bytes.push_back(std::uint8_t(random()));
+  for (std::uint8_t& byte : frame.bytes) byte = std::uint8_t(random());
   for (const char* text :
        {"chessboard:9x6:25mm", "charuco:5x5:20mm:15mm:4x4_50", "aprilgrid:3x3:88mm:26mm"})
     EXPECT_TRUE(make_board_finder(parse_board(text), {})->find(frame).ids.empty()) << text;
@@ -128,12 +124,7 @@ Frame charuco_drawing() {
   drawing->draw({560, 400}, picture, 0, 1);
   cv::GaussianBlur(picture, picture, {}, 0.7);
   cv::copyMakeBorder(picture, picture, 40, 40, 40, 40, cv::BORDER_CONSTANT, 255);
-  Frame frame;
-  frame.format = PixelFormat::gray8;
-  frame.width = picture.cols;
-  frame.height = picture.rows;
-  frame.bytes.assign(picture.datastart, picture.dataend);
-  return frame;
+  return test::gray_frame(picture.cols, picture.rows, {picture.datastart, picture.dataend});
 }
 
 TEST(BoardFinder, CharucoCornersHaveTheirIds) {
@@ -198,22 +189,22 @@ TEST(OtherBoard, AChessboardIsCountedByItsInnerCorners) {
 }
 
 TEST(OtherBoard, MarkersAreNamedByTheirDictionary) {
-  const std::string words = other(charuco_drawing(), "charuco:7x5:40mm:30mm:6x6_250");
-  EXPECT_THAT(words, HasSubstr("markers of 4x4_50 (ids 0 to 16)"));
-  const std::string miscounted = other(charuco_drawing(), "charuco:5x4:40mm:30mm:4x4_50");
-  EXPECT_THAT(miscounted, HasSubstr("such a board has 33 squares at least"));
+  EXPECT_THAT(other(charuco_drawing(), "charuco:7x5:40mm:30mm:6x6_250"),
+              HasSubstr("markers of 4x4_50 (ids 0 to 16)"));
+  EXPECT_THAT(other(charuco_drawing(), "charuco:5x4:40mm:30mm:4x4_50"),
+              HasSubstr("such a board has 33 squares at least"));
   // Three tags that look like markers of 4x4_1000 here and there are no board of it.
   EXPECT_EQ(other(picture_of(six_tags()), "charuco:7x5:40mm:30mm:6x6_250"), "");
 }
 
 TEST(OtherBoard, TagsAreNamedByTheirFamilyAndIds) {
   const Frame picture = picture_of(six_tags());
-  const std::string words = other(picture, "aprilgrid:3x2:60mm:20mm:tag25h9");
-  EXPECT_THAT(words, HasSubstr("tags of tag36h11, ids 7 to 12: name that family"));
-  const std::string first = other(picture, "aprilgrid:3x2:60mm:20mm");
-  EXPECT_THAT(first, HasSubstr("aprilgrid:COLUMNSxROWS:TAG:GAP:tag36h11:7"));
-  const std::string kalibr = other(picture, "aprilgrid:3x2:60mm:20mm:kalibr:7");
-  EXPECT_THAT(kalibr, HasSubstr("remove the word kalibr"));
+  EXPECT_THAT(other(picture, "aprilgrid:3x2:60mm:20mm:tag25h9"),
+              HasSubstr("tags of tag36h11, ids 7 to 12: name that family"));
+  EXPECT_THAT(other(picture, "aprilgrid:3x2:60mm:20mm"),
+              HasSubstr("aprilgrid:COLUMNSxROWS:TAG:GAP:tag36h11:7"));
+  EXPECT_THAT(other(picture, "aprilgrid:3x2:60mm:20mm:kalibr:7"),
+              HasSubstr("remove the word kalibr"));
   EXPECT_EQ(other(picture, "aprilgrid:3x2:60mm:20mm:tag36h11:7"), "");
 }
 

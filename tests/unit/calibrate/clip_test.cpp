@@ -6,11 +6,9 @@
 #include "daemon/lighting/response.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
-#include "daemon/set/set.hpp"
-#include "drivers/session/session.hpp"
+#include "tests/support/calibrate_pictures.hpp"
+#include "tests/support/session_fixture.hpp"
 #include "tests/support/shared_data.hpp"
-#include "tests/support/temporary_directory.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::calibrate::clip_test {
 
@@ -84,9 +82,8 @@ ClipFit fit_of(const Camera& camera, double first = 1.0 / 32, double noise_codes
 
 // Returns the code from which on pictures of so many bits count as clipped.
 std::uint32_t counted_from(double share, int bits) {
-  ResponseCurve curve;
-  curve.kind = ResponseCurve::Kind::linear;
-  curve.clip_share = share;
+  const ResponseCurve curve{
+      .kind = ResponseCurve::Kind::linear, .inverse_table = {}, .clip_share = share};
   return lighting::Response(curve, bits).clipping().at;
 }
 
@@ -213,14 +210,7 @@ TEST(ClipFit, RingingAndMixedEdgesDoNotLowerItToLight) {
 // The light camera of the pictures.
 LightCameraCalibration light_camera() {
   LightCameraCalibration camera;
-  camera.intrinsics = {.width = width,
-                       .height = height,
-                       .fx = 20,
-                       .fy = 20,
-                       .cx = 79.5,
-                       .cy = 23.5,
-                       .k = {},
-                       .max_angle_rad = 1.5};
+  camera.intrinsics = {width, height, 20, 20, 79.5, 23.5, {}, 1.5};
   return camera;
 }
 
@@ -239,21 +229,22 @@ class ClipCommand : public testing::Test {
       list << name << ' ' << bracket[e].exposure << '\n';
     }
   }
-  std::string printed(CameraRole role) const {
-    ResponseOptions options;
-    options.footage = folder();
-    options.exposures = folder() / "exposures.txt";
-    options.camera = role;
-    options.method = ResponseMethod::debevec;
-    options.table_file = folder() / "table.toml";
+  // What the command prints about the pictures, or about a session.
+  std::string printed(CameraRole role, const fs::path& session = {}) const {
+    ResponseOptions options{.footage = session,
+                            .camera = role,
+                            .exposures = {},
+                            .method = ResponseMethod::debevec,
+                            .table_file = folder() / "table.toml"};
+    if (session.empty()) {
+      options.footage = folder();
+      options.exposures = folder() / "exposures.txt";
+    }
     std::ostringstream out;
     calibrate_response(options, out);
     return out.str();
   }
-  std::string table() const {
-    std::ifstream file(folder() / "table.toml");
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
+  std::string table() const { return session::content_of(folder() / "table.toml"); }
   fs::path folder() const { return directory_.path(); }
 
   test::TemporaryDirectory directory_;
@@ -305,45 +296,24 @@ TEST_F(ClipCommand, ComparesWithWhatTheSessionSays) {
     session::SessionInfo info;
     info.name = name;
     info.observer = ObserverCalibration{};
-    info.observer->intrinsics = {
-        .width = width, .height = height, .fx = 100, .fy = 100, .cx = 79.5, .cy = 23.5};
+    info.observer->intrinsics = {width, height, 100, 100, 79.5, 23.5};
     info.observer->response.clip_share = 0.9;
     info.light = light_camera();
-    session::SessionWriter writer(folder() / name, info);
-    const auto bracket = bracket_of(camera, first);
-    for (int e = 0; e < exposures; ++e) {
-      Frame frame;
-      frame.source = source;
-      frame.sequence = std::uint64_t(e);
-      frame.timestamp_ns = frame.arrival_ns = e * 40'000'000;
-      frame.exposure = frame.exposure_s = bracket[std::size_t(e)].exposure;
-      frame.width = width;
-      frame.height = height;
-      frame.bytes = bracket[std::size_t(e)].rgb;
-      writer.write(frame);
-    }
+    test::record(folder() / name, info, source, bracket_of(camera, first));
     return folder() / name;
   };
-  const auto output = [&](const fs::path& session, CameraRole role) {
-    ResponseOptions options;
-    options.footage = session;
-    options.camera = role;
-    options.method = ResponseMethod::debevec;
-    std::ostringstream out;
-    calibrate_response(options, out);
-    return out.str();
-  };
-  const std::string clips = output(take("clips", "observer", hard, 1.0 / 32), CameraRole::observer);
+  const std::string clips =
+      printed(CameraRole::observer, take("clips", "observer", hard, 1.0 / 32));
   EXPECT_THAT(clips,
               HasSubstr("the session has clip_share = 0.9, which counts codes from 230 on: pixels "
                         "that still show light"));
   EXPECT_THAT(clips, HasSubstr("\nclip_share = 0.99609\n"));
   const std::string dark =
-      output(take("dark", "observer", hard, std::exp2(-6 - stops * (exposures - 1))),
-             CameraRole::observer);
+      printed(CameraRole::observer,
+              take("dark", "observer", hard, std::exp2(-6 - stops * (exposures - 1))));
   EXPECT_THAT(dark, HasSubstr("clip_share stays 0.9\n"));
   EXPECT_THAT(dark, HasSubstr("\nclip_share = 0.9\n"));
-  const std::string light = output(take("light", "light", limited, 1.0 / 32), CameraRole::light);
+  const std::string light = printed(CameraRole::light, take("light", "light", limited, 1.0 / 32));
   EXPECT_THAT(light,
               HasSubstr("the session has clip_share = 1, which counts codes from 255 on: pixels "
                         "below it are clipped but pass for measured light, so that lamps come out "

@@ -1,7 +1,4 @@
 // The light camera's calibration: its lens on boards seen beyond 90 degrees, its pose by tags.
-#include <apriltag/apriltag.h>
-#include <apriltag/tag36h11.h>
-
 #include <glm/gtc/quaternion.hpp>
 
 #include "daemon/calibrate/lens/coverage.hpp"
@@ -10,9 +7,7 @@
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/calibration/fisheye.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/calibrate_pictures.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::calibrate::fisheye_test {
@@ -22,14 +17,7 @@ using test::degree;
 constexpr double noise_px = 0.2;
 
 FisheyeIntrinsics wide_lens() {
-  return {.width = 1280,
-          .height = 1024,
-          .fx = 301,
-          .fy = 300,
-          .cx = 648,
-          .cy = 505,
-          .k = {-0.02, 0.004, -0.003, 0.0004},
-          .max_angle_rad = 105 * degree};
+  return {1280, 1024, 301, 300, 648, 505, {-0.02, 0.004, -0.003, 0.0004}, 105 * degree};
 }
 
 // A board held in a ring around the lens, its middle at this angle off axis.
@@ -106,19 +94,17 @@ TEST(FisheyeCalibration, WritesTheTableThatASetFileTakes) {
   const set::Set set =
       set::parse_set(set::intrinsics_toml(camera) + set::light_pose_toml(pose), "printed.toml");
   ASSERT_TRUE(set.light_camera.calibration);
-  EXPECT_NEAR(set.light_camera.calibration->intrinsics.fx, fisheye.intrinsics.fx, 1e-8);
-  EXPECT_NEAR(set.light_camera.calibration->intrinsics.k[3], fisheye.intrinsics.k[3], 1e-11);
-  EXPECT_NEAR(set.light_camera.calibration->intrinsics.max_angle_rad,
-              fisheye.intrinsics.max_angle_rad, 1e-11);
-  for (int c = 0; c < 4; ++c)
-    EXPECT_LT(glm::distance(set.light_camera.calibration->world_from_camera[c], pose[c]), 1e-10);
+  const LightCameraCalibration& read = *set.light_camera.calibration;
+  EXPECT_NEAR(read.intrinsics.fx, fisheye.intrinsics.fx, 1e-8);
+  EXPECT_NEAR(read.intrinsics.k[3], fisheye.intrinsics.k[3], 1e-11);
+  EXPECT_NEAR(read.intrinsics.max_angle_rad, fisheye.intrinsics.max_angle_rad, 1e-11);
+  for (int c = 0; c < 4; ++c) EXPECT_LT(glm::distance(read.world_from_camera[c], pose[c]), 1e-10);
 }
 
 TEST(FisheyeCapture, AsksForTheEdgeOfTheCircle) {
   const Views views = ring({10, 30}, 8);
   const auto missing = missing_views(views, fit_fisheye(views));
-  ASSERT_EQ(missing.size(), 1u);
-  EXPECT_THAT(missing[0], HasSubstr("near the edge of the image circle"));
+  EXPECT_THAT(missing, ElementsAre(HasSubstr("near the edge of the image circle")));
 }
 
 TEST(FisheyeCapture, AsksForMoreViews) {
@@ -132,18 +118,7 @@ TEST(FisheyeCapture, AsksForMoreViews) {
 class TagRoom {
  public:
   explicit TagRoom(std::vector<set::Tag> tags) : tags_(std::move(tags)) {
-    apriltag_family_t* family = tag36h11_create();
-    for (const set::Tag& tag : tags_) {
-      image_u8_t* code = apriltag_to_image(family, std::uint32_t(tag.id));
-      cells_ = code->width;
-      codes_.emplace_back();
-      for (int y = 0; y < cells_; ++y)
-        for (int x = 0; x < cells_; ++x) codes_.back().push_back(code->buf[y * code->stride + x]);
-      // The packaged library does not export image_u8_destroy.
-      std::free(code->buf);
-      std::free(code);
-    }
-    tag36h11_destroy(family);
+    for (const set::Tag& tag : tags_) codes_.push_back(test::cells_of("tag36h11", tag.id));
   }
 
   FramePtr photograph(const FisheyeIntrinsics& intrinsics, const glm::dmat4& world_from_camera,
@@ -177,43 +152,27 @@ class TagRoom {
       const glm::dvec3 hit = origin + way * (glm::dot(normal, centre - origin) / along) - centre;
       if (!(glm::dot(hit + centre - origin, way) > 0)) continue;
       // The code's picture has a white ring of one cell around the black border (8 cells).
-      const double cell = tags_[t].size_m / (cells_ - 2);
-      const int x = int(std::floor(glm::dot(hit, glm::dvec3(pose[0])) / cell + 0.5 * cells_));
-      const int y = int(std::floor(-glm::dot(hit, glm::dvec3(pose[1])) / cell + 0.5 * cells_));
-      if (x >= 0 && y >= 0 && x < cells_ && y < cells_)
-        return codes_[t][std::size_t(y * cells_ + x)] ? 0.75 : 0.04;
+      const auto& [cells, border, code] = codes_[t];
+      const double cell = tags_[t].size_m / border;
+      const int x = int(std::floor(glm::dot(hit, glm::dvec3(pose[0])) / cell + 0.5 * cells));
+      const int y = int(std::floor(-glm::dot(hit, glm::dvec3(pose[1])) / cell + 0.5 * cells));
+      if (x >= 0 && y >= 0 && x < cells && y < cells)
+        return code[std::size_t(y * cells + x)] ? 0.75 : 0.04;
     }
     return 0.75;
   }
 
   std::vector<set::Tag> tags_;
-  std::vector<std::vector<std::uint8_t>> codes_;
-  int cells_ = 0;
-};
-
-class OnePicture final : public PictureSource {
- public:
-  explicit OnePicture(FramePtr frame) : frame_(std::move(frame)) {}
-  std::optional<NamedFrame> next() override {
-    if (!frame_) return std::nullopt;
-    return NamedFrame{std::exchange(frame_, nullptr), "picture"};
-  }
-  std::optional<std::size_t> count() const override { return 1; }
-
- private:
-  FramePtr frame_;
+  std::vector<test::TagCells> codes_;
 };
 
 // Facing the camera from `direction` at a distance.
 set::Tag facing(int id, const glm::dvec3& direction, double distance, double size_m) {
-  set::Tag tag;
-  tag.id = id;
-  tag.size_m = size_m;
   const glm::dvec3 z = -glm::normalize(direction);
   const glm::dvec3 x = glm::normalize(glm::cross(glm::dvec3(0.1, 0.2, 1), z));
-  tag.world_from_tag = glm::dmat4(glm::dvec4(x, 0), glm::dvec4(glm::cross(z, x), 0),
-                                  glm::dvec4(z, 0), glm::dvec4(-distance * z, 1));
-  return tag;
+  return {id, size_m,
+          glm::dmat4(glm::dvec4(x, 0), glm::dvec4(glm::cross(z, x), 0), glm::dvec4(z, 0),
+                     glm::dvec4(-distance * z, 1))};
 }
 
 std::vector<set::Tag> room() {
@@ -222,11 +181,7 @@ std::vector<set::Tag> room() {
 }
 
 FisheyeIntrinsics small_lens() {
-  FisheyeIntrinsics lens = wide_lens();
-  lens.width = lens.height = 640;
-  lens.fx = lens.fy = 180;
-  lens.cx = lens.cy = 319.5;
-  return lens;
+  return {640, 640, 180, 180, 319.5, 319.5, wide_lens().k, wide_lens().max_angle_rad};
 }
 
 glm::dmat4 true_pose() {
@@ -241,7 +196,7 @@ set::Tracking tracking(std::vector<set::Tag> tags) {
 
 // Tags all around, one of them straight across the axis (90 degrees off it).
 TEST(LightPose, IsFoundByTagsAllAround) {
-  OnePicture picture(TagRoom(room()).photograph(small_lens(), true_pose(), 1));
+  test::Pictures picture({TagRoom(room()).photograph(small_lens(), true_pose(), 1)});
   const LightPose pose = find_light_pose(picture, small_lens(), {}, tracking(room()));
   EXPECT_EQ(pose.tags, (std::vector<int>{0, 1, 2, 3}));
   EXPECT_TRUE(pose.left_out.empty());
@@ -255,7 +210,7 @@ TEST(LightPose, IsFoundByTagsAllAround) {
 }
 
 TEST(LightPose, ATagThatWasMovedIsNamed) {
-  OnePicture picture(TagRoom(room()).photograph(small_lens(), true_pose(), 1));
+  test::Pictures picture({TagRoom(room()).photograph(small_lens(), true_pose(), 1)});
   auto believed = room();
   believed[1].world_from_tag[3].z += 0.05;
   const LightPose pose = find_light_pose(picture, small_lens(), {}, tracking(believed));
@@ -264,13 +219,10 @@ TEST(LightPose, ATagThatWasMovedIsNamed) {
 }
 
 TEST(LightPose, OneTagIsNotEnough) {
-  OnePicture picture(TagRoom({room()[0]}).photograph(small_lens(), true_pose(), 1));
-  try {
-    find_light_pose(picture, small_lens(), {}, tracking(room()));
-    FAIL() << "one tag was taken";
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("only tag 0"));
-  }
+  test::Pictures picture({TagRoom({room()[0]}).photograph(small_lens(), true_pose(), 1)});
+  const std::string refusal =
+      test::error_of([&] { find_light_pose(picture, small_lens(), {}, tracking(room())); });
+  EXPECT_THAT(refusal, HasSubstr("only tag 0"));
 }
 
 }  // namespace previz::calibrate::fisheye_test

@@ -8,14 +8,14 @@
 #include "daemon/calibrate/lens/lens_file_check.hpp"
 #include "daemon/calibrate/lens/lens_refit.hpp"
 #include "daemon/set/load.hpp"
-#include "daemon/set/set.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/calibration/pinhole.hpp"
-#include "drivers/error.hpp"
-#include "tests/support/temporary_directory.hpp"
+#include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::calibrate::from_test {
+
+using namespace std::string_literals;
 
 // The table has 12 digits: of 2000 px that is 1e-9, and the formulas differ by rounding alone.
 constexpr double exact_px = 1e-6;
@@ -26,39 +26,31 @@ struct Result {
 
 Result from(const std::string& content, FromOptions options = {}) {
   const test::TemporaryDirectory directory;
-  options.file = directory.path() / "lens.txt";
-  options.table_file = directory.path() / "table.toml";
-  std::ofstream(options.file, std::ios::binary) << content;
-  Result result;
+  options.file = directory / "lens.txt";
+  options.table_file = directory / "table.toml";
+  session::write_content(options.file, content);
   std::ostringstream out;
-  try {
-    calibrate_from(options, out);
-    std::ifstream table(*options.table_file);
-    result.table = std::string(std::istreambuf_iterator<char>(table), {});
-  } catch (const Error& error) {
-    result.error = error.what();
-  }
-  result.words = out.str();
-  return result;
+  const std::string error = test::error_of([&] { calibrate_from(options, out); });
+  return {out.str(), session::content_of(*options.table_file), error};
 }
 
 FromOptions as(CameraRole role, bool force = false) {
-  FromOptions options;
-  options.as = role;
-  options.force = force;
-  return options;
+  return {.file = {}, .as = role, .camera = {}, .size = {}, .force = force, .table_file = {}};
 }
-
 FromOptions of_camera(const std::string& camera) {
-  FromOptions options;
-  options.camera = camera;
-  return options;
+  return {.file = {}, .as = {}, .camera = camera, .size = {}, .table_file = {}};
+}
+FromOptions of_size(const std::string& size) {
+  return {.file = {}, .as = {}, .camera = {}, .size = size, .table_file = {}};
 }
 
-FromOptions of_size(const std::string& size) {
-  FromOptions options;
-  options.size = size;
-  return options;
+struct Refusal {
+  std::string content, words;
+};
+
+void expect_refused(const std::vector<Refusal>& refusals) {
+  for (const auto& [content, words] : refusals)
+    EXPECT_THAT(from(content).error, HasSubstr(words)) << content.substr(0, 200);
 }
 
 PinholeIntrinsics observer_in(const Result& result) {
@@ -263,14 +255,13 @@ TEST(LensFiles, KalibrsCamchainHasPinholes) {
 }
 
 TEST(LensFiles, KalibrsOtherModelsAreRefusedByName) {
-  for (const char* model : {"omni", "eucm", "ds"}) {
-    const std::string error = from(camchain(model, "radtan", "[0, 0, 0, 0]")).error;
-    EXPECT_THAT(error, HasSubstr("lens.txt:3: cam0.camera_model: \"" + std::string(model) +
-                                 "\" is not supported; calibrate again with pinhole-equi or "
-                                 "pinhole-radtan"));
-  }
-  EXPECT_THAT(from(camchain("pinhole", "fov", "[0.9]")).error,
-              HasSubstr("lens.txt:5: cam0.distortion_model: \"fov\" is not supported"));
+  for (const std::string model : {"omni", "eucm", "ds"})
+    expect_refused({{camchain(model, "radtan", "[0, 0, 0, 0]"),
+                     "lens.txt:3: cam0.camera_model: \"" + model +
+                         "\" is not supported; calibrate again with pinhole-equi or "
+                         "pinhole-radtan"}});
+  expect_refused({{camchain("pinhole", "fov", "[0.9]"),
+                   "lens.txt:5: cam0.distortion_model: \"fov\" is not supported"}});
 }
 
 TEST(LensFiles, ACameraThatCannotBeReadLeavesTheOthers) {
@@ -285,83 +276,63 @@ TEST(LensFiles, ACameraThatCannotBeReadLeavesTheOthers) {
 // theta/r times that; the pixel is f (u, v) (1 + k1 r^2 + ...) + c, and its (0.5, 0.5) is ours
 // (0, 0).
 struct ColmapModel {
-  const char* line;
-  bool is_fisheye;
+  std::string name, parameters;
   Lens lens;
 };
 
 class ColmapModels : public testing::TestWithParam<ColmapModel> {};
 
 TEST_P(ColmapModels, ProjectByHalfAPixelLess) {
+  auto [name, parameters, lens] = GetParam();
   const Result result = from(
       "# Camera list with one line of data per camera:\n#   CAMERA_ID, MODEL, WIDTH, HEIGHT, "
-      "PARAMS[]\n# Number of cameras: 1\n" +
-      std::string(GetParam().line) + "\n");
+      "PARAMS[]\n# Number of cameras: 1\n1 " +
+      name + " 1920 1080 " + parameters + "\n");
   EXPECT_THAT(result.words, HasSubstr("0.5 px is subtracted from cx and cy"));
-  Lens lens = GetParam().lens;
   lens.cx -= 0.5;
   lens.cy -= 0.5;
-  if (GetParam().is_fisheye)
+  if (name.ends_with("FISHEYE"))
     expect_as_opencv(light_in(result), lens);
   else
     expect_as_opencv(observer_in(result), lens);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, ColmapModels,
-    testing::Values(
-        ColmapModel{"1 SIMPLE_PINHOLE 1920 1080 1500.5 960 540",
-                    false,
-                    {1500.5, 1500.5, 960, 540, {0, 0, 0, 0}}},
-        ColmapModel{"1 PINHOLE 1920 1080 1500.5 1501.5 961 541",
-                    false,
-                    {1500.5, 1501.5, 961, 541, {0, 0, 0, 0}}},
-        ColmapModel{"1 SIMPLE_RADIAL 1920 1080 1500.5 960 540 -0.05",
-                    false,
-                    {1500.5, 1500.5, 960, 540, {-0.05, 0, 0, 0}}},
-        ColmapModel{"1 RADIAL 1920 1080 1500.5 960 540 -0.05 0.02",
-                    false,
-                    {1500.5, 1500.5, 960, 540, {-0.05, 0.02, 0, 0}}},
-        ColmapModel{"1 OPENCV 1920 1080 1500.5 1501.5 961 541 -0.05 0.02 0.001 -0.002",
-                    false,
-                    {1500.5, 1501.5, 961, 541, {-0.05, 0.02, 0.001, -0.002}}},
-        ColmapModel{"1 FULL_OPENCV 1920 1080 1500.5 1501.5 961 541 0.31 -0.12 0.0004 -0.0003 0.02 "
-                    "0.45 -0.07 0.01",
-                    false,
-                    {1500.5, 1501.5, 961, 541, eight}},
-        ColmapModel{"1 OPENCV_FISHEYE 1920 1080 560.5 561.5 961 541 -0.02 0.004 -0.003 0.0005",
-                    true,
-                    {560.5, 561.5, 961, 541, kb4}},
-        ColmapModel{"1 SIMPLE_RADIAL_FISHEYE 1920 1080 560.5 960 540 -0.02",
-                    true,
-                    {560.5, 560.5, 960, 540, {-0.02, 0, 0, 0}}},
-        ColmapModel{"1 RADIAL_FISHEYE 1920 1080 560.5 960 540 -0.02 0.004",
-                    true,
-                    {560.5, 560.5, 960, 540, {-0.02, 0.004, 0, 0}}}),
-    [](const auto& of) {
-      std::istringstream words(of.param.line);
-      std::string name;
-      words >> name >> name;
-      std::erase(name, '_');
-      return name;
-    });
+const ColmapModel colmap_models[] = {
+    {"SIMPLE_PINHOLE", "1500.5 960 540", {1500.5, 1500.5, 960, 540, {0, 0, 0, 0}}},
+    {"PINHOLE", "1500.5 1501.5 961 541", {1500.5, 1501.5, 961, 541, {0, 0, 0, 0}}},
+    {"SIMPLE_RADIAL", "1500.5 960 540 -0.05", {1500.5, 1500.5, 960, 540, {-0.05, 0, 0, 0}}},
+    {"RADIAL", "1500.5 960 540 -0.05 0.02", {1500.5, 1500.5, 960, 540, {-0.05, 0.02, 0, 0}}},
+    {"OPENCV",
+     "1500.5 1501.5 961 541 -0.05 0.02 0.001 -0.002",
+     {1500.5, 1501.5, 961, 541, {-0.05, 0.02, 0.001, -0.002}}},
+    {"FULL_OPENCV",
+     "1500.5 1501.5 961 541 0.31 -0.12 0.0004 -0.0003 0.02 0.45 -0.07 0.01",
+     {1500.5, 1501.5, 961, 541, eight}},
+    {"OPENCV_FISHEYE",
+     "560.5 561.5 961 541 -0.02 0.004 -0.003 0.0005",
+     {560.5, 561.5, 961, 541, kb4}},
+    {"SIMPLE_RADIAL_FISHEYE", "560.5 960 540 -0.02", {560.5, 560.5, 960, 540, {-0.02, 0, 0, 0}}},
+    {"RADIAL_FISHEYE", "560.5 960 540 -0.02 0.004", {560.5, 560.5, 960, 540, {-0.02, 0.004, 0, 0}}},
+};
+INSTANTIATE_TEST_SUITE_P(All, ColmapModels, testing::ValuesIn(colmap_models), [](const auto& of) {
+  std::string name = of.param.name;
+  std::erase(name, '_');
+  return name;
+});
 
 TEST(LensFiles, ColmapsOthersAreRefusedByName) {
-  EXPECT_THAT(from("1 FOV 1920 1080 900 900 960 540 0.9\n").error,
-              HasSubstr("lens.txt:1: camera 1: the camera model FOV is not supported"));
-  EXPECT_THAT(from("3 THIN_PRISM_FISHEYE 1920 1080 9 9 9 9 0 0 0 0 0 0 0 0\n").error,
-              HasSubstr("camera 3: the camera model THIN_PRISM_FISHEYE is not supported"));
-  EXPECT_THAT(from("1 OPENCV 1920 1080 900 900 960 540\n").error,
-              HasSubstr("OPENCV has 4 parameters; allowed: 8"));
-  EXPECT_THAT(from("1 PINHOLE 1920 1080 900 900 960 nan\n").error,
-              HasSubstr("\"nan\" is not a finite number"));
   std::string binary(8 + 24 + 24, '\0');
-  binary[0] = 1;
-  binary[8] = 1;
-  binary[16] = 127;
-  binary[24] = 127;
-  EXPECT_THAT(from(binary).error,
-              HasSubstr("is COLMAP's cameras.bin; convert it with \"colmap model_converter"));
+  binary[0] = binary[8] = 1;
+  binary[16] = binary[24] = 127;
+  expect_refused({
+      {"1 FOV 1920 1080 900 900 960 540 0.9\n",
+       "lens.txt:1: camera 1: the camera model FOV is not supported"},
+      {"3 THIN_PRISM_FISHEYE 1920 1080 9 9 9 9 0 0 0 0 0 0 0 0\n",
+       "camera 3: the camera model THIN_PRISM_FISHEYE is not supported"},
+      {"1 OPENCV 1920 1080 900 900 960 540\n", "OPENCV has 4 parameters; allowed: 8"},
+      {"1 PINHOLE 1920 1080 900 900 960 nan\n", "\"nan\" is not a finite number"},
+      {binary, "is COLMAP's cameras.bin; convert it with \"colmap model_converter"},
+  });
 }
 
 // The fit keeps what it promises: no pixel of either lens is farther off than the said worst.
@@ -451,28 +422,31 @@ std::string matrix_file(const std::string& matrix, const std::string& k = "[0, 0
 }
 
 TEST(LensFiles, WrongNumbersAreRefusedWithTheirPlace) {
-  EXPECT_THAT(from(matrix_file("[18.664, 0, 960, 0, 18.664, 540, 0, 0, 1]")).error,
-              HasSubstr("lens.txt:3: camera_matrix: fx 18.664 is not a focal length in px for a "
-                        "picture 1920 px wide: it may be in mm"));
-  EXPECT_THAT(from(matrix_file("[1500, 0, 960, 0, .nan, 540, 0, 0, 1]")).error,
-              HasSubstr("lens.txt:3: camera_matrix: \".nan\" is not a finite number"));
-  EXPECT_THAT(from(matrix_file("[1500, 0, 960, 0, -1500, 540, 0, 0, 1]")).error,
-              HasSubstr("lens.txt:3: camera_matrix: fy is -1500; allowed: above 0"));
-  EXPECT_THAT(from(matrix_file("[1500, 0, 96000, 0, 1500, 540, 0, 0, 1]")).error,
-              HasSubstr("camera_matrix: cx 96000 is far outside of a picture of 1920 px"));
-  EXPECT_THAT(from(matrix_file("[1500, 2, 960, 0, 1500, 540, 0, 0, 1]")).error,
-              HasSubstr("camera_matrix: has a skew of 2"));
-  EXPECT_THAT(from(matrix_file("[1500, 0, 960, 0, 1500, 540, 0, 0]")).error,
-              HasSubstr("camera_matrix: has 8 numbers; allowed: 9"));
-  EXPECT_THAT(from(matrix_file("[1500, 0, 960, 0, 1500, 540, 0, 0, 1]", "[1, 2, 3]")).error,
-              HasSubstr("lens.txt:4: distortion_coefficients: has 3 coefficients; allowed: 4, 5"));
+  expect_refused({
+      {matrix_file("[18.664, 0, 960, 0, 18.664, 540, 0, 0, 1]"),
+       "lens.txt:3: camera_matrix: fx 18.664 is not a focal length in px for a picture 1920 px "
+       "wide: it may be in mm"},
+      {matrix_file("[1500, 0, 960, 0, .nan, 540, 0, 0, 1]"),
+       "lens.txt:3: camera_matrix: \".nan\" is not a finite number"},
+      {matrix_file("[1500, 0, 960, 0, -1500, 540, 0, 0, 1]"),
+       "lens.txt:3: camera_matrix: fy is -1500; allowed: above 0"},
+      {matrix_file("[1500, 0, 96000, 0, 1500, 540, 0, 0, 1]"),
+       "camera_matrix: cx 96000 is far outside of a picture of 1920 px"},
+      {matrix_file("[1500, 2, 960, 0, 1500, 540, 0, 0, 1]"), "camera_matrix: has a skew of 2"},
+      {matrix_file("[1500, 0, 960, 0, 1500, 540, 0, 0]"),
+       "camera_matrix: has 8 numbers; allowed: 9"},
+      {matrix_file("[1500, 0, 960, 0, 1500, 540, 0, 0, 1]", "[1, 2, 3]"),
+       "lens.txt:4: distortion_coefficients: has 3 coefficients; allowed: 4, 5"},
+  });
 }
 
 TEST(LensFiles, WhatIsNotCalibratedOrHasNoCoefficientsIsRefused) {
-  EXPECT_THAT(from(matrix_file("[0, 0, 0, 0, 0, 0, 0, 0, 0]")).error,
-              HasSubstr("lens.txt:3: camera_matrix: is 0, as of a camera that is not calibrated"));
-  EXPECT_THAT(from("camera_matrix: [[900, 0, 9], [0, 900, 9], [0, 0, 1]]\n").error,
-              HasSubstr("distortion_coefficients: is missing; write the lens's, or an empty list"));
+  expect_refused({
+      {matrix_file("[0, 0, 0, 0, 0, 0, 0, 0, 0]"),
+       "lens.txt:3: camera_matrix: is 0, as of a camera that is not calibrated"},
+      {"camera_matrix: [[900, 0, 9], [0, 900, 9], [0, 0, 1]]\n",
+       "distortion_coefficients: is missing; write the lens's, or an empty list"},
+  });
   FromOptions options;
   options.file = "/dev/zero";
   std::ostringstream out;
@@ -499,40 +473,39 @@ TEST(LensFiles, TheSizeIsInTheFileOrGiven) {
 }
 
 TEST(LensFiles, WhatIsNoCalibrationIsRefusedByWhatItIs) {
-  EXPECT_THAT(from("").error, HasSubstr("has 0 bytes"));
-  EXPECT_THAT(from(" \n").error, HasSubstr("is empty"));
-  EXPECT_THAT(from(std::string("\x7f"
-                               "ELF\0\1",
-                               6))
-                  .error,
-              HasSubstr("is binary"));
-  EXPECT_THAT(from("\x1f\x8b\x08").error, HasSubstr("is compressed; unpack it"));
-  EXPECT_THAT(from("name: foo\nlist: [1, 2]\n").error,
-              HasSubstr("is not a calibration that previzd knows; it reads: OpenCV's YAML, XML and "
-                        "JSON, ROS's camera_info, Kalibr's camchain, COLMAP's cameras.txt"));
-  EXPECT_THAT(
-      from("set cut_paste_input [stack 0]\nLensDistortion {\n serialiseKnob \"22\"\n}\n").error,
-      HasSubstr("is a LensDistortion node of Nuke, which is not supported; export"));
-  EXPECT_THAT(from("lens one\n3DE4 Radial - Standard, Degree 4\n").error,
-              HasSubstr("is a lens of 3DEqualizer, which is not supported"));
-  EXPECT_THAT(from("a: [1, 2\nb: 3\n").error, HasSubstr("is not valid YAML"));
-  EXPECT_THAT(from("{\"a\": }").error, HasSubstr("is not valid JSON"));
-  EXPECT_THAT(from("<a><b></a>").error, HasSubstr("is not valid XML"));
+  expect_refused({
+      {"", "has 0 bytes"},
+      {" \n", "is empty"},
+      {"\x7f"
+       "ELF\0\1"s,
+       "is binary"},
+      {"\x1f\x8b\x08", "is compressed; unpack it"},
+      {"name: foo\nlist: [1, 2]\n",
+       "is not a calibration that previzd knows; it reads: OpenCV's YAML, XML and JSON, ROS's "
+       "camera_info, Kalibr's camchain, COLMAP's cameras.txt"},
+      {"set cut_paste_input [stack 0]\nLensDistortion {\n serialiseKnob \"22\"\n}\n",
+       "is a LensDistortion node of Nuke, which is not supported; export"},
+      {"lens one\n3DE4 Radial - Standard, Degree 4\n",
+       "is a lens of 3DEqualizer, which is not supported"},
+      {"a: [1, 2\nb: 3\n", "is not valid YAML"},
+      {"{\"a\": }", "is not valid JSON"},
+      {"<a><b></a>", "is not valid XML"},
+  });
 }
 
 TEST(LensFiles, HostileFilesEndSoon) {
   EXPECT_NE(from("\"a\",\n , 0 1\n").error, "");  // has documents without end for yaml-cpp
-  EXPECT_THAT(from("a: &a [1]\nb: *a\n").error,
-              HasSubstr("lens.txt:1: anchors (&) and aliases (*) are not supported"));
-  EXPECT_THAT(from("a: " + std::string(40, '[') + std::string(40, ']')).error,
-              HasSubstr("nested in more than 32 levels"));
+  expect_refused({
+      {"a: &a [1]\nb: *a\n", "lens.txt:1: anchors (&) and aliases (*) are not supported"},
+      {"a: " + std::string(40, '[') + std::string(40, ']'), "nested in more than 32 levels"},
+      {std::string((1 << 20) + 1, 'a'), "is larger than 1 MiB"},
+      {"a: 1\na: 2\n", "lens.txt:2: a: is given twice"},
+  });
   EXPECT_NE(from(std::string(100'000, '[')).error, "");
   EXPECT_NE(from("{\"a\":" + std::string(100'000, '[')).error, "");
   std::string deep;
   for (int i = 0; i < 10'000; ++i) deep += "<a>";
   EXPECT_NE(from(deep).error, "");
-  EXPECT_THAT(from(std::string((1 << 20) + 1, 'a')).error, HasSubstr("is larger than 1 MiB"));
-  EXPECT_THAT(from("a: 1\na: 2\n").error, HasSubstr("lens.txt:2: a: is given twice"));
 }
 
 }  // namespace previz::calibrate::from_test

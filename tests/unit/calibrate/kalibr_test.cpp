@@ -1,7 +1,4 @@
 // Kalibr's AprilGrid: tags with a black border of two cells, and squares at their corners.
-#include <apriltag/apriltag.h>
-#include <apriltag/tag36h11.h>
-
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -12,6 +9,7 @@
 #include "daemon/calibrate/lens/views.hpp"
 #include "daemon/tracking/photometry.hpp"
 #include "tests/support/test.hpp"
+#include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::calibrate::kalibr_test {
 
@@ -30,30 +28,26 @@ struct Form {
   bool has_squares = true;
 };
 
-cv::Mat1b draw_tag(apriltag_family_t* family, int id, int border) {
+cv::Mat1b draw_tag(int id, int border) {
   const int cells = 6 + 2 * border, cell_px = 2 * tag_px / cells;
   cv::Mat1b fine(2 * tag_px, 2 * tag_px, std::uint8_t(0)), drawn;
-  image_u8_t* tag = apriltag_to_image(family, std::uint32_t(id));
+  const test::TagCells tag = test::cells_of("tag36h11", id);
   for (int y = 0; y < 6; ++y)
     for (int x = 0; x < 6; ++x) {
       const cv::Point at(cell_px * (x + border), cell_px * (y + border));
-      if (tag->buf[(y + 2) * tag->stride + x + 2])
+      if (tag.cells[std::size_t((y + 2) * tag.total + x + 2)])
         fine(cv::Rect(at.x, at.y, cell_px, cell_px)) = 255;
     }
-  std::free(tag->buf);  // the packaged library does not export image_u8_destroy
-  std::free(tag);
   cv::resize(fine, drawn, {tag_px, tag_px}, 0, 0, cv::INTER_AREA);
   return drawn;
 }
 
 cv::Mat1b draw_board(const Form& form) {
-  apriltag_family_t* family = tag36h11_create();
   cv::Mat1b board(drawing_px, drawing_px, std::uint8_t(255));
   for (int id = 0; id < 36; ++id) {
     const cv::Point at(2 * gap_px + id % 6 * pitch_px, 2 * gap_px + (5 - id / 6) * pitch_px);
-    draw_tag(family, id, form.border).copyTo(board(cv::Rect(at.x, at.y, tag_px, tag_px)));
+    draw_tag(id, form.border).copyTo(board(cv::Rect(at.x, at.y, tag_px, tag_px)));
   }
-  tag36h11_destroy(family);
   for (int y = 0; form.has_squares && y <= 6; ++y)
     for (int x = 0; x <= 6; ++x)
       board(cv::Rect(gap_px + x * pitch_px, gap_px + y * pitch_px, gap_px, gap_px)) = 0;
@@ -86,12 +80,7 @@ glm::dvec2 pixel_of(const glm::dvec3& point, const Held& held) {
 }
 
 Frame frame_of(const cv::Mat1b& picture) {
-  Frame frame;
-  frame.format = PixelFormat::gray8;
-  frame.width = picture.cols;
-  frame.height = picture.rows;
-  frame.bytes.assign(picture.datastart, picture.dataend);
-  return frame;
+  return test::gray_frame(picture.cols, picture.rows, {picture.datastart, picture.dataend});
 }
 
 // Returns the board as a camera with the sRGB curve sees it: 4x4 samples per pixel, the light
@@ -156,7 +145,7 @@ void look(BoardFinder& finder, const Frame& frame, const Held& held, Seen& seen)
   if (!view.points.empty()) seen.views.views.push_back(std::move(view));
 }
 
-class KalibrsAprilgrid : public ::testing::TestWithParam<Form> {};
+class KalibrsAprilgrid : public testing::TestWithParam<Form> {};
 
 // 0.3 px, 0.2 % and nine tags in ten are the promised bounds. A corner is measured to 0.1 px or
 // better, and a view of 36 tags then gives the focal length to about 0.1 %: four views suffice.
@@ -213,9 +202,7 @@ Frame kept_picture(int i) {
 // The pictures' values are linear in light, which a folder of pictures does not say: they are read
 // by the sRGB curve as well.
 TEST(KeptKalibrBoard, CornersAreFound) {
-  for (const auto kind : {ResponseCurve::Kind::linear, ResponseCurve::Kind::srgb}) {
-    ResponseCurve response;
-    response.kind = kind;
+  for (const ResponseCurve& response : {test::linear_response, ResponseCurve{}}) {
     const auto finder = make_board_finder(parse_board(board_text), response);
     for (int i = 0; i < 3; ++i) {
       Seen seen;
@@ -232,10 +219,8 @@ TEST(KeptKalibrBoard, CornersAreFound) {
 TEST(KeptKalibrBoard, CornersAreFoundInAMosaic) {
   Frame mosaic = kept_picture(1);
   mosaic.bayer = BayerPattern::rggb;
-  ResponseCurve response;
-  response.kind = ResponseCurve::Kind::linear;
   Seen seen;
-  look(*make_board_finder(parse_board(board_text), response), mosaic, poses[1], seen);
+  look(*make_board_finder(parse_board(board_text), test::linear_response), mosaic, poses[1], seen);
   EXPECT_EQ(seen.corners, 144u);
   EXPECT_LT(seen.largest_px, 0.3);
   std::printf("mosaic: largest %.3f px\n", seen.largest_px);

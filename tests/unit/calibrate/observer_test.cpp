@@ -8,11 +8,8 @@
 #include "daemon/calibrate/lens/residual_plot.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
-#include "daemon/set/set.hpp"
 #include "drivers/calibration/pinhole.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/calibrate_pictures.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::calibrate::observer_test {
 
@@ -22,18 +19,7 @@ constexpr int width = 1280, height = 720;
 constexpr double noise_px = 0.15;
 
 PinholeIntrinsics film_lens() {
-  PinholeIntrinsics lens;
-  lens.width = width;
-  lens.height = height;
-  lens.fx = 1010;
-  lens.fy = 1013;
-  lens.cx = 652;
-  lens.cy = 349;
-  lens.k1 = -0.21;
-  lens.k2 = 0.08;
-  lens.p1 = 0.0007;
-  lens.p2 = -0.0004;
-  return lens;
+  return {width, height, 1010, 1013, 652, 349, -0.21, 0.08, 0.0007, -0.0004};
 }
 
 std::optional<glm::dvec2> through(const PinholeIntrinsics& lens, const glm::dvec3& point) {
@@ -43,12 +29,7 @@ std::optional<glm::dvec2> through(const PinholeIntrinsics& lens, const glm::dvec
 }
 
 Views captured(const std::vector<Held>& how, unsigned seed = 1) {
-  std::mt19937 random(seed);
-  const PinholeIntrinsics lens = film_lens();
-  return test::hold(
-      parse_board("chessboard:9x6:25mm"), how,
-      [&](const glm::dvec3& point) { return through(lens, point); }, width, height, noise_px,
-      random);
+  return test::hold(how, film_lens(), noise_px, seed);
 }
 
 std::string first_missing(const std::vector<Held>& how) {
@@ -261,8 +242,7 @@ TEST(ObserverCalibration, CoefficientsThatTheCornersDoNotHoldStayAtZero) {
   EXPECT_LE(worst_px(observer.picture), useless_px);
   EXPECT_EQ(observer.picture.size(), 16u * 9u);  // the whole grid: nothing folds
   for (std::size_t p = 4; p < observer_parameters.size(); ++p) {
-    const bool is_left_out =
-        std::ranges::find(observer.left_out, observer_parameters[p]) != observer.left_out.end();
+    const bool is_left_out = std::ranges::count(observer.left_out, observer_parameters[p]) > 0;
     EXPECT_EQ(observer.sigma[p] == 0, is_left_out) << observer_parameters[p];
   }
   EXPECT_EQ(observer.parameters.size() + observer.left_out.size(), observer_parameters.size());
@@ -274,20 +254,18 @@ TEST(ObserverCalibration, SaysWhereItIsNotCertain) {
   ObserverFit observer = fit_observer(views);
   EXPECT_TRUE(doubts_of(observer).empty());
   observer.picture[0].sigma_px = 1.4;
-  ASSERT_EQ(doubts_of(observer).size(), 1u);
-  EXPECT_THAT(doubts_of(observer)[0], HasSubstr("certain only to 1.4 px near 40, 40"));
+  EXPECT_THAT(doubts_of(observer), ElementsAre(HasSubstr("certain only to 1.4 px near 40, 40")));
   EXPECT_TRUE(missing_views(views, observer).empty());
   std::ostringstream out;
-  EXPECT_EQ(warn(doubts_of(observer), out).find("# WITH A DOUBT: the lens is certain only to 1.4"),
-            0u);
-  EXPECT_EQ(out.str().find("warning: the lens is certain only to 1.4 px"), 0u);
+  EXPECT_THAT(warn(doubts_of(observer), out),
+              StartsWith("# WITH A DOUBT: the lens is certain only to 1.4"));
+  EXPECT_THAT(out.str(), StartsWith("warning: the lens is certain only to 1.4 px"));
   observer.picture[0].sigma_px = 0.5;
   observer.reach = 0.55;
-  ASSERT_EQ(doubts_of(observer).size(), 1u);
-  EXPECT_THAT(doubts_of(observer)[0], HasSubstr("beyond 55 % of the way"));
+  EXPECT_THAT(doubts_of(observer), ElementsAre(HasSubstr("beyond 55 % of the way")));
   observer.picture[0].sigma_px = 6.8;
-  ASSERT_EQ(missing_views(views, observer).size(), 1u);
-  EXPECT_THAT(missing_views(views, observer)[0], HasSubstr("the lens is certain only to 6.8 px"));
+  EXPECT_THAT(missing_views(views, observer),
+              ElementsAre(HasSubstr("the lens is certain only to 6.8 px")));
 }
 
 // One frontal view, as a phone on a table: however small its stated deviation, no lens follows.

@@ -2,61 +2,40 @@
 #include "daemon/calibrate/sensor/dark_fit.hpp"
 #include "daemon/calibrate/sensor/vignetting_fit.hpp"
 #include "drivers/calibration/fisheye.hpp"
-#include "drivers/error.hpp"
+#include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/lighting_pictures.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::calibrate::sensor_test {
 
 using test::degree;
-
-class Pictures final : public PictureSource {
- public:
-  explicit Pictures(std::vector<FramePtr> frames) : frames_(std::move(frames)) {}
-  std::optional<NamedFrame> next() override {
-    if (index_ == frames_.size()) return std::nullopt;
-    const std::string name = "picture " + std::to_string(index_);
-    return NamedFrame{frames_[index_++], name};
-  }
-
- private:
-  std::vector<FramePtr> frames_;
-  std::size_t index_ = 0;
-};
+using test::Pictures;
 
 constexpr int size = 128;
 constexpr int pictures = 8;
 constexpr double noise = 0.002;
 const glm::dvec3 level(0.010, 0.012, 0.015);
 
-ResponseCurve linear() {
-  ResponseCurve curve;
-  curve.kind = ResponseCurve::Kind::linear;
-  return curve;
-}
+const ResponseCurve linear{.kind = ResponseCurve::Kind::linear, .inverse_table = {}};
 
 // A covered lens; `leak` is added in a corner, every 1000th pixel is hot.
 Pictures dark_pictures(double leak, double add = 0) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal(0, noise);
   std::vector<FramePtr> frames;
-  for (int i = 0; i < pictures; ++i) {
-    std::vector<glm::dvec3> signals;
-    for (int p = 0; p < size * size; ++p) {
+  for (int i = 0; i < pictures; ++i)
+    frames.push_back(test::make_frame(size, size, 1, [&](int x, int y) {
       glm::dvec3 signal = level + add;
       for (int c = 0; c < 3; ++c) signal[c] += normal(random);
-      if (p % 1000 == 0) signal.g = 0.9;
-      if (p % size < size / 4 && p / size < size / 4) signal += leak;
-      signals.push_back(signal);
-    }
-    frames.push_back(test::make_frame(size, size, 1, signals));
-  }
+      if ((y * size + x) % 1000 == 0) signal.g = 0.9;
+      if (x < size / 4 && y < size / 4) signal += leak;
+      return signal;
+    }));
   return Pictures(std::move(frames));
 }
 
 TEST(DarkFit, LevelNoiseAndHotPixelsAreFound) {
   Pictures source = dark_pictures(0);
-  const DarkFit fit = fit_dark(source, linear());
+  const DarkFit fit = fit_dark(source, linear);
   EXPECT_EQ(fit.pictures, pictures);
   EXPECT_EQ(fit.hot_pixels, static_cast<std::size_t>(size * size / 1000 + 1));
   // The mean of n pixels of all pictures: five standard errors; of its deviation likewise, which
@@ -70,11 +49,11 @@ TEST(DarkFit, LevelNoiseAndHotPixelsAreFound) {
 
 TEST(DarkFit, ALensThatIsNotCoveredIsRefused) {
   Pictures leaking = dark_pictures(0.01);
-  EXPECT_THROW(fit_dark(leaking, linear()), Error);
+  EXPECT_THROW(fit_dark(leaking, linear), Error);
   Pictures bright = dark_pictures(0, 0.6);
-  EXPECT_THROW(fit_dark(bright, linear()), Error);
+  EXPECT_THROW(fit_dark(bright, linear), Error);
   Pictures none({});
-  EXPECT_THROW(fit_dark(none, linear()), Error);
+  EXPECT_THROW(fit_dark(none, linear), Error);
 }
 
 const Vignetting lens_loss = {-0.12, 0.015, -0.004};
@@ -91,28 +70,34 @@ FramePtr flat_picture(double brightness, const glm::dvec2& gradient, const Vigne
                       double most = 1) {
   const LightCameraCalibration lens_of = camera();
   const Fisheye lens(lens_of.intrinsics);
-  std::vector<glm::dvec3> signals;
-  for (int y = 0; y < lens_of.intrinsics.height; ++y)
-    for (int x = 0; x < lens_of.intrinsics.width; ++x) {
-      const auto ray = lens.unproject({x, y});
-      double light = 0;
-      if (ray)
-        light = brightness * (1 + gradient.x * ray->x + gradient.y * ray->y) *
-                relative_illumination(loss, std::acos(std::min(ray->z, 1.0)));
-      signals.push_back(
-          glm::min(light * glm::dvec3(1, 0.8, 0.6) + lens_of.dark_level, glm::dvec3(most)));
-    }
-  return test::make_frame(lens_of.intrinsics.width, lens_of.intrinsics.height, 1, signals);
+  return test::make_frame(256, 256, 1, [&](int x, int y) {
+    const auto ray = lens.unproject({x, y});
+    double light = 0;
+    if (ray)
+      light = brightness * (1 + gradient.x * ray->x + gradient.y * ray->y) *
+              relative_illumination(loss, std::acos(std::min(ray->z, 1.0)));
+    return glm::min(light * glm::dvec3(1, 0.8, 0.6) + lens_of.dark_level, glm::dvec3(most));
+  });
+}
+
+struct Flats {
+  std::vector<FlatPicture> pictures;
+  std::vector<std::string> notes;
+};
+
+Flats read_flats(std::vector<FramePtr> frames, const LightCameraCalibration& by = camera()) {
+  Pictures source(std::move(frames));
+  Flats flats;
+  flats.pictures = read_flat_pictures(source, by, flats.notes);
+  return flats;
 }
 
 TEST(VignettingFit, TheLensIsToldFromTheLight) {
-  Pictures source({flat_picture(0.6, {0.2, -0.1}, lens_loss),
-                   flat_picture(0.4, {-0.3, 0}, lens_loss),
-                   flat_picture(0.5, {0, 0.25}, lens_loss)});
-  std::vector<std::string> notes;
-  std::vector<FlatPicture> pictures_seen = read_flat_pictures(source, camera(), notes);
-  EXPECT_TRUE(notes.empty());
-  const VignettingFit fit = fit_vignetting(pictures_seen, camera().intrinsics.max_angle_rad);
+  Flats flats = read_flats({flat_picture(0.6, {0.2, -0.1}, lens_loss),
+                            flat_picture(0.4, {-0.3, 0}, lens_loss),
+                            flat_picture(0.5, {0, 0.25}, lens_loss)});
+  EXPECT_THAT(flats.notes, IsEmpty());
+  const VignettingFit fit = fit_vignetting(flats.pictures, camera().intrinsics.max_angle_rad);
   // What the codes of 16 bits leave: half a code of the dimmest pixel's signal.
   const double rounding = 0.5 / 65535 / 0.1;
   EXPECT_LT(fit.rms, rounding);
@@ -129,12 +114,10 @@ TEST(VignettingFit, WhatIsClippedBelowWhiteIsLeftOut) {
   constexpr double brightness = 0.52;
   LightCameraCalibration clips = camera();
   clips.response.clip_share = 0.5;
-  Pictures source({flat_picture(brightness, {}, lens_loss, 0.5)});
-  std::vector<std::string> notes;
-  const std::vector<FlatPicture> seen = read_flat_pictures(source, clips, notes);
-  EXPECT_TRUE(notes.empty());
-  ASSERT_EQ(seen.size(), 1u);
-  for (const FlatSample& sample : seen[0].samples)
+  const Flats flats = read_flats({flat_picture(brightness, {}, lens_loss, 0.5)}, clips);
+  EXPECT_THAT(flats.notes, IsEmpty());
+  ASSERT_EQ(flats.pictures.size(), 1u);
+  for (const FlatSample& sample : flats.pictures[0].samples)
     ASSERT_NEAR(sample.signal,
                 brightness * (1 + 0.8 + 0.6) * relative_illumination(lens_loss, sample.angle_rad),
                 3 * 0.5 / 65535)
@@ -143,20 +126,14 @@ TEST(VignettingFit, WhatIsClippedBelowWhiteIsLeftOut) {
 
 TEST(VignettingFit, PicturesThatCannotBeUsedAreLeftOutAndTold) {
   std::vector<glm::dvec3> signals(64 * 64, glm::dvec3(0.5));
-  Pictures source({test::make_frame(64, 64, 1, signals), flat_picture(5, {}, {})});
-  std::vector<std::string> notes;
-  std::vector<FlatPicture> pictures_seen = read_flat_pictures(source, camera(), notes);
-  ASSERT_EQ(notes.size(), 2u);
-  EXPECT_THAT(notes[0], HasSubstr("64x64"));
-  EXPECT_THAT(notes[1], HasSubstr("black or white"));
-  EXPECT_THROW(fit_vignetting(pictures_seen, 1), Error);
+  Flats flats = read_flats({test::make_frame(64, 64, 1, signals), flat_picture(5, {}, {})});
+  EXPECT_THAT(flats.notes, ElementsAre(HasSubstr("64x64"), HasSubstr("black or white")));
+  EXPECT_THROW(fit_vignetting(flats.pictures, 1), Error);
 }
 
 TEST(VignettingFit, ALensThatLetsNothingThroughIsRefused) {
-  Pictures source({flat_picture(0.6, {}, {-0.3, -0.01, 0})});
-  std::vector<std::string> notes;
-  std::vector<FlatPicture> pictures_seen = read_flat_pictures(source, camera(), notes);
-  EXPECT_THROW(fit_vignetting(pictures_seen, 110 * degree), Error);
+  Flats flats = read_flats({flat_picture(0.6, {}, {-0.3, -0.01, 0})});
+  EXPECT_THROW(fit_vignetting(flats.pictures, 110 * degree), Error);
 }
 
 }  // namespace previz::calibrate::sensor_test

@@ -5,11 +5,8 @@
 #include "daemon/calibrate/tags/tag_tables.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
-#include "daemon/set/set.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/tag_walks.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::calibrate::tag_lens_test {
@@ -36,14 +33,7 @@ std::vector<test::Held> in_the_centre() {
 }
 
 ObserverFit by_boards(const std::vector<test::Held>& how, unsigned seed) {
-  std::mt19937 random(seed);
-  const LensVector lens = lens_vector(true_lens());
-  return fit_observer(test::hold(
-      parse_board("chessboard:9x6:25mm"), how,
-      [&](const glm::dvec3& point) {
-        return project_pinhole({lens.val, lens_size}, point);
-      },
-      1280, 720, noise_px, random));
+  return fit_observer(test::hold(how, true_lens(), noise_px, seed));
 }
 
 LensPrior prior_of(const ObserverFit& boards) {
@@ -139,9 +129,8 @@ TEST(TagLens, IsWrittenIntoItsTableAlone) {
 }
 
 std::string refusal(const std::string& table) {
-  PinholeIntrinsics lens = test::plain_lens(640, 480, 600);
   ObserverCalibration camera;
-  camera.intrinsics = lens;
+  camera.intrinsics = test::plain_lens(640, 480, 600);
   return test::error_of(
       [&] { set::parse_set(set::intrinsics_toml(camera) + table, "stage.toml"); });
 }

@@ -10,11 +10,9 @@
 #include "daemon/calibrate/tags/tag_tables.hpp"
 #include "daemon/calibrate/tags/tag_walk.hpp"
 #include "daemon/set/load.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/tag_walks.hpp"
 #include "tests/support/temporary_directory.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 #include "tests/support/units.hpp"
 
@@ -74,8 +72,7 @@ TEST(TagSurvey, FindsEveryTagOfARoom) {
   EXPECT_TRUE(survey.apart.empty());
   EXPECT_EQ(survey.sightings_used, survey.sightings);
   expect_within_sigmas(survey, still(0), 5);
-  EXPECT_TRUE(missing_of_tags(survey, {0, 13, 20}, 0).empty())
-      << missing_of_tags(survey, {0, 13, 20}, 0).front();
+  EXPECT_THAT(missing_of_tags(survey, {0, 13, 20}, 0), IsEmpty());
 }
 
 // The error of a tag against its covariance is a chi-square of 6 degrees: over 8 walks of 9 tags
@@ -115,8 +112,7 @@ TEST(TagSurvey, MirroredPosesOfSinglePicturesDoNotLast) {
 std::vector<set::Tag> bumped(int picture, int id, int when = 22) {
   std::vector<set::Tag> tags = still(0);
   if (picture >= when)
-    for (set::Tag& tag : tags)
-      if (tag.id == id) tag.world_from_tag[3] += glm::dvec4(0.006, 0.008, 0, 0);
+    std::ranges::find(tags, id, &set::Tag::id)->world_from_tag[3] += glm::dvec4(0.006, 0.008, 0, 0);
   return tags;
 }
 
@@ -134,10 +130,9 @@ TEST(TagSurvey, ATagBumpedByACentimetreIsFoundAndNamed) {
     EXPECT_GE(number(survey.moved[0].since), 22);
     EXPECT_EQ(survey.tags.size(), 9u);
     expect_within_sigmas(survey, still(0), 5);
-    const auto missing = missing_of_tags(survey, {}, 0);
-    ASSERT_EQ(missing.size(), 1u);
-    EXPECT_THAT(missing[0],
-                HasSubstr("tag " + std::to_string(id) + " again, once it is fixed in place"));
+    EXPECT_THAT(
+        missing_of_tags(survey, {}, 0),
+        ElementsAre(HasSubstr("tag " + std::to_string(id) + " again, once it is fixed in place")));
   }
 }
 
@@ -163,9 +158,7 @@ TEST(TagSurvey, AnOriginThatMovedIsRefused) {
   const std::string said = refusal(walk, {});
   EXPECT_THAT(said, HasSubstr("tag 0, which defines the world, did not stay in place (moved by "));
   EXPECT_THAT(said, HasSubstr("--origin"));
-  TagSurveyOptions elsewhere;
-  elsewhere.origin = 99;
-  EXPECT_THAT(refusal(walk, elsewhere), HasSubstr("tag 99 is in no picture"));
+  EXPECT_THAT(refusal(walk, {.origin = 99, .stated = {}}), HasSubstr("tag 99 is in no picture"));
 }
 
 TEST(TagSurvey, ATagOfAnotherSizeThanStatedIsMeasured) {
@@ -233,20 +226,18 @@ TEST(TagSurvey, SaysWhichPicturesAreMissing) {
     return id == 4 && glm::dot(direction(81), direction(seen.picture)) < std::cos(9.5 * degree);
   });
   const TagSurvey survey = survey_tags(walk, walk_lens(), {});
-  const std::vector<std::string> missing = missing_of_tags(survey, {0, 31}, 0);
-  std::string all;
-  for (const std::string& line : missing) all += line + "\n";
-  EXPECT_THAT(all, HasSubstr("tag 31, together with another tag"));
-  EXPECT_THAT(all, HasSubstr("tags 7, 8 and 9 together with others: step back"));
-  EXPECT_THAT(all, HasSubstr("tag 20 in more pictures: 3 are usable"));
-  EXPECT_THAT(all, HasSubstr("tag 4 from further to the side: walk around it"));
+  EXPECT_THAT(missing_of_tags(survey, {0, 31}, 0),
+              AllOf(Contains(HasSubstr("tag 31, together with another tag")),
+                    Contains(HasSubstr("tags 7, 8 and 9 together with others: step back")),
+                    Contains(HasSubstr("tag 20 in more pictures: 3 are usable")),
+                    Contains(HasSubstr("tag 4 from further to the side: walk around it"))));
 }
 
 TEST(TagSurvey, TheLensOfAnotherCameraIsSuspected) {
   PinholeIntrinsics other = walk_lens();
   other.fx *= 1.25, other.fy *= 0.8, other.k1 = 0.5;
-  const std::string said = refusal(walk_past(still), {}, other);
-  EXPECT_THAT(said, HasSubstr("is the lens calibration the one for this camera"));
+  EXPECT_THAT(refusal(walk_past(still), {}, other),
+              HasSubstr("is the lens calibration the one for this camera"));
 }
 
 TEST(TagSizes, AreReadAsWritten) {
@@ -304,7 +295,7 @@ TEST(TagTables, AreWrittenIntoTheSetFileWhoseCommentsStay) {
 }
 
 // The whole command, on a folder of pictures: a tag is bumped by a centimetre on the way.
-class TagCommand : public ::testing::Test {
+class TagCommand : public testing::Test {
  protected:
   static constexpr int pictures = 14, bump = 8;
 
@@ -318,14 +309,12 @@ class TagCommand : public ::testing::Test {
       const double angle = (-40 + 80.0 * i / (pictures - 1)) * degree;
       scene.world_from_camera = test::camera_looking(
           {0.75 * std::sin(angle), -0.75 * std::cos(angle), 0.55 + 0.1 * (i % 3)}, {0.02, 0.02, 0});
-      test::Sensor sensor;
-      sensor.full_well_e = 20000;
-      const Frame frame = test::expose(test::render(scene), sensor, random);
+      const Frame frame =
+          test::expose(test::render(scene), {.full_well_e = 20000, .response = {}}, random);
       cv::Mat picture(frame.height, frame.width, CV_8UC3,
                       const_cast<std::uint8_t*>(frame.bytes.data()));
-      char name[16];
-      std::snprintf(name, sizeof name, "%04d.png", i);
-      cv::imwrite((folder / "walk" / name).string(), picture);
+      const std::string number = std::to_string(10000 + i).substr(1);
+      cv::imwrite((folder / "walk" / (number + ".png")).string(), picture);
     }
     std::ofstream(set_file()) << "# The attic\n"
                                  "[observer.intrinsics]\nwidth = 640\nheight = 480\nfx = 600.0\n"
@@ -346,14 +335,11 @@ class TagCommand : public ::testing::Test {
     return tags;
   }
   std::filesystem::path set_file() const { return folder / "stage.toml"; }
+  std::string text_of_set() const { return session::read_file(set_file()); }
   std::string said() {
     std::ostringstream out;
-    try {
-      calibrate_tags(options, out);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return out.str();
+    const std::string error = test::error_of([&] { calibrate_tags(options, out); });
+    return error.empty() ? out.str() : error;
   }
 
   test::TemporaryDirectory folder;
@@ -375,45 +361,40 @@ TEST_F(TagCommand, RefusesAWalkWithABumpUnlessForcedAndWritesTheRest) {
     // The bound of the synthetic sets that tests/truth has, which are 640 px wide, too.
     EXPECT_LT(glm::distance(tag.world_from_tag[3], truth.world_from_tag[3]), 0.0003) << tag.id;
   }
-  std::ostringstream text;
-  text << std::ifstream(set_file()).rdbuf();
-  EXPECT_EQ(text.str().find("# The attic\n"), 0u);
-  EXPECT_THAT(text.str(), HasSubstr("[[tag]]  # in the middle\n"));
+  EXPECT_THAT(text_of_set(),
+              AllOf(StartsWith("# The attic\n"), HasSubstr("[[tag]]  # in the middle\n")));
 }
 
 // Whoever opens the set file next week sees that the map was forced; a good one takes that away.
 TEST_F(TagCommand, AForcedMapSaysSoInTheSetFile) {
-  const auto text_of_set = [&] { return session::read_file(set_file()); };
   options.force = options.write = true;
   said();
   const std::string forced = text_of_set();
-  const std::size_t doubt = forced.find("# UNRELIABLE: accepted with --force although");
-  ASSERT_NE(doubt, std::string::npos) << forced;
-  EXPECT_LT(doubt, forced.find("[[tag]]"));
+  EXPECT_THAT(forced.substr(0, forced.find("[[tag]]")),
+              HasSubstr("# UNRELIABLE: accepted with --force although"));
   EXPECT_THAT(forced, HasSubstr("# tag 4 again"));
   said();
   EXPECT_EQ(text_of_set(), forced);
-  EXPECT_THAT(with_tags(forced, two_tags(), ""), Not(HasSubstr("UNRELIABLE")));
-  EXPECT_THAT(with_tags(forced, two_tags(), ""), Not(HasSubstr("# tag 4")));
+  EXPECT_THAT(with_tags(forced, two_tags(), ""),
+              AllOf(Not(HasSubstr("UNRELIABLE")), Not(HasSubstr("# tag 4"))));
 }
 
 // Each picture links two neighbours of a row of tags: their errors add up.
 TEST(TagSurvey, AChainOfPairsIsNamed) {
   TagSurvey survey;
   for (int id = 0; id < 8; ++id) {
-    SurveyedTag tag;
+    SurveyedTag& tag = survey.tags.emplace_back();
     tag.id = id;
     tag.pictures = 10;
     tag.views_rad = 1;
     tag.position_sigma_m = 0.004 * id;
-    survey.tags.push_back(tag);
   }
   survey.pictures = 40;
   survey.pictures_of_pairs = 37;
-  const auto missing = missing_of_tags(survey, {}, 0);
-  ASSERT_EQ(missing.size(), 1u);
-  EXPECT_THAT(missing[0], HasSubstr("37 of 40 pictures show two only, and a chain of pairs bends"));
-  EXPECT_THAT(missing[0], HasSubstr("tag 7, the worst, to 28 mm"));
+  EXPECT_THAT(
+      missing_of_tags(survey, {}, 0),
+      ElementsAre(AllOf(HasSubstr("37 of 40 pictures show two only, and a chain of pairs bends"),
+                        HasSubstr("tag 7, the worst, to 28 mm"))));
   survey.pictures_of_pairs = 3;
   EXPECT_EQ(missing_of_tags(survey, {}, 0).size(), 7u);
 }

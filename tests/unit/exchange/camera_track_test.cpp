@@ -3,7 +3,6 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
@@ -11,6 +10,8 @@
 #include "tests/support/test.hpp"
 
 namespace previz::exchange::camera_track_test {
+
+using testing::_;
 
 // At (1, 2, 3), level, looking along the world's +Y: right = X, down = -Z, forward = Y.
 const glm::dmat4 along_y{{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}, {1, 2, 3, 1}};
@@ -63,31 +64,28 @@ TEST(CameraTrack, UsdLensIsTheCalibration) {
   EXPECT_DOUBLE_EQ(value_of(to_usda(track), "horizontalAperture"), 0.36);
 }
 
+// The numbers of a .chan file's only line: frame, place, angles about X, Y and Z, vertical angle.
+std::vector<double> chan_of(const glm::dmat4& world_from_camera) {
+  std::istringstream line(to_chan(track_of(world_from_camera)));
+  return {std::istream_iterator<double>(line), {}};
+}
+
+auto near(double value) {
+  return testing::DoubleNear(value, 1e-12);
+}
+
 // Our +Y is Nuke's -Z, where an unturned camera looks.
 TEST(CameraTrack, ChanOfALevelCameraHasNoRotation) {
-  std::istringstream line(to_chan(track_of(along_y)));
-  double frame, tx, ty, tz, rx, ry, rz, vfov;
-  line >> frame >> tx >> ty >> tz >> rx >> ry >> rz >> vfov;
-  EXPECT_EQ(frame, 7);
-  EXPECT_EQ(tx, 1);
-  EXPECT_EQ(ty, 3);
-  EXPECT_EQ(tz, -2);
-  EXPECT_NEAR(rx, 0, 1e-12);
-  EXPECT_NEAR(ry, 0, 1e-12);
-  EXPECT_NEAR(rz, 0, 1e-12);
-  EXPECT_NEAR(vfov, glm::degrees(2 * std::atan(540.0 / 1790)), 1e-12);
+  const double vertical_angle = glm::degrees(2 * std::atan(540.0 / 1790));
+  EXPECT_THAT(chan_of(along_y),
+              ElementsAre(7, 1, 3, -2, near(0), near(0), near(0), near(vertical_angle)));
 }
 
 TEST(CameraTrack, ChanOfACameraTippedDown) {
   const glm::dmat4 tipped = along_y * glm::rotate(glm::dmat4(1), glm::radians(-30.0), {1, 0, 0});
-  std::istringstream line(to_chan(track_of(tipped)));
-  double skip, rx, ry, rz;
-  line >> skip >> skip >> skip >> skip >> rx >> ry >> rz;
   // OpenCV's X is the same axis as Nuke's, its other two are turned round: the angle keeps its
   // sign.
-  EXPECT_NEAR(rx, -30, 1e-12);
-  EXPECT_NEAR(ry, 0, 1e-12);
-  EXPECT_NEAR(rz, 0, 1e-12);
+  EXPECT_THAT(chan_of(tipped), ElementsAre(_, _, _, _, near(-30), near(0), near(0), _));
 }
 
 // Ry Rx Rz of the angles is the matrix they were taken from, also where the camera looks straight
@@ -127,19 +125,23 @@ TEST(CameraTrack, FramesThatWereNotTrackedHaveNoKey) {
 // A session in which `from` stands for what `to` says, wherever it is written.
 void rewrite(const std::filesystem::path& session, const std::string& from, const std::string& to) {
   std::string text = session::read_file(session / "session.toml");
-  for (std::size_t at = text.find(from); at != std::string::npos;
-       at = text.find(from, at + to.size()))
+  for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
     text.replace(at, from.size(), to);
   session::replace_file(session / "session.toml", text);
 }
 
-TEST(ExportTake, TwoFilesOfOneNameStayTwo) {
-  const test::TemporaryDirectory directory;
-  test::write_small_take(directory.path());
+class ExportTake : public testing::Test {
+ protected:
+  ExportTake() { test::write_small_take(directory.path()); }
+
+  test::TemporaryDirectory directory;
+  std::ostringstream out;
+};
+
+TEST_F(ExportTake, TwoFilesOfOneNameStayTwo) {
   const std::string floor = session::read_file(directory / "floor.gltf");
   const std::string card = session::read_file(directory / "card.gltf");
   rewrite(directory / "session", "card.gltf", "props/floor.gltf");
-  std::ostringstream out;
   export_take({directory / "session", directory / "out"}, out);
   EXPECT_EQ(session::read_file(directory / "out/floor.gltf"), floor);
   EXPECT_EQ(session::read_file(directory / "out/floor_2.gltf"), card);
@@ -147,15 +149,12 @@ TEST(ExportTake, TwoFilesOfOneNameStayTwo) {
 
 // What is exported is handed on: a take from elsewhere must not add files of the one who exports
 // it.
-TEST(ExportTake, CopiesNoForeignFile) {
-  const test::TemporaryDirectory directory;
-  test::write_small_take(directory.path());
+TEST_F(ExportTake, CopiesNoForeignFile) {
   session::replace_file(directory / "secret.gltf", session::read_file(directory / "card.gltf"));
   rewrite(directory / "session", "\"card.gltf\"", "\"../secret.gltf\"");
   rewrite(directory / "session", "\\\"card.gltf\\\"", "\\\"../secret.gltf\\\"");
   // What the set names is no asset of the session any more.
   rewrite(directory / "session", "\"../secret.gltf\" =", "\"other.gltf\" =");
-  std::ostringstream out;
   EXPECT_THROW(export_take({directory / "session", directory / "out"}, out), Error);
   EXPECT_FALSE(std::filesystem::exists(directory / "out/secret.gltf"));
   export_take({directory / "session", directory / "out", {}, true}, out);

@@ -5,9 +5,7 @@
 #include "daemon/exchange/import_description.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
-#include "daemon/set/set.hpp"
 #include "drivers/calibration/fisheye.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/session_toml.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -86,11 +84,6 @@ exchange::ImportDescription describe(const std::string& json) {
   return exchange::read_description(folder / "FRAMES.json");
 }
 
-template <typename Read>
-std::string message_of(const Read& read) {
-  return test::error_of([&] { read(); });
-}
-
 // `text` with another value for a key of a TOML table, a further key, or (value "") without it; and
 // the line of the key, or of its table where the key is not there.
 std::pair<std::string, int> edited(std::string text, const std::string& table,
@@ -117,11 +110,11 @@ struct Mistake {
   std::string kind = "srgb";  // of the response
   // Where session.toml differs.
   std::string recorded_key{}, recorded_value{}, recorded_words{};
-
-  const std::string& recorded(const std::string& own, const std::string& other) const {
-    return own.empty() ? other : own;
-  }
 };
+
+const std::string& either(const std::string& own, const std::string& other) {
+  return own.empty() ? other : own;
+}
 
 void PrintTo(const Mistake& mistake, std::ostream* out) {
   *out << mistake.camera << '.' << mistake.table << '.' << mistake.key << " = " << mistake.value;
@@ -142,7 +135,7 @@ TEST_P(CalibrationMistake, IsReportedInTheSameWordsByASetFile) {
   const std::string table = m.camera + "." + m.table;
   const auto kind = edited(set_text, m.camera + ".response", "kind", '"' + m.kind + '"').first;
   const auto [text, line] = edited(m.key == "kind" ? set_text : kind, table, m.key, m.value);
-  const auto message = message_of([&, &its = text] { set::parse_set(its, "stage.toml"); });
+  const auto message = test::error_of([&, &its = text] { set::parse_set(its, "stage.toml"); });
   EXPECT_TRUE(message.starts_with("stage.toml:" + std::to_string(line) + ":")) << message;
   expect_words(message, ": " + table + "." + m.key + ": ", m.words);
 }
@@ -156,7 +149,7 @@ TEST_P(CalibrationMistake, IsReportedInTheSameWordsByAnImport) {
     json[camera][m.table].erase(m.key);
   else
     json[camera][m.table][m.key] = nlohmann::json::parse(m.value);
-  expect_words(message_of([&] { describe(json.dump()); }),
+  expect_words(test::error_of([&] { describe(json.dump()); }),
                "FRAMES.json: " + camera + "." + m.table + "." + m.key + ": ", m.words);
 }
 
@@ -166,16 +159,22 @@ TEST_P(CalibrationMistake, IsReportedInTheSameWordsByASession) {
   const bool is_flat = m.table == "intrinsics" || m.table == "pose" || m.key == "responsivity" ||
                        m.key == "dark_level";
   const std::string home = is_flat ? table : table + "." + m.table;
-  const std::string key = m.recorded(m.recorded_key, m.key);
+  const std::string key = either(m.recorded_key, m.key);
   const auto kind = edited(session_text(), table + ".response", "kind", '"' + m.kind + '"').first;
-  const auto [text, line] = edited(m.key == "kind" ? session_text() : kind, home, key,
-                                   m.recorded(m.recorded_value, m.value));
-  expect_words(message_of([&, &its = text] { session::parse_session_toml(its, "session.toml"); }),
-               "session.toml:" + std::to_string(line) + ": " + home + "." + key + ": ",
-               m.recorded(m.recorded_words, m.words));
+  const auto [text, line] =
+      edited(m.key == "kind" ? session_text() : kind, home, key, either(m.recorded_value, m.value));
+  expect_words(
+      test::error_of([&, &its = text] { session::parse_session_toml(its, "session.toml"); }),
+      "session.toml:" + std::to_string(line) + ": " + home + "." + key + ": ",
+      either(m.recorded_words, m.words));
 }
 
 const std::string rising = "; allowed: at least 2 numbers, strictly increasing from 0 to 1";
+Mistake table_of(const std::string& value, const std::string& words,
+                 const std::string& kind = "table") {
+  return {"observer", "response", "table", value, words, kind, "inverse_table"};
+}
+
 const Mistake observer_mistakes[] = {
     {"observer", "intrinsics", "width", "0", "0 is not allowed; allowed: whole number in px, 1 to"},
     {"observer", "intrinsics", "width", "16385", "16385 is not allowed; allowed: whole number"},
@@ -188,13 +187,9 @@ const Mistake observer_mistakes[] = {
     {"observer", "intrinsics", "k4", "\"wide\"", "\"wide\" is not allowed; allowed: number"},
     {"observer", "intrinsics", "k6", "[1, 2]",
      "a list of 2 entries is not allowed; allowed: number"},
-    {.camera = "observer",
-     .table = "lens",
-     .key = "focal_length_mm",
-     .value = "0",
-     .words = "0 is not allowed; allowed: finite number in mm, 0.01 to 10000",
-     .recorded_key = "focal_length_m",
-     .recorded_words = "0 is not allowed; allowed: finite number in m, 1e-05 to 10"},
+    {"observer", "lens", "focal_length_mm", "0",
+     "0 is not allowed; allowed: finite number in mm, 0.01 to 10000", "srgb", "focal_length_m", "",
+     "0 is not allowed; allowed: finite number in m, 1e-05 to 10"},
     {"observer", "lens", "f_number", "0.4", "0.4 is not allowed; allowed: finite number, 0.5 to"},
     {"observer", "lens", "f_number", "", "is missing; allowed: number, 0.5 to"},
     {"observer", "lens", "focus_distance_m", "0.03",
@@ -207,41 +202,11 @@ const Mistake observer_mistakes[] = {
      "conflicts with kind \"srgb\"; allowed with \"gamma\""},
     {"observer", "response", "gamma", "0", "0 is not allowed; allowed: finite number, 0.1 to 10",
      "gamma"},
-    {.camera = "observer",
-     .table = "response",
-     .key = "table",
-     .value = "",
-     .words = "is missing for kind \"table\"" + rising,
-     .kind = "table",
-     .recorded_key = "inverse_table"},
-    {.camera = "observer",
-     .table = "response",
-     .key = "table",
-     .value = "[0, 0.5, 0.5, 1]",
-     .words = "number 3 is not above the one before it" + rising,
-     .kind = "table",
-     .recorded_key = "inverse_table"},
-    {.camera = "observer",
-     .table = "response",
-     .key = "table",
-     .value = "[0]",
-     .words = "does not run from 0 to 1" + rising,
-     .kind = "table",
-     .recorded_key = "inverse_table"},
-    {.camera = "observer",
-     .table = "response",
-     .key = "table",
-     .value = "[0, 2, 1]",
-     .words = "2 is not allowed; allowed: finite number, 0 to 1",
-     .kind = "table",
-     .recorded_key = "inverse_table"},
-    {.camera = "observer",
-     .table = "response",
-     .key = "table",
-     .value = "[0, 1]",
-     .words = "conflicts with kind \"linear\"; allowed with \"table\"",
-     .kind = "linear",
-     .recorded_key = "inverse_table"},
+    table_of("", "is missing for kind \"table\"" + rising),
+    table_of("[0, 0.5, 0.5, 1]", "number 3 is not above the one before it" + rising),
+    table_of("[0]", "does not run from 0 to 1" + rising),
+    table_of("[0, 2, 1]", "2 is not allowed; allowed: finite number, 0 to 1"),
+    table_of("[0, 1]", "conflicts with kind \"linear\"; allowed with \"table\"", "linear"),
 };
 INSTANTIATE_TEST_SUITE_P(Observer, CalibrationMistake, testing::ValuesIn(observer_mistakes));
 
@@ -249,22 +214,12 @@ const Mistake light_mistakes[] = {
     {"light_camera", "intrinsics", "fx", "-3", "-3 is not allowed; allowed: finite number in px"},
     {"light_camera", "intrinsics", "k", "[1, 2]",
      "a list of 2 entries is not allowed; allowed: 4 numbers in brackets"},
-    {.camera = "light_camera",
-     .table = "intrinsics",
-     .key = "max_angle_deg",
-     .value = "181",
-     .words = "181 is not allowed; allowed: finite number in degrees, 1 to 180",
-     .recorded_key = "max_angle_rad",
-     .recorded_value = "3.15",
-     .recorded_words =
-         "3.15 is not allowed; allowed: finite number in rad, 0.0174532925199 to 3.1415"},
-    {.camera = "light_camera",
-     .table = "intrinsics",
-     .key = "vignetting",
-     .value = "[-0.5, 0.0, 0.0]",
-     .words = "passes no light at some angle; allowed: at least 0.01 of it up to max_angle_deg",
-     .recorded_words = "passes no light at some angle; allowed: at least 0.01 of it up to "
-                       "max_angle_rad"},
+    {"light_camera", "intrinsics", "max_angle_deg", "181",
+     "181 is not allowed; allowed: finite number in degrees, 1 to 180", "srgb", "max_angle_rad",
+     "3.15", "3.15 is not allowed; allowed: finite number in rad, 0.0174532925199 to 3.1415"},
+    {"light_camera", "intrinsics", "vignetting", "[-0.5, 0.0, 0.0]",
+     "passes no light at some angle; allowed: at least 0.01 of it up to max_angle_deg", "srgb", "",
+     "", "passes no light at some angle; allowed: at least 0.01 of it up to max_angle_rad"},
     {"light_camera", "response", "clip_share", "0.4",
      "0.4 is not allowed; allowed: finite number, 0.5 to 1"},
     {"light_camera", "response", "dark_level", "[0, 0.6, 0]",
@@ -308,11 +263,11 @@ TEST(Calibration, DistortionThatIsNotFiniteIsRefused) {
       const std::string words =
           std::string(key) + ": " + value + " is not allowed; allowed: finite number";
       const auto set = edited(set_text, "observer.intrinsics", key, value).first;
-      EXPECT_THAT(message_of([&] { set::parse_set(set, "stage.toml"); }),
-                  testing::HasSubstr("observer.intrinsics." + words));
+      EXPECT_THAT(test::error_of([&] { set::parse_set(set, "stage.toml"); }),
+                  HasSubstr("observer.intrinsics." + words));
       const auto session = edited(session_text(), "observer.calibration", key, value).first;
-      EXPECT_THAT(message_of([&] { session::parse_session_toml(session, "session.toml"); }),
-                  testing::HasSubstr("observer.calibration." + words));
+      EXPECT_THAT(test::error_of([&] { session::parse_session_toml(session, "session.toml"); }),
+                  HasSubstr("observer.calibration." + words));
     }
 }
 
@@ -320,7 +275,7 @@ TEST(Calibration, DistortionThatIsNotFiniteIsRefused) {
 TEST(Calibration, RationalTermsArePrintedIfTheyAreNotZero) {
   ObserverCalibration calibration = *set::parse_set(set_text, "stage.toml").observer.calibration;
   const std::string with = set::intrinsics_toml(calibration);
-  EXPECT_THAT(with, testing::HasSubstr("k3 = 0.004\nk4 = 0.05\nk5 = -0.006\nk6 = 0.007\n"));
+  EXPECT_THAT(with, HasSubstr("k3 = 0.004\nk4 = 0.05\nk5 = -0.006\nk6 = 0.007\n"));
   EXPECT_EQ(set::intrinsics_toml(*set::parse_set(with, "printed.toml").observer.calibration), with);
   PinholeIntrinsics& lens = calibration.intrinsics;
   lens.k4 = lens.k5 = lens.k6 = 0;
@@ -336,10 +291,10 @@ TEST(Calibration, AFoldingFisheyeIsRefusedWhereItIsWrittenAndUsedWhereItIsRecord
       "k: the lens model folds back at 73.9 degrees off axis; allowed: a growing radius up to "
       "max_angle_deg";
   const std::string set = edited(set_text, key, "k", k).first;
-  EXPECT_THAT(message_of([&] { set::parse_set(set, "stage.toml"); }), HasSubstr(words));
+  EXPECT_THAT(test::error_of([&] { set::parse_set(set, "stage.toml"); }), HasSubstr(words));
   nlohmann::json json = nlohmann::json::parse(frames_text);
   json["light"]["intrinsics"]["k"] = nlohmann::json::parse(k);
-  EXPECT_THAT(message_of([&] { describe(json.dump()); }), HasSubstr(words));
+  EXPECT_THAT(test::error_of([&] { describe(json.dump()); }), HasSubstr(words));
 
   const std::string session = edited(session_text(), "light.calibration", "k", k).first;
   const auto light = session::parse_session_toml(session, "session.toml").info.light;

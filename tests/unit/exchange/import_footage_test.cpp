@@ -1,26 +1,16 @@
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/picture_header.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::exchange::import_footage_test {
-
-std::unique_ptr<session::StreamReader> open(const Shoot& shoot, const std::string& source) {
-  session::Session opened = session::open_session(shoot.session());
-  auto stream = session::open_stream(opened, source);
-  EXPECT_TRUE(opened.missing.empty());
-  return stream;
-}
 
 TEST(Import, NumberedPicturesComeInBitForBit) {
   const Shoot shoot;
   const ImportReport report = shoot.import();
   EXPECT_EQ(report.observer_frames, 3u);
   EXPECT_EQ(report.light_frames, 0u);
-  const auto stream = open(shoot, "observer");
+  const auto stream = shoot.open();
   ASSERT_EQ(stream->records().size(), 3u);
   for (int i = 0; i < 3; ++i) {
     const FramePtr frame = stream->read(i);
@@ -43,31 +33,27 @@ class ImportKinds : public testing::TestWithParam<Kind> {};
 TEST_P(ImportKinds, KeepTheirBits) {
   const auto [extension, type, format] = GetParam();
   Shoot shoot;
-  std::string name = "deep.";
-  name += extension;
+  const std::string name = std::string("deep.") + extension;
   write_picture(shoot.folder() / name, noise_picture(7, type, 20, 10));
   shoot.json["observer"]["pictures"] = {name};
-  ASSERT_EQ(shoot.error(), "");
-  const FramePtr frame = open(shoot, "observer")->read(0);
+  const FramePtr frame = shoot.first_frame();
   EXPECT_EQ(frame->format, format);
   EXPECT_EQ(frame->bytes, frame_bytes_of(noise_picture(7, type, 20, 10)));
 }
 
-INSTANTIATE_TEST_SUITE_P(Files, ImportKinds,
-                         testing::Values(Kind{"png", CV_8UC1, PixelFormat::gray8},
-                                         Kind{"png", CV_8UC3, PixelFormat::rgb8},
-                                         Kind{"png", CV_16UC1, PixelFormat::gray16},
-                                         Kind{"png", CV_16UC3, PixelFormat::rgb16},
-                                         Kind{"tiff", CV_8UC3, PixelFormat::rgb8},
-                                         Kind{"tiff", CV_16UC1, PixelFormat::gray16},
-                                         Kind{"tiff", CV_16UC3, PixelFormat::rgb16}));
+const Kind kinds[] = {
+    {"png", CV_8UC1, PixelFormat::gray8},   {"png", CV_8UC3, PixelFormat::rgb8},
+    {"png", CV_16UC1, PixelFormat::gray16}, {"png", CV_16UC3, PixelFormat::rgb16},
+    {"tiff", CV_8UC3, PixelFormat::rgb8},   {"tiff", CV_16UC1, PixelFormat::gray16},
+    {"tiff", CV_16UC3, PixelFormat::rgb16},
+};
+INSTANTIATE_TEST_SUITE_P(Files, ImportKinds, testing::ValuesIn(kinds));
 
 TEST(Import, JpegIsWhatItsDecoderSays) {
   Shoot shoot;
   write_picture(shoot.folder() / "a.jpg", cv::Mat(16, 24, CV_8UC3, cv::Scalar(30, 90, 200)));
   shoot.json["observer"]["pictures"] = {"a.jpg"};
-  ASSERT_EQ(shoot.error(), "");
-  const FramePtr frame = open(shoot, "observer")->read(0);
+  const FramePtr frame = shoot.first_frame();
   // One flat block: only its mean is coded, to a step of at most 2 at OpenCV's quality 95, and
   // Y'CbCr to RGB multiplies a chroma step by at most 1.8.
   EXPECT_NEAR(frame->bytes[0], 200, 6);
@@ -89,7 +75,7 @@ TEST(Import, ATableOfTimesAndExposuresInAnyOrder) {
   EXPECT_THAT(shoot.error(), HasSubstr("light.timestamps_ns must increase; entry 2"));
   shoot.json["light"]["sort_by_time"] = true;
   EXPECT_EQ(shoot.import().light_frames, 3u);
-  const auto stream = open(shoot, "light");
+  const auto stream = shoot.open("light");
   const int order[] = {1, 2, 0};
   const double exposure[] = {8.54492187e-05, 0.0013671875, 0.35};
   for (int i = 0; i < 3; ++i) {
@@ -107,11 +93,11 @@ TEST(Import, ExposureOfShutterGainAndResponsivity) {
   observer.erase("exposure");
   observer["exposure_s"] = {0.01, 0.02, 0.04};
   observer["gain"] = 2;
-  observer["intrinsics"] = {{"width", 32}, {"height", 24}, {"fx", 30},
-                            {"fy", 30},    {"cx", 16},     {"cy", 12}};
+  observer["intrinsics"] =
+      Json::parse(R"({"width": 32, "height": 24, "fx": 30, "fy": 30, "cx": 16, "cy": 12})");
   observer["response"] = {{"responsivity", 3}};
   ASSERT_EQ(shoot.error(), "");
-  const auto stream = open(shoot, "observer");
+  const auto stream = shoot.open();
   for (int i = 0; i < 3; ++i) {
     const session::FrameRecord& record = stream->records()[i];
     EXPECT_EQ(record.exposure_s, 0.01 * (1 << i));
@@ -130,7 +116,7 @@ TEST(Import, WildcardsSortByNumber) {
     shoot.json["observer"]["pictures"] = pattern;
     std::filesystem::remove_all(shoot.session());
     ASSERT_EQ(shoot.error(), "");
-    const auto stream = open(shoot, "observer");
+    const auto stream = shoot.open();
     ASSERT_EQ(stream->records().size(), 3u);
     for (const int i : {0, 1, 2})
       EXPECT_EQ(stream->read(i)->bytes,
@@ -155,22 +141,26 @@ TEST(Import, NumbersMayGrowPastTheirPadding) {
   }
 }
 
-std::vector<std::uint8_t> noise_bytes(std::size_t count, int seed) {
+Bytes noise_bytes(std::size_t count, int seed) {
   cv::Mat noise = noise_picture(seed, CV_8UC1, static_cast<int>(count), 1);
   return {noise.datastart, noise.dataend};
 }
 
 TEST(Import, AVideoOfBt709KeepsItsSamples) {
   Shoot shoot;
-  std::vector<std::vector<std::uint8_t>> frames;
+  std::vector<Bytes> frames;
   for (int i = 0; i < 4; ++i) frames.push_back(noise_bytes(2 * 64 * 48, i));
-  write_video(shoot.folder() / "take.mkv", "yuv422p", frames, 64, 48, 50, true);
-  shoot.json["observer"] = {
-      {"video", "take.mkv"}, {"timestamps_ns", "container"}, {"start_ns", 1000}, {"exposure", 1}};
+  const VideoForm form = {.pixel_format = "yuv422p",
+                          .width = 64,
+                          .height = 48,
+                          .fps = 50,
+                          .range = AVCOL_RANGE_MPEG,
+                          .matrix = AVCOL_SPC_BT709};
+  shoot.film("take.mkv", form, frames, {{"timestamps_ns", "container"}, {"start_ns", 1000}});
   const ImportReport report = shoot.import();
   ASSERT_EQ(report.notes.size(), 2u);
   EXPECT_THAT(report.notes[0], HasSubstr("kept as it is"));
-  const auto stream = open(shoot, "observer");
+  const auto stream = shoot.open();
   ASSERT_EQ(stream->records().size(), 4u);
   for (int i = 0; i < 4; ++i) {
     const FramePtr frame = stream->read(i);
@@ -182,11 +172,10 @@ TEST(Import, AVideoOfBt709KeepsItsSamples) {
 
 TEST(Import, AVideoBringsItsOwnTimes) {
   Shoot shoot;
-  write_video(shoot.folder() / "take.mkv", "gray", {noise_bytes(512, 1), noise_bytes(512, 2)}, 32,
-              16, 50, false);
-  shoot.json["observer"] = {{"video", "take.mkv"}, {"exposure", 1}};
+  shoot.film("take.mkv", {.pixel_format = "gray", .fps = 50},
+             {noise_bytes(512, 1), noise_bytes(512, 2)}, Json::object());
   ASSERT_EQ(shoot.error(), "");
-  EXPECT_EQ(open(shoot, "observer")->records().at(1).timestamp_ns, 20'000'000);
+  EXPECT_EQ(shoot.open()->records().at(1).timestamp_ns, 20'000'000);
 }
 
 // Frame 1 is taken at start_ns + 1e9 / fps; the times of a session are below 2^63 ns = 9.22e18.
@@ -203,19 +192,17 @@ TEST(Import, TimesThatNoSessionCanHoldAreRefused) {
   Shoot slow;
   slow.json["observer"]["fps"] = 2.2e-10;  // frame 2 at 9.09e18
   ASSERT_EQ(slow.error(), "");
-  EXPECT_EQ(open(slow, "observer")->records().at(2).timestamp_ns, std::llround(2 / 2.2e-10 * 1e9));
+  EXPECT_EQ(slow.open()->records().at(2).timestamp_ns, std::llround(2 / 2.2e-10 * 1e9));
 }
 
 TEST(Import, AVideoOfRgbKeepsItsSamples) {
   Shoot shoot;
-  const std::vector<std::uint8_t> rgb = noise_bytes(3 * 32 * 16, 1);
-  std::vector<std::uint8_t> bgr0;
+  const Bytes rgb = noise_bytes(3 * 32 * 16, 1);
+  Bytes bgr0;
   for (std::size_t i = 0; i < rgb.size(); i += 3)
     bgr0.insert(bgr0.end(), {rgb[i + 2], rgb[i + 1], rgb[i], 0});
-  write_video(shoot.folder() / "take.mkv", "bgr0", {bgr0}, 32, 16, 25, false);
-  shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
-  ASSERT_EQ(shoot.error(), "");
-  const FramePtr frame = open(shoot, "observer")->read(0);
+  shoot.film("take.mkv", {.pixel_format = "bgr0"}, {bgr0});
+  const FramePtr frame = shoot.first_frame();
   EXPECT_EQ(frame->format, PixelFormat::rgb8);
   EXPECT_EQ(frame->bytes, rgb);
 }
@@ -225,41 +212,36 @@ TEST(Import, AVideoOfRgbKeepsItsSamples) {
 // y' = (Y - 16)/219 and p = (C - 128)/224; BT.709 likewise with 1.5748, 0.187324, 0.468124, 1.8556.
 // swscale's tables are fixed point: one code of rounding on top of the half.
 TEST(Import, AnyOtherVideoBecomesRgb) {
-  struct Case {
-    bool bt709;
-    double red, green, blue;
-  };
   const double y = (120 - 16) / 219.0, pb = (100 - 128) / 224.0, pr = (180 - 128) / 224.0;
-  for (const Case& matrix :
-       {Case{false, y + 1.402 * pr, y - 0.344136 * pb - 0.714136 * pr, y + 1.772 * pb},
-        Case{true, y + 1.5748 * pr, y - 0.187324 * pb - 0.468124 * pr, y + 1.8556 * pb}}) {
+  const std::array bt601{y + 1.402 * pr, y - 0.344136 * pb - 0.714136 * pr, y + 1.772 * pb};
+  const std::array bt709{y + 1.5748 * pr, y - 0.187324 * pb - 0.468124 * pr, y + 1.8556 * pb};
+  for (const bool is_bt709 : {false, true}) {
     Shoot shoot;
-    std::vector<std::uint8_t> frame(64 * 48, 120);
+    Bytes frame(64 * 48, 120);
     frame.insert(frame.end(), 32 * 24, 100);
     frame.insert(frame.end(), 32 * 24, 180);
-    write_video(shoot.folder() / "take.mkv", "yuv420p", {frame}, 64, 48, 25, matrix.bt709);
-    shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
+    VideoForm form = {.pixel_format = "yuv420p", .width = 64, .height = 48};
+    if (is_bt709) {
+      form.range = AVCOL_RANGE_MPEG;
+      form.matrix = AVCOL_SPC_BT709;
+    }
+    shoot.film("take.mkv", form, {frame});
     const ImportReport report = shoot.import();
     EXPECT_THAT(report.notes.at(0), HasSubstr("converted to rgb8"));
-    EXPECT_EQ(report.notes.at(0).find("matrix smpte170m (assumed)") == std::string::npos,
-              matrix.bt709);
-    const FramePtr rgb = open(shoot, "observer")->read(0);
+    EXPECT_NE(testing::Value(report.notes.at(0), HasSubstr("matrix smpte170m (assumed)")),
+              is_bt709);
+    const FramePtr rgb = shoot.open()->read(0);
     ASSERT_EQ(rgb->format, PixelFormat::rgb8);
-    for (std::size_t i = 0; i < rgb->bytes.size(); i += 3) {
-      ASSERT_NEAR(rgb->bytes[i], 255 * matrix.red, 1.5);
-      ASSERT_NEAR(rgb->bytes[i + 1], 255 * matrix.green, 1.5);
-      ASSERT_NEAR(rgb->bytes[i + 2], 255 * matrix.blue, 1.5);
-    }
+    for (std::size_t i = 0; i < rgb->bytes.size(); ++i)
+      ASSERT_NEAR(rgb->bytes[i], 255 * (is_bt709 ? bt709 : bt601)[i % 3], 1.5);
   }
 }
 
 TEST(Import, AVideoDeeperThan8BitsKeepsItsDepth) {
   Shoot shoot;
-  const std::vector<std::uint8_t> samples = noise_bytes(2 * 3 * 32 * 16, 5);
-  write_video(shoot.folder() / "take.mkv", "gbrp16le", {samples}, 32, 16, 25, false);
-  shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
-  ASSERT_EQ(shoot.error(), "");
-  const FramePtr frame = open(shoot, "observer")->read(0);
+  const Bytes samples = noise_bytes(2 * 3 * 32 * 16, 5);
+  shoot.film("take.mkv", {.pixel_format = "gbrp16le"}, {samples});
+  const FramePtr frame = shoot.first_frame();
   ASSERT_EQ(frame->format, PixelFormat::rgb16);
   for (std::size_t pixel = 0; pixel < 32 * 16; ++pixel)
     for (int channel = 0; channel < 3; ++channel) {
@@ -272,9 +254,8 @@ TEST(Import, AVideoDeeperThan8BitsKeepsItsDepth) {
 
 TEST(Import, AVideoWithMoreOrFewerFramesThanTimes) {
   Shoot shoot;
-  write_video(shoot.folder() / "take.mkv", "gray", {noise_bytes(512, 1), noise_bytes(512, 2)}, 32,
-              16, 25, false);
-  shoot.json["observer"] = {{"video", "take.mkv"}, {"timestamps_ns", {1}}, {"exposure", 1}};
+  shoot.film("take.mkv", {.pixel_format = "gray"}, {noise_bytes(512, 1), noise_bytes(512, 2)},
+             {{"timestamps_ns", {1}}});
   EXPECT_THAT(shoot.error(), HasSubstr("frame 1: exceeds the 1 frames"));
   shoot.json["observer"]["timestamps_ns"] = {1, 2, 3};
   EXPECT_THAT(shoot.error(), HasSubstr("observer has 2 frames; 3 are described"));
@@ -300,23 +281,22 @@ TEST(Import, FootageOfOtherFormatsIsRefused) {
   shoot.json["observer"]["pictures"] = {"a.png"};
   EXPECT_THAT(shoot.error(), HasSubstr("allowed: PNG, JPEG, TIFF"));
 
-  write_video(shoot.folder() / "real.mkv", "gray", {noise_bytes(512, 1)}, 32, 16, 25, false);
+  shoot.film("real.mkv", {.pixel_format = "gray"}, {noise_bytes(512, 1)});
   session::write_content(shoot.folder() / "list.mkv", "ffconcat version 1.0\nfile real.mkv\n");
   session::write_content(shoot.folder() / "list.mp4",
                          "#EXTM3U\n#EXT-X-TARGETDURATION:1\n#EXTINF:1,\nreal.mkv\n");
   for (const char* name : {"list.mkv", "list.mp4", "concat:real.mkv", "http://127.0.0.1:1/a.mkv"}) {
-    shoot.json["observer"] = {{"video", name}, {"fps", 25}, {"exposure", 1}};
+    shoot.json["observer"]["video"] = name;
     EXPECT_NE(shoot.error(), "") << name;
   }
-  shoot.json["observer"] = {{"video", "real.mkv"}, {"fps", 25}, {"exposure", 1}};
+  shoot.json["observer"]["video"] = "real.mkv";
   EXPECT_EQ(shoot.error(), "");
 }
 
 // A name with a colon is a name, and no protocol.
 TEST(Import, AFileWithAColonIsRead) {
   Shoot shoot;
-  write_video(shoot.folder() / "12:A.mkv", "gray", {noise_bytes(512, 1)}, 32, 16, 25, false);
-  shoot.json["observer"] = {{"video", "12:A.mkv"}, {"fps", 25}, {"exposure", 1}};
+  shoot.film("12:A.mkv", {.pixel_format = "gray"}, {noise_bytes(512, 1)});
   EXPECT_EQ(shoot.error(), "");
 }
 

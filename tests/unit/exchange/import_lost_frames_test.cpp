@@ -1,22 +1,7 @@
 // Videos of others that are damaged, cut or lack frames: what comes in, when, and with which poses.
-#include <opencv2/imgproc.hpp>
-
-#include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::exchange::import_lost_frames_test {
-
-using Bytes = std::vector<std::uint8_t>;
-
-VideoForm small_form() {
-  VideoForm form;
-  form.encoder = "png";
-  form.width = 48;
-  return form;
-}
 
 // A texture that moves, so that every frame differs from every other one and refers to others.
 std::vector<Bytes> moving_texture(int count, int width, int height) {
@@ -42,7 +27,7 @@ struct Timed {
 Timed import_video(const Shoot& shoot) {
   Timed timed;
   timed.notes = shoot.import().notes;
-  const auto stream = shoot.open_observer();
+  const auto stream = shoot.open();
   for (std::size_t i = 0; i < stream->records().size(); ++i) {
     const FramePtr frame = stream->read(i);
     timed.frames[frame->timestamp_ns] = frame->bytes;
@@ -50,11 +35,13 @@ Timed import_video(const Shoot& shoot) {
   return timed;
 }
 
+using Options = std::map<std::string, std::string>;  // of an encoder
+
 struct Damage {
   const char* name;
   const char* encoder;
   const char* file;
-  std::map<std::string, std::string> options;
+  Options options;
   std::size_t at_least;  // so many frames come in
 };
 
@@ -66,19 +53,19 @@ class ImportVideoWithAHole : public testing::TestWithParam<Damage> {};
 class ImportTruncatedVideo : public testing::TestWithParam<Damage> {};
 
 constexpr int texture_frames = 48;
+const Json its_own_times = Json::object();  // no rate beside the video
 
 using Spoil = std::function<bool(AVPacket&, int)>;
 
 void film(Shoot& shoot, const Damage& damage, Spoil spoil) {
-  VideoForm form;
-  form.encoder = damage.encoder;
-  form.options = damage.options;
-  form.pixel_format = std::string(damage.encoder) == "mjpeg" ? "yuvj420p" : "yuv420p";
-  form.width = 160;
-  form.height = 96;
-  form.spoil = std::move(spoil);
-  write_video(shoot.folder() / damage.file, form, moving_texture(texture_frames, 160, 96));
-  shoot.json["observer"] = {{"video", damage.file}, {"exposure", 1}};
+  const VideoForm form = {
+      .pixel_format = std::string(damage.encoder) == "mjpeg" ? "yuvj420p" : "yuv420p",
+      .width = 160,
+      .height = 96,
+      .encoder = damage.encoder,
+      .options = damage.options,
+      .spoil = std::move(spoil)};
+  shoot.film(damage.file, form, moving_texture(texture_frames, 160, 96), its_own_times);
 }
 
 Timed import_video(const Damage& damage, Spoil spoil) {
@@ -140,10 +127,9 @@ void expect_lost_frames_only(const Damage& damage, void (*harm)(AVPacket&)) {
   EXPECT_LT(damaged.frames.size(), whole.frames.size());
   EXPECT_GE(damaged.frames.size(), damage.at_least);
   const std::string lost = std::to_string(whole.frames.size() - damaged.frames.size());
-  EXPECT_TRUE(std::ranges::any_of(damaged.notes, [&](const std::string& note) {
-    return note.find(": " + lost + (lost == "1" ? " frame is lost" : " frames are lost")) !=
-           std::string::npos;
-  }));
+  EXPECT_THAT(
+      damaged.notes,
+      Contains(HasSubstr(": " + lost + (lost == "1" ? " frame is lost" : " frames are lost"))));
 }
 
 TEST_P(ImportVideoWithAHole, NoFrameThatRefersToALostOneComesIn) {
@@ -156,14 +142,12 @@ TEST_P(ImportTruncatedVideo, NoFrameThatRefersToALostOneComesIn) {
 
 // The most that may be lost: a group of 12, and the frames before the next key frame in time.
 constexpr std::size_t all_but_a_group = texture_frames - 15;
-const std::map<std::string, std::string> groups = {{"g", "12"}, {"bf", "2"}};
+const Options groups = {{"g", "12"}, {"bf", "2"}};
+const Options groups_of_hevc = {{"g", "12"},
+                                {"x265-params", "log-level=none:pools=none:bframes=2"}};
 const Damage mjpeg{"mjpeg", "mjpeg", "take.avi", {}, texture_frames - 1};
 const Damage h264{"h264", "libx264", "take.mp4", groups, all_but_a_group};
-const Damage hevc{"hevc",
-                  "libx265",
-                  "take.mkv",
-                  {{"g", "12"}, {"x265-params", "log-level=none:pools=none:bframes=2"}},
-                  all_but_a_group};
+const Damage hevc{"hevc", "libx265", "take.mkv", groups_of_hevc, all_but_a_group};
 const Damage mpeg4{"mpeg4", "mpeg4", "take.mp4", groups, all_but_a_group};
 const Damage mpeg2{"mpeg2", "mpeg2video", "take.mkv", groups, all_but_a_group};
 
@@ -196,8 +180,7 @@ TEST(ImportVideo, ATransportStreamThatLostPacketsComesInWithoutTheirFrames) {
     const Timed whole = import_video(shoot);
     ASSERT_EQ(whole.frames.size(), std::size_t{texture_frames});
     std::filesystem::remove_all(shoot.session());
-    std::ifstream in(shoot.folder() / "take.ts", std::ios::binary);
-    std::string bytes(std::istreambuf_iterator<char>(in), {});
+    std::string bytes = session::content_of(shoot.folder() / "take.ts");
     bytes.erase(continuing_packet(bytes), 188);
     session::write_content(shoot.folder() / "take.ts", bytes);
     const Timed damaged = import_video(shoot);
@@ -210,11 +193,9 @@ TEST(ImportVideo, ATransportStreamThatLostPacketsComesInWithoutTheirFrames) {
 // What was cut away before an open group's key frame is lost at the beginning; the numbers and
 // times of the others count from what is in the file.
 TEST(ImportVideo, ACutAtAnOpenGroupOfPicturesComesIn) {
-  const Damage open_group{"",
-                          "libx264",
-                          "take.mkv",
-                          {{"g", "12"}, {"bf", "2"}, {"x264-params", "open-gop=1:scenecut=0"}},
-                          0};
+  Options options = groups;
+  options["x264-params"] = "open-gop=1:scenecut=0";
+  const Damage open_group{"", "libx264", "take.mkv", options, 0};
   Packets packets;
   const Timed whole = import_video(open_group, packets.kept());
   ASSERT_EQ(whole.frames.size(), std::size_t{texture_frames});
@@ -234,53 +215,49 @@ TEST(ImportVideo, ACutAtAnOpenGroupOfPicturesComesIn) {
 }
 
 // A phone's clip that lost one frame while it was filmed, with a track of timecode.
-TEST(ImportVideo, TheRateIsTheNominalOneAndTheTimecodeTheClips) {
-  VideoForm form = small_form();
-  form.fps = 30;
-  form.metadata = {{"timecode", "10:59:59:20"}};
+void film_by_a_phone(Shoot& shoot, const Json& more) {
+  VideoForm form = {
+      .width = 48, .fps = 30, .encoder = "png", .metadata = {{"timecode", "10:59:59:20"}}};
   for (std::int64_t i = 0; i < 60; ++i)
     if (i != 20) form.times.push_back(i);
+  shoot.film("take.mov", form, std::vector<Bytes>(59, Bytes(3 * 48 * 16, 90)), more);
+}
+
+TEST(ImportVideo, TheRateIsTheNominalOneAndTheTimecodeTheClips) {
   Shoot shoot;
-  write_video(shoot.folder() / "take.mov", form, std::vector<Bytes>(59, Bytes(3 * 48 * 16, 90)));
-  shoot.json["observer"] = {{"video", "take.mov"}, {"exposure", 1}};
-  const ImportReport report = shoot.import();
-  EXPECT_TRUE(std::ranges::any_of(report.notes, [](const std::string& note) {
-    return note == "observer: 30 frames per second; 1 frame is missing, after frame 19";
-  })) << report.notes.back();
+  film_by_a_phone(shoot, its_own_times);
+  EXPECT_THAT(shoot.import().notes,
+              Contains("observer: 30 frames per second; 1 frame is missing, after frame 19"));
   const session::Session opened = session::open_session(shoot.session());
   EXPECT_EQ(opened.info.timecode, (session::Timecode{"10:59:59:20", 30}));
 }
 
 // A rate beside the clip counts its frames, and so hides the one that is missing: that is said.
 TEST(ImportVideo, ARateThatHidesAMissingFrameIsSaid) {
-  VideoForm form = small_form();
-  form.fps = 30;
-  for (std::int64_t i = 0; i < 60; ++i)
-    if (i != 20) form.times.push_back(i);
   Shoot shoot;
-  write_video(shoot.folder() / "take.mov", form, std::vector<Bytes>(59, Bytes(3 * 48 * 16, 90)));
-  shoot.json["observer"] = {{"video", "take.mov"}, {"exposure", 1}, {"fps", 30}};
-  const ImportReport report = shoot.import();
-  EXPECT_TRUE(std::ranges::any_of(report.notes, [](const std::string& note) {
-    return note.find("observer.fps = 30 takes the place of the times in ") != std::string::npos &&
-           note.find("take.mov, which are up to 0.0333 s away") != std::string::npos;
-  })) << report.notes.back();
+  film_by_a_phone(shoot, {{"fps", 30}});
+  EXPECT_THAT(shoot.import().notes,
+              Contains(AllOf(HasSubstr("observer.fps = 30 takes the place of the times in "),
+                             HasSubstr("take.mov, which are up to 0.0333 s away"))));
+}
+
+// Nothing but nought in one packet.
+Spoil blank(int lost) {
+  return [lost](AVPacket& packet, int number) {
+    if (number == lost) std::fill_n(packet.data, packet.size, std::uint8_t{0});
+    return true;
+  };
 }
 
 // The timecode of the file is that of its first frame, which was lost.
 TEST(ImportVideo, TheTimecodeIsThatOfTheFirstFrameThatCameIn) {
-  VideoForm form = small_form();
-  form.encoder = "mjpeg";
-  form.pixel_format = "yuvj420p";
-  form.metadata = {{"timecode", "10:59:59:24"}};
-  form.spoil = [](AVPacket& packet, int number) {
-    if (number == 0) std::fill_n(packet.data, packet.size, std::uint8_t{0});
-    return true;
-  };
+  const VideoForm form = {.pixel_format = "yuvj420p",
+                          .width = 48,
+                          .encoder = "mjpeg",
+                          .metadata = {{"timecode", "10:59:59:24"}},
+                          .spoil = blank(0)};
   Shoot shoot;
-  write_video(shoot.folder() / "take.mov", form,
-              std::vector<Bytes>(10, Bytes(48 * 16 * 3 / 2, 90)));
-  shoot.json["observer"] = {{"video", "take.mov"}, {"exposure", 1}};
+  shoot.film("take.mov", form, std::vector<Bytes>(10, Bytes(48 * 16 * 3 / 2, 90)), its_own_times);
   ASSERT_EQ(shoot.error(), "");
   const session::Session opened = session::open_session(shoot.session());
   EXPECT_EQ(opened.info.timecode, (session::Timecode{"11:00:00:00", 25}));
@@ -289,10 +266,7 @@ TEST(ImportVideo, TheTimecodeIsThatOfTheFirstFrameThatCameIn) {
 // A pose belongs to its frame, not to the one that takes its place.
 TEST(ImportVideo, PosesOfLostFramesAreLeftOut) {
   Shoot shoot;
-  film(shoot, mjpeg, [](AVPacket& packet, int number) {
-    if (number == 1) std::fill_n(packet.data, packet.size, std::uint8_t{0});
-    return true;
-  });
+  film(shoot, mjpeg, blank(1));
   for (const int frame : {0, 1, 2})
     shoot.json["track"].push_back(
         {{"frame", frame},
@@ -301,7 +275,7 @@ TEST(ImportVideo, PosesOfLostFramesAreLeftOut) {
   EXPECT_EQ(report.observer_frames, std::uint64_t{texture_frames - 1});
   EXPECT_EQ(report.poses, 2u);
   EXPECT_THAT(report.notes.back(), HasSubstr("1 pose belongs to a lost frame"));
-  const auto stream = shoot.open_observer();
+  const auto stream = shoot.open();
   EXPECT_EQ(stream->read(1)->sequence, 2u);
   EXPECT_EQ(stream->read(1)->timestamp_ns, 80'000'000);
 }

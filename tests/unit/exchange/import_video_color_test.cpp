@@ -1,17 +1,10 @@
 // Videos of others: what their tags say of colour.
-#include <opencv2/imgproc.hpp>
-
-#include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::exchange::import_video_color_test {
 
 using Rgb = std::array<double, 3>;
 using Matrix = std::array<Rgb, 3>;
-using Bytes = std::vector<std::uint8_t>;
 
 Rgb operator*(const Matrix& m, const Rgb& v) {
   Rgb product{};
@@ -222,32 +215,32 @@ Rgb pixel(const Frame& frame, int x, int y) {
   }
 }
 
-// Within 2 of 255: a code of 8 bits, limited, is 255/219 of ours wide, of which half is lost, and a
-// half of its chroma's up to 1.8556 times as much; what is decoded with other curves has 10 bits.
-TEST_P(ImportVideoColors, ComeInAsTheTagsSay) {
-  const ColorForm& form = GetParam();
-  VideoForm video;
-  video.encoder = form.encoder;
-  video.pixel_format = form.pixel_format;
-  video.width = video.height = side;
+VideoForm video_of(const ColorForm& form) {
+  VideoForm video = {
+      .pixel_format = form.pixel_format, .width = side, .height = side, .encoder = form.encoder};
   if (video.encoder == "libx264") video.options = {{"qp", "0"}};
   if (video.encoder == "libx265")
     video.options = {{"x265-params", "lossless=1:log-level=none:pools=none:bframes=0"}};
-  if (video.encoder == "mjpeg") video.options = {{"qmin", "1"}, {"qmax", "1"}};
   if (form.tagged) {
     video.range = form.full ? AVCOL_RANGE_JPEG : AVCOL_RANGE_MPEG;
     video.matrix = form.matrix;
     video.transfer = form.transfer;
     video.primaries = form.primaries;
   }
+  return video;
+}
+
+// Within 2 of 255: a code of 8 bits, limited, is 255/219 of ours wide, of which half is lost, and a
+// half of its chroma's up to 1.8556 times as much; what is decoded with other curves has 10 bits.
+TEST_P(ImportVideoColors, ComeInAsTheTagsSay) {
+  const ColorForm& form = GetParam();
   Shoot shoot;
-  const std::string file = video.encoder == "libx265" ? "take.mp4" : "take.mkv";
-  write_video(shoot.folder() / file, video, {frame_of(form)});
-  shoot.json["observer"] = {{"video", file}, {"fps", 25}, {"exposure", 1}};
+  const bool is_hevc = form.encoder == std::string("libx265");
+  shoot.film(is_hevc ? "take.mp4" : "take.mkv", video_of(form), {frame_of(form)});
   const ImportReport report = shoot.import();
   EXPECT_EQ(report.notes.at(0).find("(assumed)") == std::string::npos, form.tagged)
       << report.notes.at(0);
-  const FramePtr frame = shoot.open_observer()->read(0);
+  const FramePtr frame = shoot.open()->read(0);
   for (std::size_t i = 0; i < 4; ++i) {
     const Rgb is = pixel(*frame, i % 2 ? 48 : 16, i / 2 ? 48 : 16);
     const Rgb signal = signals_of(form)[i];
@@ -271,64 +264,54 @@ constexpr auto no_trc = AVCOL_TRC_UNSPECIFIED, trc709 = AVCOL_TRC_BT709,
 constexpr auto no_pri = AVCOL_PRI_UNSPECIFIED, pri709 = AVCOL_PRI_BT709, pri2020 = AVCOL_PRI_BT2020,
                p3 = AVCOL_PRI_SMPTE432, pri525 = AVCOL_PRI_SMPTE170M, pri625 = AVCOL_PRI_BT470BG;
 
-INSTANTIATE_TEST_SUITE_P(
-    Forms, ImportVideoColors,
-    testing::Values(
-        ColorForm{"untagged", "ffv1", "yuv420p", 8, false, bt601, no_trc, no_pri, false},
-        ColorForm{"bt601", "ffv1", "yuv420p", 8, false, bt601, trc601, pri709},
-        ColorForm{"bt601_full", "ffv1", "yuv420p", 8, true, bt601, trc601, pri709},
-        ColorForm{"bt709", "ffv1", "yuv420p", 8, false, bt709, trc709, pri709},
-        ColorForm{"bt709_full", "ffv1", "yuv420p", 8, true, bt709, trc709, pri709},
-        ColorForm{"bt709_422", "ffv1", "yuv422p", 8, false, bt709, trc709, pri709, true, 2, 1},
-        ColorForm{"bt709_422_full", "ffv1", "yuv422p", 8, true, bt709, trc709, pri709, true, 2, 1},
-        ColorForm{"bt709_444_12", "ffv1", "yuv444p12le", 12, false, bt709, trc709, pri709, true, 1,
-                  1},
-        ColorForm{"bt709_10", "ffv1", "yuv420p10le", 10, false, bt709, trc709, pri709},
-        ColorForm{"bt709_10_full", "ffv1", "yuv420p10le", 10, true, bt709, trc709, pri709},
-        ColorForm{"srgb", "ffv1", "yuv444p", 8, true, bt601, trc_srgb, pri709, true, 1, 1},
-        ColorForm{"smpte240m", "ffv1", "yuv420p", 8, false, bt240, trc709, pri709},
-        ColorForm{"bt2020", "ffv1", "yuv420p10le", 10, false, bt2020, trc2020, pri2020},
-        ColorForm{"pq_2020", "ffv1", "yuv420p10le", 10, false, bt2020, pq, pri2020},
-        ColorForm{"pq_2020_full", "ffv1", "yuv444p12le", 12, true, bt2020, pq, pri2020, true, 1, 1},
-        ColorForm{"hlg_2020", "ffv1", "yuv420p10le", 10, false, bt2020, hlg, pri2020},
-        ColorForm{"hlg_709_422", "ffv1", "yuv422p10le", 10, false, bt709, hlg, pri709, true, 2, 1},
-        ColorForm{"hlg_p3_full", "ffv1", "yuv420p10le", 10, true, bt709, hlg, p3},
-        ColorForm{"linear_16", "ffv1", "gbrp16le", 16, true, no_matrix, linear, pri709, true, 1, 1},
-        ColorForm{"linear_p3", "ffv1", "gbrp16le", 16, true, no_matrix, linear, p3, true, 1, 1},
-        ColorForm{"gamma22", "ffv1", "yuv420p10le", 10, false, bt709, g22, pri709},
-        ColorForm{"gamma28", "ffv1", "yuv420p10le", 10, false, bt709, g28, pri709},
-        ColorForm{"log100", "ffv1", "yuv444p12le", 12, false, bt709, log100, pri709, true, 1, 1},
-        ColorForm{"log316", "ffv1", "yuv444p12le", 12, false, bt709, log316, pri709, true, 1, 1},
-        ColorForm{"gray_limited", "ffv1", "gray", 8, false, bt709, trc709, pri709},
-        ColorForm{"gray_full", "ffv1", "gray", 8, true, bt709, trc709, pri709},
-        ColorForm{"gray_10_limited", "ffv1", "gray10le", 10, false, bt709, trc709, pri709},
-        ColorForm{"gray_pq", "ffv1", "gray10le", 10, false, bt709, pq, pri709},
-        ColorForm{"rgb_limited", "ffv1", "gbrp10le", 10, false, no_matrix, trc_srgb, pri709, true,
-                  1, 1},
-        ColorForm{"h264", "libx264", "yuv420p", 8, false, bt709, trc709, pri709},
-        ColorForm{"h264_full", "libx264", "yuvj420p", 8, true, bt709, trc709, pri709},
-        ColorForm{"h264_10_hlg", "libx264", "yuv420p10le", 10, false, bt2020, hlg, pri2020},
-        ColorForm{"hevc_10_pq", "libx265", "yuv420p10le", 10, false, bt2020, pq, pri2020},
-        ColorForm{"hevc_10_hlg", "libx265", "yuv420p10le", 10, false, bt2020, hlg, pri2020}),
-    [](const auto& form) { return std::string(form.param.name); });
+const ColorForm color_forms[] = {
+    {"untagged", "ffv1", "yuv420p", 8, false, bt601, no_trc, no_pri, false},
+    {"bt601", "ffv1", "yuv420p", 8, false, bt601, trc601, pri709},
+    {"bt601_full", "ffv1", "yuv420p", 8, true, bt601, trc601, pri709},
+    {"bt709", "ffv1", "yuv420p", 8, false, bt709, trc709, pri709},
+    {"bt709_full", "ffv1", "yuv420p", 8, true, bt709, trc709, pri709},
+    {"bt709_422", "ffv1", "yuv422p", 8, false, bt709, trc709, pri709, true, 2, 1},
+    {"bt709_422_full", "ffv1", "yuv422p", 8, true, bt709, trc709, pri709, true, 2, 1},
+    {"bt709_444_12", "ffv1", "yuv444p12le", 12, false, bt709, trc709, pri709, true, 1, 1},
+    {"bt709_10", "ffv1", "yuv420p10le", 10, false, bt709, trc709, pri709},
+    {"bt709_10_full", "ffv1", "yuv420p10le", 10, true, bt709, trc709, pri709},
+    {"srgb", "ffv1", "yuv444p", 8, true, bt601, trc_srgb, pri709, true, 1, 1},
+    {"smpte240m", "ffv1", "yuv420p", 8, false, bt240, trc709, pri709},
+    {"bt2020", "ffv1", "yuv420p10le", 10, false, bt2020, trc2020, pri2020},
+    {"pq_2020", "ffv1", "yuv420p10le", 10, false, bt2020, pq, pri2020},
+    {"pq_2020_full", "ffv1", "yuv444p12le", 12, true, bt2020, pq, pri2020, true, 1, 1},
+    {"hlg_2020", "ffv1", "yuv420p10le", 10, false, bt2020, hlg, pri2020},
+    {"hlg_709_422", "ffv1", "yuv422p10le", 10, false, bt709, hlg, pri709, true, 2, 1},
+    {"hlg_p3_full", "ffv1", "yuv420p10le", 10, true, bt709, hlg, p3},
+    {"linear_16", "ffv1", "gbrp16le", 16, true, no_matrix, linear, pri709, true, 1, 1},
+    {"linear_p3", "ffv1", "gbrp16le", 16, true, no_matrix, linear, p3, true, 1, 1},
+    {"gamma22", "ffv1", "yuv420p10le", 10, false, bt709, g22, pri709},
+    {"gamma28", "ffv1", "yuv420p10le", 10, false, bt709, g28, pri709},
+    {"log100", "ffv1", "yuv444p12le", 12, false, bt709, log100, pri709, true, 1, 1},
+    {"log316", "ffv1", "yuv444p12le", 12, false, bt709, log316, pri709, true, 1, 1},
+    {"gray_limited", "ffv1", "gray", 8, false, bt709, trc709, pri709},
+    {"gray_full", "ffv1", "gray", 8, true, bt709, trc709, pri709},
+    {"gray_10_limited", "ffv1", "gray10le", 10, false, bt709, trc709, pri709},
+    {"gray_pq", "ffv1", "gray10le", 10, false, bt709, pq, pri709},
+    {"rgb_limited", "ffv1", "gbrp10le", 10, false, no_matrix, trc_srgb, pri709, true, 1, 1},
+    {"h264", "libx264", "yuv420p", 8, false, bt709, trc709, pri709},
+    {"h264_full", "libx264", "yuvj420p", 8, true, bt709, trc709, pri709},
+    {"h264_10_hlg", "libx264", "yuv420p10le", 10, false, bt2020, hlg, pri2020},
+    {"hevc_10_pq", "libx265", "yuv420p10le", 10, false, bt2020, pq, pri2020},
+    {"hevc_10_hlg", "libx265", "yuv420p10le", 10, false, bt2020, hlg, pri2020},
+};
+INSTANTIATE_TEST_SUITE_P(Forms, ImportVideoColors, testing::ValuesIn(color_forms),
+                         [](const auto& form) { return std::string(form.param.name); });
 
 // Rec. 601's and P3's primaries with a signal of 709: light is taken by sRGB's curve, which the
 // response curve of the set then has.
 TEST(ImportVideo, PrimariesOfSmallDifferenceAreConvertedToo) {
   for (const AVColorPrimaries primaries : {pri525, pri625, p3}) {
-    ColorForm form{"", "ffv1", "gbrp16le", 16, true, no_matrix, trc_srgb, primaries, true, 1, 1};
-    VideoForm video;
-    video.pixel_format = form.pixel_format;
-    video.width = video.height = side;
-    video.matrix = no_matrix;
-    video.range = AVCOL_RANGE_JPEG;
-    video.transfer = trc_srgb;
-    video.primaries = primaries;
+    const ColorForm form{"",       "ffv1",    "gbrp16le", 16, true, no_matrix,
+                         trc_srgb, primaries, true,       1,  1};
     Shoot shoot;
-    write_video(shoot.folder() / "take.mkv", video, {frame_of(form)});
-    shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
-    ASSERT_EQ(shoot.error(), "");
-    const FramePtr frame = shoot.open_observer()->read(0);
+    shoot.film("take.mkv", video_of(form), {frame_of(form)});
+    const FramePtr frame = shoot.first_frame();
     for (std::size_t i = 0; i < 4; ++i)
       for (std::size_t c = 0; c < 3; ++c)
         // The published matrices have four digits.

@@ -1,15 +1,9 @@
 // Videos and photographs of others: which side is up, the shape of a pixel, and what is refused.
 #include <opencv2/imgproc.hpp>
 
-#include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/import_fixture.hpp"
-#include "tests/support/test.hpp"
 
 namespace previz::exchange::import_video_test {
-
-using Bytes = std::vector<std::uint8_t>;
 
 // Its quadrants are red, green, blue and white.
 Bytes marked_picture(int width, int height) {
@@ -31,12 +25,7 @@ int quadrant_at(const Frame& frame, int x, int y) {
   return rgb[0] > 100 ? (rgb[1] > 100 ? 3 : 0) : rgb[1] > 100 ? 1 : 2;
 }
 
-VideoForm marked_form() {
-  VideoForm form;
-  form.encoder = "png";
-  form.width = 48;
-  return form;
-}
+const VideoForm marked_form = {.width = 48, .encoder = "png"};
 
 // All eight, by the definition in libavutil/display.h: a point (p, q) of the stored picture is
 // shown at (a p + c q, b p + d q), up to a shift; the rows of the matrix begin with (a, b) and (c,
@@ -46,16 +35,15 @@ TEST(ImportVideo, IsTurnedAsItIsToBeShown) {
        {std::array{1, 0, 0, 1}, std::array{-1, 0, 0, -1}, std::array{0, 1, -1, 0},
         std::array{0, -1, 1, 0}, std::array{-1, 0, 0, 1}, std::array{1, 0, 0, -1},
         std::array{0, 1, 1, 0}, std::array{0, -1, -1, 0}}) {
-    VideoForm form = marked_form();
+    VideoForm form = marked_form;
     const int one = 1 << 16;
     form.display_matrix = {a * one, b * one, 0, c * one, d * one, 0, 0, 0, 1 << 30};
     Shoot shoot;
-    write_video(shoot.folder() / "take.mov", form, {marked_picture(48, 16)});
-    shoot.json["observer"] = {{"video", "take.mov"}, {"fps", 25}, {"exposure", 1}};
+    shoot.film("take.mov", form, {marked_picture(48, 16)});
     const ImportReport report = shoot.import();
     const bool upright = a == 1 && d == 1;
     EXPECT_EQ(report.notes.size(), upright ? 1u : 2u);
-    const FramePtr frame = shoot.open_observer()->read(0);
+    const FramePtr frame = shoot.open()->read(0);
     ASSERT_EQ(frame->width, a == 0 ? 16 : 48);
     ASSERT_EQ(frame->height, a == 0 ? 48 : 16);
     for (int stored = 0; stored < 4; ++stored) {
@@ -69,18 +57,16 @@ TEST(ImportVideo, IsTurnedAsItIsToBeShown) {
 }
 
 TEST(ImportVideo, AnAngleThatIsNoQuarterTurnIsRefused) {
-  VideoForm form = marked_form();
+  VideoForm form = marked_form;
   form.display_matrix = {46341, 46341, 0, -46341, 46341, 0, 0, 0, 1 << 30};
   Shoot shoot;
-  write_video(shoot.folder() / "take.mov", form, {marked_picture(48, 16)});
-  shoot.json["observer"] = {{"video", "take.mov"}, {"fps", 25}, {"exposure", 1}};
+  shoot.film("take.mov", form, {marked_picture(48, 16)});
   EXPECT_THAT(shoot.error(), HasSubstr("\"rotation_deg\": 0"));
-  shoot.json["observer"]["read_as"] = {{"rotation_deg", 0}};
   shoot.json["observer"]["read_as"] = {{"rotation_deg", 45}};
   EXPECT_THAT(shoot.error(), HasSubstr("must be 0, 90, 180 or 270"));
   shoot.json["observer"]["read_as"] = {{"rotation_deg", 0}};
   EXPECT_EQ(shoot.error(), "");
-  EXPECT_EQ(shoot.open_observer()->read(0)->width, 48);
+  EXPECT_EQ(shoot.open()->read(0)->width, 48);
 }
 
 TEST(ImportVideo, PixelsBecomeSquare) {
@@ -90,13 +76,11 @@ TEST(ImportVideo, PixelsBecomeSquare) {
   };
   for (const Case& shape : {Case{{1, 1}, 48, 16}, Case{{2, 1}, 96, 16}, Case{{4, 3}, 64, 16},
                             Case{{1, 2}, 48, 32}, Case{{0, 1}, 48, 16}}) {
-    VideoForm form = marked_form();
+    VideoForm form = marked_form;
     form.pixel_aspect = shape.aspect;
     Shoot shoot;
-    write_video(shoot.folder() / "take.mov", form, {marked_picture(48, 16)});
-    shoot.json["observer"] = {{"video", "take.mov"}, {"fps", 25}, {"exposure", 1}};
-    ASSERT_EQ(shoot.error(), "");
-    const FramePtr frame = shoot.open_observer()->read(0);
+    shoot.film("take.mov", form, {marked_picture(48, 16)});
+    const FramePtr frame = shoot.first_frame();
     ASSERT_EQ(frame->width, shape.width);
     ASSERT_EQ(frame->height, shape.height);
     for (int i = 0; i < 4; ++i)
@@ -128,18 +112,16 @@ TEST(ImportPictures, AreTurnedAsEXIFSays) {
     cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
     const std::filesystem::path file = shoot.folder() / "photo.jpg";
     write_picture(file, bgr);
-    std::ifstream in(file, std::ios::binary);
-    std::string bytes(std::istreambuf_iterator<char>(in), {});
+    std::string bytes = session::content_of(file);
     session::write_content(file, bytes.insert(2, exif_segment(orientation)));
     shoot.json["observer"] = {{"pictures", {"photo.jpg"}}, {"fps", 25}, {"exposure", 1}};
     const ImportReport report = shoot.import();
     EXPECT_EQ(report.notes.empty(), orientation == 1);
-    const FramePtr frame = shoot.open_observer()->read(0);
+    const FramePtr frame = shoot.open()->read(0);
     EXPECT_EQ(frame->width, orientation > 4 ? 32 : 64);
-    EXPECT_EQ(quadrant_at(*frame, 8, 8), top[static_cast<std::size_t>(orientation - 1)][0]);
-    EXPECT_EQ(quadrant_at(*frame, frame->width - 8, 8),
-              top[static_cast<std::size_t>(orientation - 1)][1])
-        << orientation;
+    const auto [left, right] = top[static_cast<std::size_t>(orientation - 1)];
+    EXPECT_EQ(quadrant_at(*frame, 8, 8), left) << orientation;
+    EXPECT_EQ(quadrant_at(*frame, frame->width - 8, 8), right) << orientation;
   }
 }
 
@@ -147,29 +129,18 @@ TEST(ImportPictures, AreTurnedAsEXIFSays) {
 
 TEST(ImportVideo, WhatIsNotConvertedIsRefusedWithARemedy) {
   struct Case {
-    std::function<void(VideoForm&)> set;
-    const char* named;
-    const char* remedy;
-    Json read_as;
+    AVColorSpace matrix;
+    const char *named, *read_as;
   };
-  for (const Case& unknown : {Case{[](VideoForm& f) { f.matrix = AVCOL_SPC_YCGCO; },
-                                   "matrix ycgco",
-                                   "zscale=matrix=709",
-                                   {{"matrix", "bt709"}}},
-                              Case{[](VideoForm& f) { f.matrix = AVCOL_SPC_BT2020_CL; },
-                                   "matrix bt2020c",
-                                   "zscale=matrix=709",
-                                   {{"matrix", "bt2020"}}}}) {
-    VideoForm form;
-    form.pixel_format = "yuv420p";
-    unknown.set(form);
+  for (const auto& [matrix, named, read_as] :
+       {Case{AVCOL_SPC_YCGCO, "matrix ycgco", "bt709"},
+        Case{AVCOL_SPC_BT2020_CL, "matrix bt2020c", "bt2020"}}) {
     Shoot shoot;
-    write_video(shoot.folder() / "take.mkv", form, {Bytes(32 * 16 * 3 / 2, 100)});
-    shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
-    EXPECT_THAT(shoot.error(), HasSubstr(unknown.named));
-    EXPECT_THAT(shoot.error(), HasSubstr(unknown.remedy));
-    EXPECT_THAT(shoot.error(), HasSubstr("read_as"));
-    shoot.json["observer"]["read_as"] = unknown.read_as;
+    shoot.film("take.mkv", {.pixel_format = "yuv420p", .matrix = matrix},
+               {Bytes(32 * 16 * 3 / 2, 100)});
+    EXPECT_THAT(shoot.error(),
+                AllOf(HasSubstr(named), HasSubstr("zscale=matrix=709"), HasSubstr("read_as")));
+    shoot.json["observer"]["read_as"] = {{"matrix", read_as}};
     EXPECT_EQ(shoot.error(), "");
   }
 }
@@ -181,46 +152,35 @@ Bytes noise() {
 
 // Cameras name their curves in words.
 TEST(ImportVideo, ACamerasLogarithmicCurveIsRefused) {
-  VideoForm form;
-  form.encoder = "png";
-  form.metadata = {{"GAMMA", "S-Log3"}};
+  VideoForm form = {.encoder = "png", .metadata = {{"GAMMA", "S-Log3"}}};
   Shoot shoot;
-  write_video(shoot.folder() / "take.mkv", form, {noise()});
-  shoot.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
+  shoot.film("take.mkv", form, {noise()});
   EXPECT_THAT(shoot.error(), HasSubstr("logarithmic curve: its GAMMA is \"S-Log3\""));
   shoot.json["observer"]["read_as"] = {{"transfer", "as recorded"}};
   const ImportReport report = shoot.import();
-  EXPECT_EQ(shoot.open_observer()->read(0)->bytes, noise());
+  EXPECT_EQ(shoot.open()->read(0)->bytes, noise());
   EXPECT_THAT(report.notes.at(0), HasSubstr("as recorded"));
 
   form.metadata = {{"comment", "graded from S-Log3"}};  // people's words
   Shoot commented;
-  write_video(commented.folder() / "take.mkv", form, {noise()});
-  commented.json["observer"] = {{"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}};
+  commented.film("take.mkv", form, {noise()});
   EXPECT_EQ(commented.error(), "");
 }
 
 TEST(ImportVideo, ReadAsIsCheckedMemberByMember) {
   Shoot shoot;
-  VideoForm form;
-  form.encoder = "png";
-  write_video(shoot.folder() / "take.mkv", form, {noise()});
   const auto error_of = [&](const Json& read_as) {
-    shoot.json["observer"] = {
-        {"video", "take.mkv"}, {"fps", 25}, {"exposure", 1}, {"read_as", read_as}};
+    shoot.film("take.mkv", {.encoder = "png"}, {noise()}, {{"fps", 25}, {"read_as", read_as}});
     return shoot.error();
   };
-  const auto has = [](const std::string& text, const char* part) {
-    return text.find(part) != std::string::npos;
-  };
-  EXPECT_PRED2(has, error_of({{"range", "tv"}}), "allowed: \"full\", \"limited\"");
-  EXPECT_PRED2(has, error_of({{"transfer", "slog3"}}), "\"as recorded\", \"srgb\"");
-  EXPECT_PRED2(has, error_of({{"pixel_aspect", {1, 0}}}), "pixel_aspect");
-  EXPECT_PRED2(has, error_of({{"pixel_aspect", {1}}}), "two numbers");
-  EXPECT_PRED2(has, error_of({{"gamma", 2.2}}), "gamma");
+  EXPECT_THAT(error_of({{"range", "tv"}}), HasSubstr("allowed: \"full\", \"limited\""));
+  EXPECT_THAT(error_of({{"transfer", "slog3"}}), HasSubstr("\"as recorded\", \"srgb\""));
+  EXPECT_THAT(error_of({{"pixel_aspect", {1, 0}}}), HasSubstr("pixel_aspect"));
+  EXPECT_THAT(error_of({{"pixel_aspect", {1}}}), HasSubstr("two numbers"));
+  EXPECT_THAT(error_of({{"gamma", 2.2}}), HasSubstr("gamma"));
   shoot.json["observer"] = {
       {"pictures", "observer/%04d.png"}, {"fps", 25}, {"exposure", 1}, {"read_as", Json::object()}};
-  EXPECT_PRED2(has, shoot.error(), "stands for the tags of a video");
+  EXPECT_THAT(shoot.error(), HasSubstr("stands for the tags of a video"));
   EXPECT_EQ(error_of({{"range", "full"}, {"primaries", "p3-d65"}, {"pixel_aspect", {1, 1}}}), "");
 }
 

@@ -9,7 +9,6 @@
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/load.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/gltf_writer.hpp"
@@ -81,6 +80,14 @@ class UntrackedTake : public testing::Test {
     writer.close();
   }
 
+  void take_tags_out() {
+    std::string toml = session::read_file(session_ / "session.toml");
+    const std::size_t tag = toml.find("[[tag]]");
+    ASSERT_NE(tag, std::string::npos);
+    toml.erase(tag, toml.find("[[object]]") - tag);
+    session::replace_file(session_ / "session.toml", toml);
+  }
+
   // World places of the object's corners as the renderer has them.
   static glm::dmat4 place_in(const fs::path& folder, const std::string& place) {
     std::ofstream(folder / "set.toml")
@@ -136,10 +143,7 @@ TEST_F(UntrackedTake, IsExportedWithItsCamera) {
   EXPECT_THAT(said_.str(), HasSubstr("finding the poses of 4 frames"));
   EXPECT_THAT(said_.str(), HasSubstr("3 poses of 4 frames"));
   EXPECT_THAT(said_.str(), HasSubstr("rotation order ZXY"));
-  std::istringstream chan(session::read_file(out_ / "camera.chan"));
-  int lines = 0;
-  for (std::string line; std::getline(chan, line);) ++lines;
-  EXPECT_EQ(lines, 3);
+  EXPECT_EQ(std::ranges::count(session::read_file(out_ / "camera.chan"), '\n'), 3);
 }
 
 // It lay at the origin.
@@ -153,12 +157,9 @@ TEST_F(UntrackedTake, IsExportedWithItsObjectsInTheirPlaces) {
 
 // The take was recorded before the tags were measured.
 TEST_F(UntrackedTake, IsExportedWithAnotherSetFile) {
-  std::string toml = session::read_file(session_ / "session.toml");
-  const std::string whole_set = session::open_session(session_).info.set_text;
-  const std::size_t tag = toml.find("[[tag]]");
-  toml.replace(tag, toml.find("[[object]]") - tag, "");
-  session::replace_file(session_ / "session.toml", toml);
-  session::replace_file(directory_ / "measured.toml", whole_set);
+  session::replace_file(directory_ / "measured.toml",
+                        session::open_session(session_).info.set_text);
+  take_tags_out();
   ExportOptions options{session_, out_};
   options.set_file = directory_ / "measured.toml";
   export_take(options, said_);
@@ -166,17 +167,11 @@ TEST_F(UntrackedTake, IsExportedWithAnotherSetFile) {
 }
 
 TEST_F(UntrackedTake, WithoutTagsSaysWhatToDo) {
-  std::string toml = session::read_file(session_ / "session.toml");
-  const std::size_t tag = toml.find("[[tag]]");
-  ASSERT_NE(tag, std::string::npos);
-  toml.replace(tag, toml.find("[[object]]") - tag, "");
-  session::replace_file(session_ / "session.toml", toml);
-  try {
-    export_take({session_, out_}, said_);
-    FAIL() << "a camera nobody knows was exported";
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("`previzd track` says why; the set file needs [[tag]]"));
-  }
+  take_tags_out();
+  EXPECT_THAT(test::error_of([&] {
+                export_take({session_, out_}, said_);
+              }),
+              HasSubstr("`previzd track` says why; the set file needs [[tag]]"));
 }
 
 TEST(PlacedModel, KeepsWhatItDoesNotKnow) {

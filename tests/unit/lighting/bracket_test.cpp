@@ -19,17 +19,14 @@ template <typename Scene>
 FramePtr noisy_frame(int i, double exposure, const Scene& scene, std::mt19937& random) {
   const SensorNoise noise;
   std::normal_distribution<double> normal;
-  std::vector<glm::dvec3> signals;
-  for (int p = 0; p < strip_width * strip_height; ++p) {
+  Frame frame = *test::make_frame(strip_width, strip_height, exposure, [&](int x, int) {
+    const double mean = exposure * scene(x);
     glm::dvec3 signal(0);
-    for (int c = 0; c < 3; ++c) {
-      const double mean = exposure * scene(p % strip_width);
+    for (int c = 0; c < 3; ++c)
       signal[c] = mean + normal(random) * std::sqrt(mean * noise.signal_per_electron +
                                                     noise.read_noise * noise.read_noise);
-    }
-    signals.push_back(signal);
-  }
-  Frame frame = *test::make_frame(strip_width, strip_height, exposure, signals);
+    return signal;
+  });
   frame.sequence = static_cast<std::uint64_t>(i);
   frame.timestamp_ns = i * 40'000'000;
   return std::make_shared<Frame>(std::move(frame));
@@ -72,13 +69,13 @@ TEST(MergeMoving, TheNewestLongExposureShowsTheWallWhereTheLampWas) {
   // The long exposure alone sees the wall well: 5 of its standard deviations.
   const double sigma =
       std::sqrt(wall_radiance * noise.signal_per_electron + noise.read_noise * noise.read_noise);
-  for (int row = 0; row < strip_height; ++row) {
+  for (int row = 0; row < strip_height; ++row)
     for (int column = 0; column < strip_width; ++column) {
-      const bool lit_now = moving_lamp(3, column) == lamp_radiance;
-      bool lit_before = false;
-      for (int i = 0; i < 3; ++i)
-        lit_before = lit_before || moving_lamp(i, column) == lamp_radiance;
-      if (lit_now) {
+      const auto is_lit = [column](int frame) {
+        return moving_lamp(frame, column) == lamp_radiance;
+      };
+      const bool lit_before = is_lit(0) || is_lit(1) || is_lit(2);
+      if (is_lit(3)) {
         // Clipped at 1 in the newest, and wall in the others, which the shortest, of a standard
         // deviation of 1.2, cannot tell from 1.
         EXPECT_TRUE(flags_at(picture, column, row) & moved) << column;
@@ -89,7 +86,6 @@ TEST(MergeMoving, TheNewestLongExposureShowsTheWallWhereTheLampWas) {
         EXPECT_EQ(flags_at(picture, column, row), lit_before ? moved : 0) << column;
       }
     }
-  }
 }
 
 TEST(MergeMoving, TheNewestShortExposureShowsTheLampWhereItIsNowAndNowhereElse) {
@@ -100,14 +96,13 @@ TEST(MergeMoving, TheNewestShortExposureShowsTheLampWhereItIsNowAndNowhereElse) 
   const double sigma =
       std::sqrt(signal * noise.signal_per_electron + noise.read_noise * noise.read_noise) /
       exposures.back();
-  for (int row = 0; row < strip_height; ++row) {
+  for (int row = 0; row < strip_height; ++row)
     for (int column = 0; column < strip_width; ++column) {
       if (moving_lamp(3, column) == lamp_radiance)
         EXPECT_NEAR(at(picture, column, row).r, lamp_radiance, 5 * sigma) << column;
       else  // at most the white of the long exposure, which no newer one can deny there
         EXPECT_LE(at(picture, column, row).r, 1.0f) << column;
     }
-  }
 }
 
 TEST(MergeMoving, ASwitchedOffLampIsGoneWithTheFirstExposureWithoutIt) {
@@ -139,9 +134,7 @@ TEST(MergeMoving, AStaticSceneLeavesNothingOut) {
         i++, exposure, [](int column) { return 1e-3 * std::pow(1.25, column); }, random));
   const HdrPicture picture = merge_exposures(frames, linear_curve);
   // 5 standard deviations: 6e-7 a comparison, of which there are 6144.
-  EXPECT_EQ(std::count_if(picture.flags.begin(), picture.flags.end(),
-                          [](std::uint8_t flag) { return flag & moved; }),
-            0);
+  EXPECT_TRUE(std::ranges::none_of(picture.flags, [](std::uint8_t flag) { return flag & moved; }));
 }
 
 // A curve that was fitted where the camera clips near half of white guesses what lies above, and
@@ -157,7 +150,7 @@ TEST(MergeMoving, ByACurveThatGuessesWhatIsClippedIsTheSameLight) {
   const HdrPicture picture = merge_exposures(frames, whole);
   const HdrPicture by_guess = merge_exposures(frames, guessed);
   EXPECT_EQ(by_guess.flags, picture.flags);
-  EXPECT_TRUE(std::ranges::find(picture.flags, moved) != picture.flags.end());
+  EXPECT_THAT(picture.flags, Contains(moved));
   for (std::size_t p = 0; p < picture.radiance.size(); ++p)
     EXPECT_NEAR(by_guess.radiance[p].g / units, picture.radiance[p].g,
                 1e-6 * picture.radiance[p].g);
@@ -166,23 +159,21 @@ TEST(MergeMoving, ByACurveThatGuessesWhatIsClippedIsTheSameLight) {
 TEST(MergeExposures, AMissingExposureIsBridgedOrFlagged) {
   const std::vector<double> all{1.0 / 4096, 1.0 / 256, 1.0 / 16, 1.0, 16.0};
   for (std::size_t missing = 0; missing < all.size(); ++missing) {
+    const auto radiance = [](std::size_t k) { return 1e-3 * std::pow(1.45, k); };  // to 1400
     std::vector<FramePtr> frames;
-    std::vector<glm::dvec3> radiances;
-    for (int k = 0; k < 40; ++k) radiances.emplace_back(1e-3 * std::pow(1.45, k));  // to 1400
-    for (std::size_t e = 0; e < all.size(); ++e) {
-      if (e == missing) continue;
-      std::vector<glm::dvec3> signals;
-      for (const glm::dvec3& radiance : radiances) signals.push_back(all[e] * radiance);
-      frames.push_back(test::make_frame(40, 1, all[e], signals));
-    }
+    for (std::size_t e = 0; e < all.size(); ++e)
+      if (e != missing)
+        frames.push_back(test::make_frame(40, 1, all[e], [&](int x, int) {
+          return glm::dvec3(all[e] * radiance(std::size_t(x)));
+        }));
     const HdrPicture picture = merge_exposures(frames, linear_curve);
-    for (std::size_t k = 0; k < radiances.size(); ++k) {
+    for (std::size_t k = 0; k < 40; ++k) {
       if (picture.flags[k] & overexposed) {
-        EXPECT_LT(picture.radiance[k].r, radiances[k].r);
+        EXPECT_LT(picture.radiance[k].r, radiance(k));
       } else {
         // Steps of 256 between exposures: the worst signal that is left is 1/256, 256 codes of 16
         // bits, half of one is 0.2 %; where the longest is missing, 1e-3, 65 codes, 0.8 %.
-        EXPECT_NEAR(picture.radiance[k].r / radiances[k].r, 1, 0.008) << missing << " " << k;
+        EXPECT_NEAR(picture.radiance[k].r / radiance(k), 1, 0.008) << missing << " " << k;
       }
     }
   }
@@ -192,11 +183,9 @@ TEST(MergeExposures, TheDarkLevelIsTakenOff) {
   const glm::dvec3 dark(0.02, 0.01, 0.03);
   const std::vector<glm::dvec3> radiances{glm::dvec3(0), {0.5, 2, 8}, glm::dvec3(100)};
   std::vector<FramePtr> frames;
-  for (const double exposure : {0.1, 1.0}) {
-    std::vector<glm::dvec3> signals;
-    for (const glm::dvec3& radiance : radiances) signals.push_back(exposure * radiance + dark);
-    frames.push_back(test::make_frame(3, 1, exposure, signals));
-  }
+  for (const double exposure : {0.1, 1.0})
+    frames.push_back(test::make_frame(
+        3, 1, exposure, [&](int x, int) { return exposure * radiances[std::size_t(x)] + dark; }));
   const HdrPicture picture = merge_exposures(frames, linear_curve, dark);
   EXPECT_EQ(picture.flags, (std::vector<std::uint8_t>{underexposed, 0, overexposed}));
   EXPECT_EQ(picture.radiance[0], glm::vec3(0));
@@ -224,7 +213,7 @@ std::vector<FramePtr> static_bracket(const std::vector<double>& true_exposures,
 TEST(Disagreements, AnExposureThatIsTwoStopsWrongIsNamed) {
   const std::vector<double> right{1.0 / 64, 1.0 / 8, 1};
   EXPECT_TRUE(disagreements(Bracket(static_bracket(right, right), linear_curve, {})).empty());
-  for (std::size_t wrong = 0; wrong < right.size(); ++wrong) {
+  for (std::size_t wrong = 0; wrong < right.size(); ++wrong)
     for (const double stops : {2.0, -2.0}) {
       std::vector<double> stated = right;
       stated[wrong] *= std::exp2(stops);
@@ -236,7 +225,6 @@ TEST(Disagreements, AnExposureThatIsTwoStopsWrongIsNamed) {
         EXPECT_NEAR(d.stops, d.shorter == wrong ? -stops : stops, 0.1);
       }
     }
-  }
 }
 
 TEST(Disagreements, AMovingLampIsNone) {

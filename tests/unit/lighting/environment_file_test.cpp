@@ -1,12 +1,9 @@
 #include <ImfChannelList.h>
-#include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
-#include <half.h>
 
 #include "daemon/lighting/exr_picture.hpp"
 #include "daemon/lighting/lighting.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -17,11 +14,18 @@ namespace previz::lighting::environment_file_test {
 using std::numbers::pi;
 using test::towards;
 
-set::Lighting settings_for(const std::filesystem::path& file) {
+class LoadEnvironment : public testing::Test {
+ protected:
+  LoadEnvironment() { settings.environment = file; }
+
+  std::string refusal() {
+    return test::error_of([&] { load_environment(settings); });
+  }
+
+  test::TemporaryDirectory directory;
+  const std::filesystem::path file = directory / "sky.exr";
   set::Lighting settings;
-  settings.environment = file;
-  return settings;
-}
+};
 
 // Rough texture in every pixel and a few pixels a hundred thousand times as bright.
 LinearPicture rough_sky(int width) {
@@ -47,7 +51,7 @@ void integrate(const LinearPicture& picture, const Body& body) {
     x = (x + picture.width) % picture.width;
     return glm::dvec3(picture.radiance[static_cast<std::size_t>(y * picture.width + x)]);
   };
-  for (int r = 0; r < 4 * picture.height; ++r) {
+  for (int r = 0; r < 4 * picture.height; ++r)
     for (int c = 0; c < 4 * picture.width; ++c) {
       const double x = (c + 0.5) / 4, y = (r + 0.5) / 4;
       const double azimuth = 2 * pi * (0.5 - x / picture.width);
@@ -62,7 +66,6 @@ void integrate(const LinearPicture& picture, const Body& body) {
                       std::cos(elevation) * std::sin(azimuth), std::sin(elevation)),
            radiance, std::cos(elevation) * pi * pi / 8 / picture.height / picture.width);
     }
-  }
 }
 
 double largest_relative_error(const glm::dvec3& value, const glm::dvec3& expected) {
@@ -70,10 +73,9 @@ double largest_relative_error(const glm::dvec3& value, const glm::dvec3& expecte
   return std::max({error.x, error.y, error.z});
 }
 
-TEST(LoadEnvironment, KeepsFluxAndIrradiance) {
-  const previz::test::TemporaryDirectory directory;
+TEST_F(LoadEnvironment, KeepsFluxAndIrradiance) {
   const LinearPicture sky = rough_sky(256);
-  write_exr_picture(directory / "sky.exr", sky);
+  write_exr_picture(file, sky);
   const std::vector<glm::dvec3> normals = test::upper_normals();
   glm::dvec3 flux(0);
   std::vector<glm::dvec3> expected(normals.size(), glm::dvec3(0));
@@ -84,7 +86,6 @@ TEST(LoadEnvironment, KeepsFluxAndIrradiance) {
         expected[n] += radiance * (sr * cosine);
   });
   for (int resolution : {0, 64, 1024}) {
-    set::Lighting settings = settings_for(directory / "sky.exr");
     settings.resolution = resolution;
     const EnvironmentMap map = load_environment(settings).environment;
     EXPECT_EQ(map.size, resolution == 0 ? 256 : resolution);
@@ -103,10 +104,8 @@ TEST(LoadEnvironment, KeepsFluxAndIrradiance) {
 }
 
 // What `previzd calibrate balance` prints makes up for an environment that does not fit the camera.
-TEST(LoadEnvironment, IsMultipliedByTheBalanceAndTheGain) {
-  const previz::test::TemporaryDirectory directory;
-  write_exr_picture(directory / "sky.exr", rough_sky(64));
-  set::Lighting settings = settings_for(directory / "sky.exr");
+TEST_F(LoadEnvironment, IsMultipliedByTheBalanceAndTheGain) {
+  write_exr_picture(file, rough_sky(64));
   const EnvironmentMap plain = load_environment(settings).environment;
   settings.environment_gain = 2;
   settings.balance = {0.5, 0.25, 4};
@@ -115,34 +114,27 @@ TEST(LoadEnvironment, IsMultipliedByTheBalanceAndTheGain) {
     ASSERT_EQ(balanced.radiance[i], plain.radiance[i] * glm::vec3(1, 0.5f, 8));
 }
 
-TEST(LoadEnvironment, SeesTheLayoutFromInside) {
-  const previz::test::TemporaryDirectory directory;
+TEST_F(LoadEnvironment, SeesTheLayoutFromInside) {
   // Red grows with x, green with y, blue with z.
   LinearPicture sky{256, 128, {}};
   for (int r = 0; r < 128; ++r)
     for (int c = 0; c < 256; ++c)
       sky.radiance.emplace_back(
           0.5 * towards(360 * (0.5 - (c + 0.5) / 256), 180 * (0.5 - (r + 0.5) / 128)) + 0.5);
-  write_exr_picture(directory / "sky.exr", sky);
+  write_exr_picture(file, sky);
   for (double turn_deg : {0.0, 90.0, -133.0, 725.0}) {
-    set::Lighting settings = settings_for(directory / "sky.exr");
     settings.environment_rotation_rad = turn_deg * pi / 180;
     settings.environment_gain = 2;
     const EnvironmentMap map = load_environment(settings).environment;
-    for (int j = 0; j < map.size; ++j) {
-      for (int i = 0; i < map.size; ++i) {
-        const glm::dvec3 d(texel_direction(map.size, i, j));
-        const double c = std::cos(-turn_deg * pi / 180), s = std::sin(-turn_deg * pi / 180);
-        const glm::dvec3 unturned(c * d.x - s * d.y, s * d.x + c * d.y, d.z);
-        // Slopes are 1/2: a texel's mean and a pixel's chord are off by their squared size, next to
-        // a pole by a pixel, where azimuth is lost.
-        const double limit = std::abs(d.z) > 0.999 ? 0.03 : 0.002;
-        ASSERT_LT(glm::length(glm::dvec3(map.radiance[static_cast<std::size_t>(j * map.size + i)]) -
-                              2.0 * (0.5 * unturned + 0.5)),
-                  limit)
-            << i << " " << j;
-      }
-    }
+    const double c = std::cos(-turn_deg * pi / 180), s = std::sin(-turn_deg * pi / 180);
+    for_each_texel(map, [&](const glm::dvec3& d, const glm::dvec3& radiance) {
+      const glm::dvec3 unturned(c * d.x - s * d.y, s * d.x + c * d.y, d.z);
+      // Slopes are 1/2: a texel's mean and a pixel's chord are off by their squared size, next to
+      // a pole by a pixel, where azimuth is lost.
+      const double limit = std::abs(d.z) > 0.999 ? 0.03 : 0.002;
+      ASSERT_LT(glm::length(radiance - 2.0 * (0.5 * unturned + 0.5)), limit)
+          << d.x << " " << d.y << " " << d.z;
+    });
     // The picture for people is the same way around.
     if (turn_deg == 0) {
       const LinearPicture shown = to_latitude_longitude(map, 256);
@@ -152,48 +144,27 @@ TEST(LoadEnvironment, SeesTheLayoutFromInside) {
   }
 }
 
-struct NamedChannel {
-  const char* name;
-  float value;
-  Imf::PixelType type = Imf::HALF;
-};
-
-void write_channels(const std::filesystem::path& file, const std::vector<NamedChannel>& channels) {
-  constexpr int width = 64, height = 32;
-  Imf::Header header(width, height);
-  Imf::FrameBuffer buffer;
-  std::vector<std::vector<float>> floats(channels.size());
-  std::vector<std::vector<half>> halves(channels.size());
-  for (std::size_t c = 0; c < channels.size(); ++c) {
-    header.channels().insert(channels[c].name, Imf::Channel(channels[c].type));
-    if (channels[c].type == Imf::HALF) {
-      halves[c].assign(width * height, half(channels[c].value));
-      buffer.insert(channels[c].name,
-                    Imf::Slice(Imf::HALF, reinterpret_cast<char*>(halves[c].data()), sizeof(half),
-                               sizeof(half) * width));
-    } else {
-      floats[c].assign(width * height, channels[c].value);
-      buffer.insert(channels[c].name,
-                    Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(floats[c].data()), sizeof(float),
-                               sizeof(float) * width));
-    }
-  }
-  Imf::OutputFile output(file.c_str(), header);
-  output.setFrameBuffer(buffer);
-  output.writePixels(height);
+// A channel of one value.
+ExrChannel channel(const char* name, float value, bool is_half = true) {
+  return {name, std::vector<float>(64 * 32, value), is_half};
 }
 
-TEST(LoadEnvironment, ReadsTheUsualChannels) {
-  const previz::test::TemporaryDirectory directory;
-  const std::vector<std::pair<std::vector<NamedChannel>, glm::vec3>> files{
-      {{{"R", 1}, {"G", 2}, {"B", 4}}, {1, 2, 4}},
-      {{{"A", 1}, {"B", 4}, {"G", 2}, {"R", 1}}, {1, 2, 4}},
-      {{{"Z", 9, Imf::FLOAT}, {"R", 1, Imf::FLOAT}, {"G", 2}, {"B", 4, Imf::FLOAT}}, {1, 2, 4}},
-      {{{"Y", 3}}, {3, 3, 3}},
-      {{{"Y", 3}, {"A", 1}}, {3, 3, 3}}};
+void write_channels(const std::filesystem::path& file, const std::vector<ExrChannel>& channels) {
+  write_exr_channels(file, 64, 32, channels);
+}
+
+TEST_F(LoadEnvironment, ReadsTheUsualChannels) {
+  const ExrChannel r = channel("R", 1), g = channel("G", 2), b = channel("B", 4),
+                   y = channel("Y", 3), a = channel("A", 1);
+  const std::vector<std::pair<std::vector<ExrChannel>, glm::vec3>> files{
+      {{r, g, b}, {1, 2, 4}},
+      {{a, b, g, r}, {1, 2, 4}},
+      {{channel("Z", 9, false), channel("R", 1, false), g, channel("B", 4, false)}, {1, 2, 4}},
+      {{y}, {3, 3, 3}},
+      {{y, a}, {3, 3, 3}}};
   for (const auto& [channels, expected] : files) {
-    write_channels(directory / "sky.exr", channels);
-    const Lighting lighting = load_environment(settings_for(directory / "sky.exr"));
+    write_channels(file, channels);
+    const Lighting lighting = load_environment(settings);
     for (const glm::vec3& radiance : lighting.environment.radiance)
       ASSERT_LT(glm::length(radiance - expected), 1e-5f);
     EXPECT_NEAR(lighting.report.seen_sr, 4 * pi, 1e-12);
@@ -201,27 +172,21 @@ TEST(LoadEnvironment, ReadsTheUsualChannels) {
   }
 }
 
-std::string message_of(const std::filesystem::path& file) {
-  return test::error_of([&] { load_environment(settings_for(file)); });
-}
-
-TEST(LoadEnvironment, SaysWhatIsWrongWithAFile) {
-  const previz::test::TemporaryDirectory directory;
-  const auto file = directory / "sky.exr";
-  write_channels(file, {{"R", 1}, {"G", 1}, {"left.B", 1}});
-  EXPECT_THAT(message_of(file), HasSubstr("found G, R, left.B"));
-  write_channels(file, {{"Y", 1}, {"RY", 0}, {"BY", 0}});
-  EXPECT_THAT(message_of(file), HasSubstr("found BY, RY, Y"));
+TEST_F(LoadEnvironment, SaysWhatIsWrongWithAFile) {
+  write_channels(file, {channel("R", 1), channel("G", 1), channel("left.B", 1)});
+  EXPECT_THAT(refusal(), HasSubstr("found G, R, left.B"));
+  write_channels(file, {channel("Y", 1), channel("RY", 0), channel("BY", 0)});
+  EXPECT_THAT(refusal(), HasSubstr("found BY, RY, Y"));
   write_exr_picture(file, {30, 20, std::vector<glm::vec3>(600)});
-  EXPECT_THAT(message_of(file), HasSubstr("30x20"));
-  EXPECT_THAT(message_of(directory / "none.exr"), HasSubstr("none.exr"));
-  EXPECT_THAT(message_of(directory.path()), HasSubstr("cannot be read"));
+  EXPECT_THAT(refusal(), HasSubstr("30x20"));
+  settings.environment = directory / "none.exr";
+  EXPECT_THAT(refusal(), HasSubstr("none.exr"));
+  settings.environment = directory.path();
+  EXPECT_THAT(refusal(), HasSubstr("cannot be read"));
 }
 
 // A file of some kilobytes may claim to hold a picture that no memory holds.
-TEST(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
-  const previz::test::TemporaryDirectory directory;
-  const auto file = directory / "sky.exr";
+TEST_F(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
   {
     Imf::Header header(65536, 32768);
     header.compression() = Imf::ZIP_COMPRESSION;
@@ -229,17 +194,15 @@ TEST(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
       header.channels().insert(channel, Imf::Channel(Imf::HALF));
     const Imf::OutputFile without_pixels(file.c_str(), header);
   }
-  EXPECT_THAT(message_of(file), HasSubstr("65536x32768 pixels; allowed: at most"));
+  EXPECT_THAT(refusal(), HasSubstr("65536x32768 pixels; allowed: at most"));
 }
 
 // So may an attribute of its header, which OpenEXR would ask as much memory for.
-TEST(LoadEnvironment, AHugeAttributeIsRefusedBeforeMemoryIsAskedFor) {
-  const previz::test::TemporaryDirectory directory;
-  const auto file = directory / "sky.exr";
+TEST_F(LoadEnvironment, AHugeAttributeIsRefusedBeforeMemoryIsAskedFor) {
   const std::string name("owner\0string\0", 13);
   std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name
                                         << std::string("\xff\xff\xff\x7f", 4) << "and little more";
-  EXPECT_THAT(message_of(file), HasSubstr("its header is damaged"));
+  EXPECT_THAT(refusal(), HasSubstr("its header is damaged"));
 }
 
 }  // namespace previz::lighting::environment_file_test

@@ -1,6 +1,6 @@
 // From made-up skies through made-up fisheye pictures to the map, and back to the sky.
 #include "daemon/lighting/lighting.hpp"
-#include "drivers/error.hpp"
+#include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"
 
@@ -14,23 +14,19 @@ using test::make_frame;
 using test::photograph;
 using test::Sky;
 using test::towards;
+using test::unseen_as;
 
 // A pixel's diagonal on the axis: what is closer than this to an edge may be mixed with it.
 constexpr double pixel_diagonal_rad = 1.5 / 153.3;
 
+double cap_sr(double radius_rad) {
+  return 2 * pi * (1 - std::cos(radius_rad));
+}
+
 const Sky uniform = [](const glm::dvec3&) { return glm::dvec3(1, 2, 3); };
 
 set::Lighting constant_fill(double radiance) {
-  set::Lighting settings;
-  settings.unseen = set::UnseenRule::constant;
-  settings.unseen_radiance = glm::dvec3(radiance);
-  return settings;
-}
-
-set::Lighting with_rule(set::UnseenRule rule) {
-  set::Lighting settings;
-  settings.unseen = rule;
-  return settings;
+  return unseen_as(set::UnseenRule::constant, radiance);
 }
 
 Lighting estimate_one(const LightCameraCalibration& camera, const Sky& sky, double exposure,
@@ -41,13 +37,15 @@ Lighting estimate_one(const LightCameraCalibration& camera, const Sky& sky, doub
 
 template <typename Body>  // body(direction, radiance, angle to `axis` in rad)
 void for_each_texel(const EnvironmentMap& map, const glm::dvec3& axis, const Body& body) {
-  for (int j = 0; j < map.size; ++j) {
-    for (int i = 0; i < map.size; ++i) {
-      const glm::dvec3 direction(texel_direction(map.size, i, j));
-      body(direction, glm::dvec3(map.radiance[static_cast<std::size_t>(j * map.size + i)]),
-           std::acos(std::clamp(glm::dot(direction, axis), -1.0, 1.0)));
-    }
-  }
+  lighting::for_each_texel(map, [&](const glm::dvec3& direction, const glm::dvec3& radiance) {
+    body(direction, radiance, std::acos(std::clamp(glm::dot(direction, axis), -1.0, 1.0)));
+  });
+}
+
+// The light of `uniform`, to half a code of a quarter of it.
+void expect_uniform(const EnvironmentMap& map) {
+  for (const glm::vec3& radiance : map.radiance)
+    ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
 }
 
 TEST(Estimate, UniformSkyIsUniformWhereSeen) {
@@ -68,7 +66,6 @@ TEST(Estimate, UniformSkyIsUniformWhereSeen) {
                        ASSERT_EQ(radiance, glm::dvec3(9));
                      }
                    });
-    const auto cap_sr = [](double angle) { return 2 * pi * (1 - std::cos(angle)); };
     EXPECT_LT(lighting.report.seen_sr, cap_sr(100 * degree));
     EXPECT_GT(lighting.report.seen_sr, cap_sr(100 * degree - pixel_diagonal_rad));
     EXPECT_NEAR(lighting.report.seen_sr + lighting.report.filled_sr, 4 * pi, 1e-6);
@@ -92,7 +89,7 @@ TEST(Estimate, OneTexelHoldsTheWholeSphere) {
 // they stand, on the map's folds and poles too, at any resolution.
 TEST(Estimate, LampsKeepFluxAndDirection) {
   constexpr double radius = 2 * degree, lamp = 300, ambient = 0.05;
-  const double solid_angle = 2 * pi * (1 - std::cos(radius));
+  const double solid_angle = cap_sr(radius);
   std::vector<glm::dvec3> places;
   for (const auto& [azimuth, elevation] : {std::pair{0.0, 90.0},
                                            {33.0, 78.0},
@@ -108,8 +105,7 @@ TEST(Estimate, LampsKeepFluxAndDirection) {
       if (glm::length(d - place) < 2 * std::sin(radius / 2)) return glm::dvec3(lamp);
     return glm::dvec3(ambient);
   };
-  LightCameraCalibration camera = fisheye_camera();
-  camera.world_from_camera = looking(17, 90);
+  const LightCameraCalibration camera = fisheye_camera(512, looking(17, 90));
   const std::vector<FramePtr> frames{photograph(camera, sky, 0.8 / 256, test::Detail::fine),
                                      photograph(camera, sky, 0.8, test::Detail::fine)};
   for (int resolution : {0, 256, 64}) {
@@ -142,8 +138,7 @@ TEST(Estimate, LampsKeepFluxAndDirection) {
 TEST(Estimate, DirectionsAreWhereTheyWere) {
   const Sky sky = [](const glm::dvec3& d) { return 0.5 * d + 0.5; };
   for (const glm::dmat4& pose : {looking(0, 90), looking(30, 90, 45), looking(-100, 25, -20)}) {
-    LightCameraCalibration camera = fisheye_camera();
-    camera.world_from_camera = pose;
+    const LightCameraCalibration camera = fisheye_camera(512, pose);
     const EnvironmentMap map = estimate_one(camera, sky, 0.9, constant_fill(0)).environment;
     for_each_texel(map, glm::dvec3(pose[2]),
                    [&](const glm::dvec3& direction, const glm::dvec3& radiance, double angle) {
@@ -163,19 +158,14 @@ TEST(Estimate, ReportsClippedAndBlackSolidAngles) {
     if (glm::dot(d, hole) > std::cos(10 * degree)) return glm::dvec3(0);
     return glm::dvec3(0.5);
   };
-  const LightCameraCalibration camera = [] {
-    auto c = fisheye_camera();
-    c.world_from_camera = looking(0, 90);
-    return c;
-  }();
+  const LightCameraCalibration camera = fisheye_camera(512, looking(0, 90));
   const EnvironmentReport report = estimate_one(camera, sky, 1, constant_fill(0)).report;
   // Any pixel that the lamp clips when it covers a hundredth of it is counted: up to a pixel's
   // diagonal more. Holes count where a pixel lies wholly inside.
-  const auto cap = [](double radius) { return 2 * pi * (1 - std::cos(radius)); };
-  EXPECT_GT(report.overexposed_sr, cap(5 * degree) * 0.999);
-  EXPECT_LT(report.overexposed_sr, cap(5 * degree + pixel_diagonal_rad));
-  EXPECT_LT(report.underexposed_sr, cap(10 * degree) * 1.001);
-  EXPECT_GT(report.underexposed_sr, cap(10 * degree - pixel_diagonal_rad));
+  EXPECT_GT(report.overexposed_sr, cap_sr(5 * degree) * 0.999);
+  EXPECT_LT(report.overexposed_sr, cap_sr(5 * degree + pixel_diagonal_rad));
+  EXPECT_LT(report.underexposed_sr, cap_sr(10 * degree) * 1.001);
+  EXPECT_GT(report.underexposed_sr, cap_sr(10 * degree - pixel_diagonal_rad));
   ASSERT_GE(report.notes.size(), 3u);
   EXPECT_THAT(report.notes[0], HasSubstr("clipped in every exposure"));
   EXPECT_THAT(report.notes[1], HasSubstr("black in every exposure"));
@@ -184,19 +174,17 @@ TEST(Estimate, ReportsClippedAndBlackSolidAngles) {
 
 // A cap of half angle r has a solid angle of 2 pi (1 - cos r).
 TEST(AreaWords, AreDegreesOrAShareOfAllDirections) {
-  EXPECT_EQ(area_words(2 * pi * (1 - std::cos(2 * degree))), "an area 4.0 degrees wide");
+  EXPECT_EQ(area_words(cap_sr(2 * degree)), "an area 4.0 degrees wide");
   EXPECT_EQ(area_words(pi), "an area of 25 % of all directions");
   EXPECT_EQ(area_words(4 * pi), "an area of 100 % of all directions");
 }
 
 TEST(UnseenHorizon, ContinuesAUniformSky) {
   for (const glm::dmat4& pose : {looking(0, 90), looking(50, 10)}) {
-    LightCameraCalibration camera = fisheye_camera();
-    camera.world_from_camera = pose;
+    const LightCameraCalibration camera = fisheye_camera(512, pose);
     const Lighting lighting =
-        estimate_one(camera, uniform, 0.25, with_rule(set::UnseenRule::horizon));
-    for (const glm::vec3& radiance : lighting.environment.radiance)
-      ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
+        estimate_one(camera, uniform, 0.25, unseen_as(set::UnseenRule::horizon));
+    expect_uniform(lighting.environment);
   }
 }
 
@@ -204,10 +192,9 @@ TEST(UnseenHorizon, FollowsTheAzimuthAndCalmsDown) {
   const Sky sky = [](const glm::dvec3& d) {
     return glm::dvec3(1 + 0.5 * d.x / std::max(1e-9, std::hypot(d.x, d.y)));
   };
-  LightCameraCalibration camera = fisheye_camera();
-  camera.world_from_camera = looking(20, 90);
+  const LightCameraCalibration camera = fisheye_camera(512, looking(20, 90));
   const EnvironmentMap map =
-      estimate_one(camera, sky, 0.5, with_rule(set::UnseenRule::horizon)).environment;
+      estimate_one(camera, sky, 0.5, unseen_as(set::UnseenRule::horizon)).environment;
   const auto at = [&](double azimuth, double elevation) {
     return map.radiance[texel_index(map.size, glm::vec3(towards(azimuth, elevation)))].r;
   };
@@ -226,11 +213,10 @@ TEST(UnseenHorizon, DoesNotSmearALampAtTheEdge) {
   const Sky sky = [&](const glm::dvec3& d) {
     return glm::dvec3(glm::dot(d, lamp) > std::cos(1.5 * degree) ? 1000.0 : 0.25);
   };
-  LightCameraCalibration camera = fisheye_camera();
-  camera.world_from_camera = looking(0, 90);
+  const LightCameraCalibration camera = fisheye_camera(512, looking(0, 90));
   const std::vector<FramePtr> frames{photograph(camera, sky, 1, test::Detail::fine),
                                      photograph(camera, sky, 5e-4, test::Detail::fine)};
-  const Lighting lighting = estimate(frames, camera, with_rule(set::UnseenRule::horizon));
+  const Lighting lighting = estimate(frames, camera, unseen_as(set::UnseenRule::horizon));
   for_each_texel(lighting.environment, glm::dvec3(0, 0, 1),
                  [&](const glm::dvec3&, const glm::dvec3& radiance, double angle) {
                    // Pixels on the lamp's rim of up to eight times the median may remain.
@@ -244,10 +230,9 @@ TEST(UnseenHorizon, DoesNotSmearALampAtTheEdge) {
 TEST(UnseenMirror, ShowsTheUpperHalfBelow) {
   const Sky sky = [](const glm::dvec3& d) { return 0.4 * d + 0.5; };
   for (const glm::dmat4& pose : {looking(0, 90, 25), looking(30, 20)}) {
-    LightCameraCalibration camera = fisheye_camera();
-    camera.world_from_camera = pose;
+    const LightCameraCalibration camera = fisheye_camera(512, pose);
     const glm::dvec3 axis(pose[2]);
-    const Lighting lighting = estimate_one(camera, sky, 0.9, with_rule(set::UnseenRule::mirror));
+    const Lighting lighting = estimate_one(camera, sky, 0.9, unseen_as(set::UnseenRule::mirror));
     for_each_texel(lighting.environment, axis,
                    [&](const glm::dvec3& d, const glm::dvec3& radiance, double angle) {
                      if (angle < 101 * degree) return;
@@ -258,26 +243,22 @@ TEST(UnseenMirror, ShowsTheUpperHalfBelow) {
 }
 
 TEST(UnseenMirror, FallsBackToTheHorizonWhereTheMirrorIsUnseenToo) {
-  LightCameraCalibration camera = fisheye_camera();
+  LightCameraCalibration camera = fisheye_camera(512, looking(0, 90));
   camera.intrinsics.max_angle_rad = 80 * degree;
-  camera.world_from_camera = looking(0, 90);
-  const Lighting lighting = estimate_one(camera, uniform, 0.25, with_rule(set::UnseenRule::mirror));
-  for (const glm::vec3& radiance : lighting.environment.radiance)
-    ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
+  const Lighting lighting = estimate_one(camera, uniform, 0.25, unseen_as(set::UnseenRule::mirror));
+  expect_uniform(lighting.environment);
   EXPECT_THAT(lighting.report.notes.back(), HasSubstr("not in the mirrored picture either"));
 }
 
 // A lens whose circle is wider than the picture: the edge is where the picture ends.
 TEST(Estimate, ThePictureMayCutTheCircle) {
-  LightCameraCalibration camera = fisheye_camera();
+  LightCameraCalibration camera = fisheye_camera(512, looking(0, 90));
   camera.intrinsics.width = 400;
   camera.intrinsics.cx = 190;
-  camera.world_from_camera = looking(0, 90);
   const Lighting lighting =
-      estimate_one(camera, uniform, 0.25, with_rule(set::UnseenRule::horizon));
-  for (const glm::vec3& radiance : lighting.environment.radiance)
-    ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
-  EXPECT_LT(lighting.report.seen_sr, 2 * pi * (1 - std::cos(100 * degree)) * 0.95);
+      estimate_one(camera, uniform, 0.25, unseen_as(set::UnseenRule::horizon));
+  expect_uniform(lighting.environment);
+  EXPECT_LT(lighting.report.seen_sr, cap_sr(100 * degree) * 0.95);
 }
 
 TEST(Estimate, ResolutionFollowsTheSourceOrTheSet) {
@@ -292,13 +273,8 @@ TEST(Estimate, ResolutionFollowsTheSourceOrTheSet) {
 TEST(Estimate, RefusesFramesThatDoNotFit) {
   const LightCameraCalibration camera = fisheye_camera();
   const FramePtr frame = make_frame(2, 2, 1, std::vector<glm::dvec3>(4));
-  try {
-    estimate({&frame, 1}, camera, {});
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "light frame 0 has 2x2 pixels, the light camera's calibration 512x512");
-  }
+  const std::string refusal = test::error_of([&] { estimate({&frame, 1}, camera, {}); });
+  EXPECT_EQ(refusal, "light frame 0 has 2x2 pixels, the light camera's calibration 512x512");
   EXPECT_THROW(estimate({}, camera, {}), Error);  // no frame
 }
 

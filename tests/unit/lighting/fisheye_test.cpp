@@ -9,14 +9,7 @@ using std::numbers::pi;
 using test::degree;
 
 FisheyeIntrinsics wide(std::array<double, 4> k, double max_angle_deg = 130) {
-  return {.width = 512,
-          .height = 480,
-          .fx = 150.5,
-          .fy = 149.25,
-          .cx = 250.125,
-          .cy = 241.75,
-          .k = k,
-          .max_angle_rad = max_angle_deg * degree};
+  return {512, 480, 150.5, 149.25, 250.125, 241.75, k, max_angle_deg * degree};
 }
 
 glm::dvec3 direction(double off_axis, double psi) {
@@ -26,14 +19,13 @@ glm::dvec3 direction(double off_axis, double psi) {
 
 TEST(Fisheye, WithoutDistortionIsEquidistant) {
   const Fisheye lens(wide({}));
-  for (double angle : {0.0, 1e-9, 0.1, 1.0, 0.5 * pi, 100 * degree, 130 * degree - 1e-12}) {
+  for (double angle : {0.0, 1e-9, 0.1, 1.0, 0.5 * pi, 100 * degree, 130 * degree - 1e-12})
     for (double psi : {0.0, 0.7, 2.0, -3.0}) {
       const auto pixel = lens.project(7.5 * direction(angle, psi));
       ASSERT_TRUE(pixel);
       EXPECT_NEAR(pixel->x, 250.125 + 150.5 * angle * std::cos(psi), 1e-10);
       EXPECT_NEAR(pixel->y, 241.75 + 149.25 * angle * std::sin(psi), 1e-10);
     }
-  }
 }
 
 TEST(Fisheye, ProjectsThePolynomialBeyondNinetyDegrees) {
@@ -69,7 +61,7 @@ TEST(Fisheye, RoundTripsUpToTheCalibratedAngle) {
 TEST(Fisheye, RoundTripsOnEveryPixel) {
   const Fisheye lens(wide({-0.02, 0.002, -0.0003, 0}, 100));
   int seen = 0;
-  for (int y = 0; y < 480; ++y) {
+  for (int y = 0; y < 480; ++y)
     for (int x = 0; x < 512; ++x) {
       const auto ray = lens.unproject({x, y});
       if (!ray) continue;
@@ -80,7 +72,6 @@ TEST(Fisheye, RoundTripsOnEveryPixel) {
       ASSERT_NEAR(pixel->x, x, 1e-9);
       ASSERT_NEAR(pixel->y, y, 1e-9);
     }
-  }
   EXPECT_GT(seen, 100000);
 }
 

@@ -1,7 +1,6 @@
 #include "daemon/lighting/hdr.hpp"
 
 #include "daemon/lighting/response.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"
@@ -9,32 +8,28 @@
 namespace previz::lighting::hdr_test {
 
 using test::make_frame;
+using test::rgb8_frame;
 
 const ResponseCurve linear{
     .kind = ResponseCurve::Kind::linear, .inverse_table = {}, .clip_share = 1};
 const ResponseCurve srgb = LightCameraCalibration{}.response;
 
-FramePtr frame_of(double exposure, const std::vector<glm::dvec3>& radiances) {
+// The signals of a sensor that saturates at this share of white.
+FramePtr saturated_frame(double exposure, const std::vector<glm::dvec3>& radiances, double share) {
   std::vector<glm::dvec3> signals;
-  for (const glm::dvec3& radiance : radiances) signals.push_back(exposure * radiance);
+  for (const glm::dvec3& radiance : radiances)
+    signals.push_back(glm::min(exposure * radiance, glm::dvec3(share)));
   return make_frame(static_cast<int>(radiances.size()), 1, exposure, signals);
 }
 
-FramePtr srgb8_frame(int width, double exposure, std::vector<std::uint8_t> codes) {
-  Frame frame;
-  frame.source = "light";
-  frame.sequence = 12;
-  frame.exposure = exposure;
-  frame.width = width;
-  frame.height = static_cast<int>(codes.size()) / 3 / width;
-  frame.bytes = std::move(codes);
-  return std::make_shared<Frame>(std::move(frame));
+FramePtr frame_of(double exposure, const std::vector<glm::dvec3>& radiances) {
+  return saturated_frame(exposure, radiances, 1);
 }
 
 TEST(MergeExposures, OneExposureIsTheInverseResponse) {
   std::vector<std::uint8_t> codes;
   for (int code = 0; code < 255; ++code) codes.insert(codes.end(), 3, static_cast<uint8_t>(code));
-  const FramePtr frame = srgb8_frame(255, 0.5, codes);
+  const FramePtr frame = rgb8_frame(255, 0.5, codes);
   const HdrPicture picture = merge_exposures({&frame, 1}, srgb);
   const Response response({}, 8);
   for (std::size_t code = 0; code < 255; ++code) {
@@ -84,14 +79,6 @@ TEST(MergeExposures, AClippedChannelLeavesTheOthers) {
   EXPECT_NEAR(picture.radiance[0].b, 0.25, 2e-5);
 }
 
-// The signals of a sensor that saturates at this share of white.
-FramePtr saturated_frame(double exposure, const std::vector<glm::dvec3>& radiances, double share) {
-  std::vector<glm::dvec3> signals;
-  for (const glm::dvec3& radiance : radiances)
-    signals.push_back(glm::min(exposure * radiance, glm::dvec3(share)));
-  return make_frame(static_cast<int>(radiances.size()), 1, exposure, signals);
-}
-
 // A wall that the longest exposure shows, a lamp that only the shortest does, and one that none
 // does. In every order, since the newest exposure is believed.
 TEST(MergeExposures, WhatIsClippedBelowWhiteIsAtLeastSoMuchLight) {
@@ -122,19 +109,17 @@ TEST(MergeExposures, ADarkLevelAtWhatIsClippedIsRefused) {
   half.clip_share = 0.5;
   const FramePtr frame = frame_of(1, {glm::dvec3(0.3)});
   EXPECT_NO_THROW(Bracket({&frame, 1}, half, glm::dvec3(0.4)));
-  try {
+  const std::string refusal = test::error_of([&] {
     const Bracket refused({&frame, 1}, half, glm::dvec3(0, 0, 0.501));
-    FAIL() << "not refused";
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("dark_level is 0.501"));
-  }
+  });
+  EXPECT_THAT(refusal, HasSubstr("dark_level is 0.501"));
 }
 
 // Without a share that was measured, only the largest code is clipped, whatever the depth.
 TEST(MergeExposures, OnlyTheLargestCodeIsClippedUnlessTheCalibrationSaysOtherwise) {
   for (const int bits : {1, 8, 10, 12, 16})
     EXPECT_EQ(Response(srgb, bits).clipping().at, (1u << bits) - 1) << bits;
-  const FramePtr frame = srgb8_frame(2, 1, {254, 254, 254, 255, 255, 255});
+  const FramePtr frame = rgb8_frame(2, 1, {254, 254, 254, 255, 255, 255});
   EXPECT_EQ(merge_exposures({&frame, 1}, srgb).flags, (std::vector<std::uint8_t>{0, overexposed}));
 }
 
@@ -167,7 +152,7 @@ TEST(MergeExposures, IsUnbiasedAndNearTheBestUnderSensorNoise) {
       for (int i = 0; i < pixels; ++i)
         codes.insert(codes.end(), 3,
                      static_cast<std::uint8_t>(response.forward(signal + sigma * normal(random))));
-      frames.push_back(srgb8_frame(pixels, exposure, codes));
+      frames.push_back(rgb8_frame(pixels, exposure, codes));
       const int code = response.forward(signal);
       if (code > 1 && code < 250) {
         const double step = response.inverse()[static_cast<std::size_t>(code + 1)] -
@@ -199,9 +184,9 @@ std::string merge_error(const std::vector<FramePtr>& frames) {
 
 TEST(MergeExposures, RefusesWhatCannotBeUsed) {
   EXPECT_THAT(merge_error({}), HasSubstr("at least one"));
-  EXPECT_THAT(merge_error({srgb8_frame(1, 0, {1, 2, 3})}), HasSubstr("light frame 12: exposure"));
-  EXPECT_THAT(merge_error({srgb8_frame(1, std::nan(""), {1, 2, 3})}), HasSubstr("exposure"));
-  EXPECT_THAT(merge_error({srgb8_frame(1, 1, {1, 2, 3}), srgb8_frame(2, 1, {1, 2, 3, 1, 2, 3})}),
+  EXPECT_THAT(merge_error({rgb8_frame(1, 0, {1, 2, 3})}), HasSubstr("light frame 12: exposure"));
+  EXPECT_THAT(merge_error({rgb8_frame(1, std::nan(""), {1, 2, 3})}), HasSubstr("exposure"));
+  EXPECT_THAT(merge_error({rgb8_frame(1, 1, {1, 2, 3}), rgb8_frame(2, 1, {1, 2, 3, 1, 2, 3})}),
               HasSubstr("2x1"));
 }
 

@@ -4,6 +4,7 @@
 #include <opencv2/photo.hpp>
 
 #include "tests/support/lighting.hpp"
+#include "tests/support/lighting_pictures.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/test.hpp"
 
@@ -48,17 +49,10 @@ ResponseCurve channel_response(const cv::Mat& robertson, int bgr) {
 std::vector<FramePtr> frames_of(const Memorial& memorial) {
   std::vector<FramePtr> frames;
   for (std::size_t i = 0; i < memorial.pictures.size(); ++i) {
-    const cv::Mat& picture = memorial.pictures[i];
-    Frame frame;
-    frame.source = "light";
-    frame.sequence = i;
-    frame.exposure = memorial.times_s[i];
-    frame.width = picture.cols;
-    frame.height = picture.rows;
-    for (int y = 0; y < picture.rows; ++y)
-      for (int x = 0; x < picture.cols; ++x)
-        for (const int bgr : {2, 1, 0}) frame.bytes.push_back(picture.at<cv::Vec3b>(y, x)[bgr]);
-    frames.push_back(std::make_shared<Frame>(std::move(frame)));
+    std::vector<std::uint8_t> codes;
+    for (const cv::Vec3b& bgr : cv::Mat3b(memorial.pictures[i]))
+      codes.insert(codes.end(), {bgr[2], bgr[1], bgr[0]});
+    frames.push_back(test::rgb8_frame(memorial.pictures[i].cols, memorial.times_s[i], codes, i));
   }
   return frames;
 }
@@ -67,7 +61,7 @@ std::vector<FramePtr> frames_of(const Memorial& memorial) {
 // blue in the scans: the frame around the film) left out.
 std::vector<double> stops_off(const Memorial& memorial, const HdrPicture& merged, int rgb) {
   std::vector<double> ratios;
-  for (int y = 0; y < merged.height; ++y) {
+  for (int y = 0; y < merged.height; ++y)
     for (int x = 0; x < merged.width; ++x) {
       const auto p = static_cast<std::size_t>(y * merged.width + x);
       if (memorial.pictures.front().at<cv::Vec3b>(y, x) == cv::Vec3b(255, 0, 0)) continue;
@@ -75,7 +69,6 @@ std::vector<double> stops_off(const Memorial& memorial, const HdrPicture& merged
       if (truth > 0 && merged.radiance[p][rgb] > 0)
         ratios.push_back(std::log2(merged.radiance[p][rgb] / truth));
     }
-  }
   std::vector<double> sorted = ratios;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
                    sorted.end());
@@ -85,10 +78,9 @@ std::vector<double> stops_off(const Memorial& memorial, const HdrPicture& merged
 }
 
 double quantile_of(std::vector<double>& values, double q) {
-  const auto place =
-      values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
+  const auto place = static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, values.begin() + place);
+  return values[static_cast<std::size_t>(place)];
 }
 
 TEST(MergeExposures, MatchesThePublishedMapOfRealExposures) {

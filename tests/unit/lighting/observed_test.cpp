@@ -4,7 +4,6 @@
 #include "daemon/lighting/lighting.hpp"
 #include "daemon/lighting/response.hpp"
 #include "drivers/calibration/pinhole.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"
@@ -25,14 +24,13 @@ Plate film(const ObserverCalibration& camera, const glm::dmat4& pose, double exp
   const PinholeIntrinsics& lens = camera.intrinsics;
   const Response response(camera.response, 8);
   Plate plate{lens.width, lens.height, 8, {}};
-  for (int y = 0; y < lens.height; ++y) {
+  for (int y = 0; y < lens.height; ++y)
     for (int x = 0; x < lens.width; ++x) {
       const glm::dvec2 n = undistort(lens, {x, y}).value();
       const glm::dvec3 direction = glm::normalize(glm::dmat3(pose) * glm::dvec3(n, 1));
       for (int c = 0; c < 3; ++c)
         plate.samples.push_back(response.forward(exposure * sky(direction)[c]));
     }
-  }
   return plate;
 }
 
@@ -49,19 +47,16 @@ TEST(ObservedLight, KeepsWhatTheFilmCameraSawWhereItSawIt) {
   for (const glm::dmat4& pose : {test::looking(20, -40), test::looking(100, -60, 30)})
     light.see(film(camera, pose, 1.5, below), 1.5, pose);
   int seen = 0;
-  for (int j = 0; j < 256; ++j) {
-    for (int i = 0; i < 256; ++i) {
-      const auto t = static_cast<std::size_t>(j * 256 + i);
-      if (light.map().seen[t] == 0) continue;
-      ++seen;
-      const glm::dvec3 direction(texel_direction(256, i, j));
-      ASSERT_LT(glm::length(glm::dvec3(light.map().radiance[t]) - below(direction)),
-                std::sqrt(3.0) * tolerance);
-      // Within the picture's diagonal of one of the two.
-      EXPECT_GT(std::max(glm::dot(direction, test::towards(20, -40)),
-                         glm::dot(direction, test::towards(100, -60))),
-                std::cos(46 * degree));
-    }
+  for (int t = 0; t < 256 * 256; ++t) {
+    if (light.map().seen[std::size_t(t)] == 0) continue;
+    ++seen;
+    const glm::dvec3 direction(texel_direction(256, t % 256, t / 256));
+    ASSERT_LT(glm::length(glm::dvec3(light.map().radiance[std::size_t(t)]) - below(direction)),
+              std::sqrt(3.0) * tolerance);
+    // Within the picture's diagonal of one of the two.
+    EXPECT_GT(std::max(glm::dot(direction, test::towards(20, -40)),
+                       glm::dot(direction, test::towards(100, -60))),
+              std::cos(46 * degree));
   }
   // 74 by 59 degrees are 1.1 sr; the two overlap by little.
   EXPECT_GT(seen * texel_sr(256), 1.6);
@@ -109,13 +104,10 @@ TEST(ObservedLight, IsSeenFromTheSetInARoom) {
 }
 
 TEST(UnseenObserver, FillsWhatItSawAndContinuesTheEdgeElsewhere) {
-  LightCameraCalibration fisheye = test::fisheye_camera(128);
-  fisheye.world_from_camera = test::looking(0, 90);
+  const LightCameraCalibration fisheye = test::fisheye_camera(128, test::looking(0, 90));
   const auto above = [](const glm::dvec3&) { return glm::dvec3(0.5); };
   const FramePtr frame = test::photograph(fisheye, above, 1);
-  set::Lighting settings;
-  settings.unseen = set::UnseenRule::observer;
-  Estimator estimator(fisheye, settings);
+  Estimator estimator(fisheye, test::unseen_as(set::UnseenRule::observer));
   const ObserverCalibration camera = film_camera();
   ObservedLight light(camera, estimator.resolution(), nullptr);
   const glm::dmat4 pose = test::looking(0, -50);

@@ -1,7 +1,6 @@
 // What an environment's picture may be besides a latitude-longitude OpenEXR: Radiance .hdr, a cube
 // cross; and what is said about everything else.
 #include "daemon/lighting/lighting.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -14,7 +13,7 @@ using std::numbers::pi;
 using Rgbe = std::array<int, 4>;
 using Sky = previz::test::Sky;
 
-class PictureFormats : public ::testing::Test {
+class PictureFormats : public testing::Test {
  protected:
   Lighting load(const std::string& bytes, double turn_rad = 0, int resolution = 0) {
     std::ofstream(file_, std::ios::binary) << bytes;
@@ -26,12 +25,7 @@ class PictureFormats : public ::testing::Test {
   }
   template <typename Picture>
   std::string refusal(const Picture& picture) {
-    try {
-      load(picture);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "accepted";
+    return test::error_of([&] { load(picture); });
   }
 
  private:
@@ -99,8 +93,7 @@ TEST_F(PictureFormats, ExposureAndColourCorrectionAreDividedOut) {
       load(with_header("-Y 8 +X 16", "EXPOSURE=2\nEXPOSURE= 2.0\nCOLORCORR= 2 1 0.5\n") +
            flat(128, {128, 64, 32, 129}));
   expect_even(lighting, glm::vec3(0.125f));
-  ASSERT_EQ(lighting.report.notes.size(), 1u);
-  EXPECT_THAT(lighting.report.notes[0], HasSubstr("8, 4 and 2 times as bright"));
+  EXPECT_THAT(lighting.report.notes, ElementsAre(HasSubstr("8, 4 and 2 times as bright")));
 }
 
 // A world with every direction another colour, none of whose channels is zero.
@@ -159,21 +152,21 @@ TEST_F(PictureFormats, RadiancePicturesAreTurnedUpright) {
 TEST_F(PictureFormats, DamagedRadianceFilesAreRefusedByName) {
   const std::string pixels = flat(128, {128, 64, 32, 129});
   const std::string size = "-Y 8 +X 16";
-  EXPECT_THAT(refusal(with_header(size) + pixels.substr(0, 200)),
-              HasSubstr("sky.exr: cannot be read as Radiance .hdr: scan line 4 is cut off"));
-  EXPECT_THAT(refusal(with_header("-Y 65536 +X 131072")),
-              HasSubstr("131072x65536 pixels; allowed: at most"));
-  EXPECT_THAT(refusal(with_header("-Y 8192 +X 16384")), HasSubstr("scan line 1 is cut off"));
-  EXPECT_THAT(refusal(with_header("-Y -8 +X 16") + pixels), HasSubstr("16x-8 pixels"));
-  EXPECT_THAT(refusal(with_header("-Y 8 +Y 16") + pixels), HasSubstr("its size is \"-Y 8 +Y 16\""));
-  EXPECT_THAT(refusal("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 8 +X 16\n" + pixels),
-              HasSubstr("CIE XYZ"));
-  EXPECT_THAT(refusal(with_header(size, "EXPOSURE=0\n") + pixels),
-              HasSubstr("\"EXPOSURE=0\" is not a brightness factor"));
-  EXPECT_THAT(refusal("#?RADIANCE\nFORMAT=32-bit_rle"), HasSubstr("ends in its header"));
-  EXPECT_THAT(refusal(with_header(size) + bytes_of({2, 2, 0, 16, 128 + 17, 1})),
-              HasSubstr("scan line 1 has a run that does not fit"));
-  EXPECT_THAT(refusal(with_header(size) + flat(128, {1, 1, 1, 3})), HasSubstr("scan line 1 has a"));
+  const std::pair<std::string, const char*> damages[] = {
+      {with_header(size) + pixels.substr(0, 200),
+       "sky.exr: cannot be read as Radiance .hdr: scan line 4 is cut off"},
+      {with_header("-Y 65536 +X 131072"), "131072x65536 pixels; allowed: at most"},
+      {with_header("-Y 8192 +X 16384"), "scan line 1 is cut off"},
+      {with_header("-Y -8 +X 16") + pixels, "16x-8 pixels"},
+      {with_header("-Y 8 +Y 16") + pixels, "its size is \"-Y 8 +Y 16\""},
+      {"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 8 +X 16\n" + pixels, "CIE XYZ"},
+      {with_header(size, "EXPOSURE=0\n") + pixels, "\"EXPOSURE=0\" is not a brightness factor"},
+      {"#?RADIANCE\nFORMAT=32-bit_rle", "ends in its header"},
+      {with_header(size) + bytes_of({2, 2, 0, 16, 128 + 17, 1}),
+       "scan line 1 has a run that does not fit"},
+      {with_header(size) + flat(128, {1, 1, 1, 3}), "scan line 1 has a"},
+  };
+  for (const auto& [bytes, words] : damages) EXPECT_THAT(refusal(bytes), HasSubstr(words));
 }
 
 TEST_F(PictureFormats, OtherFormatsAreRefusedByName) {
@@ -215,9 +208,8 @@ TEST_F(PictureFormats, ACubeCrossShowsTheSameWorldAsALatitudeLongitudePicture) {
     const auto expected = load(latitude_longitude(256, smooth_world), turn_rad, 64).environment;
     for (const bool vertical : {true, false}) {
       const Lighting found = load(cross(vertical, 64, smooth_world, glm::vec3(0)), turn_rad, 64);
-      ASSERT_EQ(found.report.notes.size(), 1u);
-      EXPECT_THAT(found.report.notes[0],
-                  HasSubstr(vertical ? "vertical cube cross" : "horizontal cube cross"));
+      EXPECT_THAT(found.report.notes, ElementsAre(HasSubstr(vertical ? "vertical cube cross"
+                                                                     : "horizontal cube cross")));
       // A pixel of either picture is h = 2 / 64 wide or less; a tent over a pixel is off by h^2 / 4
       // of second derivatives, which are below 1.5 in sum; next to a pole by a pixel, with slope 1.
       for (std::size_t i = 0; i < expected.radiance.size(); ++i) {
@@ -235,15 +227,10 @@ TEST_F(PictureFormats, ACubeCrossShowsTheSameWorldAsALatitudeLongitudePicture) {
 // The six directions of the world one by one: the middle of each face has its own colour.
 TEST_F(PictureFormats, ACubeCrossIsTheRightWayAround) {
   const auto painted = [](const glm::dvec3& d) {
-    return glm::dvec3(1.5 + (d.x > 0.8    ? 1.0
-                             : d.x < -0.8 ? -1.0
-                                          : 0.0),
-                      1.5 + (d.y > 0.8    ? 1.0
-                             : d.y < -0.8 ? -1.0
-                                          : 0.0),
-                      1.5 + (d.z > 0.8    ? 1.0
-                             : d.z < -0.8 ? -1.0
-                                          : 0.0));
+    glm::dvec3 color(1.5);
+    for (int axis = 0; axis < 3; ++axis)
+      if (std::abs(d[axis]) > 0.8) color[axis] += std::copysign(1.0, d[axis]);
+    return color;
   };
   for (const bool vertical : {true, false}) {
     const EnvironmentMap map = load(cross(vertical, 32, painted, glm::vec3(0))).environment;
@@ -263,8 +250,7 @@ TEST_F(PictureFormats, TheCornersOfACrossDoNotCount) {
   expect_even(lighting, glm::vec3(1));
   ASSERT_EQ(lighting.report.notes.size(), 2u);
   EXPECT_THAT(lighting.report.notes[0], HasSubstr("1 of 1536 pixels"));
-  EXPECT_THAT(refusal(LinearPicture{4, 3, std::vector<glm::vec3>(12, glm::vec3(0.5f))}),
-              HasSubstr("accepted"));
+  EXPECT_EQ(refusal(LinearPicture{4, 3, std::vector<glm::vec3>(12, glm::vec3(0.5f))}), "");
 }
 
 TEST_F(PictureFormats, OtherShapesAreRefusedWithARemedy) {

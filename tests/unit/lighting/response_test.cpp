@@ -1,6 +1,5 @@
 #include "daemon/lighting/response.hpp"
 
-#include "drivers/error.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::lighting::response_test {

@@ -4,7 +4,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "daemon/lighting/lighting.hpp"
-#include "drivers/error.hpp"
+#include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"
 
@@ -62,16 +62,6 @@ TEST(Room, WhatStandsBetweenHides) {
   EXPECT_THROW(Room({}, glm::dvec3(0)), Error);
 }
 
-struct WallLamp {
-  glm::dvec3 place{0};
-  double radius_m = 0;
-};
-
-// A disc on the wall where a ray from `seen_from` meets it, painted by distance along the wall.
-WallLamp lamp_on_wall(const glm::dvec3& seen_from, const glm::dvec3& direction, double radius_m) {
-  return {seen_from + distance_in_box(seen_from, direction) * direction, radius_m};
-}
-
 struct SeenLamp {
   double flux = 0;
   glm::dvec3 direction{0};
@@ -79,14 +69,12 @@ struct SeenLamp {
 
 SeenLamp lamp_in(const EnvironmentMap& map, double ambient) {
   SeenLamp seen;
-  for (int j = 0; j < map.size; ++j) {
-    for (int i = 0; i < map.size; ++i) {
-      const double above = map.radiance[static_cast<std::size_t>(j * map.size + i)].g - ambient;
-      if (above < 1) continue;
-      seen.flux += above * texel_sr(map.size);
-      seen.direction += above * glm::dvec3(texel_direction(map.size, i, j));
-    }
-  }
+  for_each_texel(map, [&](const glm::dvec3& direction, const glm::dvec3& radiance) {
+    const double above = radiance.g - ambient;
+    if (above < 1) return;
+    seen.flux += above * texel_sr(map.size);
+    seen.direction += above * direction;
+  });
   seen.direction = glm::normalize(seen.direction);
   return seen;
 }
@@ -96,25 +84,23 @@ SeenLamp lamp_in(const EnvironmentMap& map, double ambient) {
 TEST(Parallax, ALampIsWhereTheSetSeesIt) {
   constexpr double ambient = 0.2, radiance = 300;
   const glm::dvec3 seen_from(0.0, 0.0, 0.3), camera_place(1.6, -0.9, 0.2);
-  LightCameraCalibration camera = test::fisheye_camera(256);
-  camera.world_from_camera = test::looking(10, 90);
+  LightCameraCalibration camera = test::fisheye_camera(256, test::looking(10, 90));
   camera.world_from_camera[3] = glm::dvec4(camera_place, 1);
   for (const glm::dvec3& direction :
        {test::towards(-30, 50), test::towards(160, 40), test::towards(60, 75)}) {
-    const WallLamp lamp = lamp_on_wall(seen_from, direction, 0.25);
+    // A disc on the wall where a ray from `seen_from` meets it, painted by distance along the wall.
+    const glm::dvec3 lamp = seen_from + distance_in_box(seen_from, direction) * direction;
     const auto sky_from = [&](const glm::dvec3& from) {
       return [&lamp, from](const glm::dvec3& d) {
         const glm::dvec3 hit = from + distance_in_box(from, d) * d;
-        return glm::dvec3(glm::distance(hit, lamp.place) < lamp.radius_m ? radiance : ambient);
+        return glm::dvec3(glm::distance(hit, lamp) < 0.25 ? radiance : ambient);
       };
     };
     std::vector<FramePtr> frames;
     for (const double exposure : {1.0 / 512, 1.0})
       frames.push_back(
           test::photograph(camera, sky_from(camera_place), exposure, test::Detail::fine));
-    set::Lighting settings;
-    settings.unseen = set::UnseenRule::constant;
-    settings.unseen_radiance = glm::dvec3(ambient);
+    const set::Lighting settings = test::unseen_as(set::UnseenRule::constant, ambient);
     const SeenLamp far = lamp_in(estimate(frames, camera, settings).environment, ambient);
     const SeenLamp near =
         lamp_in(estimate(frames, camera, settings, box_room(seen_from)).environment, ambient);
@@ -135,15 +121,12 @@ TEST(Parallax, ALampIsWhereTheSetSeesIt) {
 }
 
 TEST(Parallax, AUniformRoomIsUniform) {
-  LightCameraCalibration camera = test::fisheye_camera(128);
-  camera.world_from_camera = test::looking(0, 90);
+  const LightCameraCalibration camera = test::fisheye_camera(128, test::looking(0, 90));
   const FramePtr frame = test::photograph(
       camera, [](const glm::dvec3&) { return glm::dvec3(1, 2, 3); }, 0.25);
   for (const auto rule : {set::UnseenRule::horizon, set::UnseenRule::mirror}) {
-    set::Lighting settings;
-    settings.unseen = rule;
     const Lighting lighting =
-        estimate({&frame, 1}, camera, settings, box_room(glm::dvec3(1, 1, 0.5)));
+        estimate({&frame, 1}, camera, test::unseen_as(rule), box_room(glm::dvec3(1, 1, 0.5)));
     for (const glm::vec3& radiance : lighting.environment.radiance)
       ASSERT_LT(glm::length(radiance - glm::vec3(1, 2, 3)), 2e-4f);
   }

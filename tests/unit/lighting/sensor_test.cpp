@@ -23,23 +23,18 @@ TEST(Vignetting, LeastIlluminationIsTheLeastOfManyAngles) {
 
 // A lens that darkens towards its edge, a sensor that shows light in the dark: the sky as it is.
 TEST(Estimate, UndoesVignettingAndDarkLevel) {
-  LightCameraCalibration camera = test::fisheye_camera(128);
-  camera.world_from_camera = test::looking(30, 90);
+  LightCameraCalibration camera = test::fisheye_camera(128, test::looking(30, 90));
   camera.vignetting = {-0.12, 0.01, -0.002};
   camera.dark_level = {0.03, 0.02, 0.04};
   const glm::dvec3 radiance(1, 2, 3);
   const double exposure = 0.25;
   const Fisheye lens(camera.intrinsics);
-  std::vector<glm::dvec3> signals;
-  for (int y = 0; y < 128; ++y) {
-    for (int x = 0; x < 128; ++x) {
-      const auto ray = lens.unproject({x, y});
-      const double falloff =
-          ray ? relative_illumination(camera.vignetting, std::acos(glm::normalize(*ray).z)) : 0;
-      signals.push_back(exposure * falloff * radiance + camera.dark_level);
-    }
-  }
-  const FramePtr frame = test::make_frame(128, 128, exposure, signals);
+  const FramePtr frame = test::make_frame(128, 128, exposure, [&](int x, int y) {
+    const auto ray = lens.unproject({x, y});
+    const double falloff =
+        ray ? relative_illumination(camera.vignetting, std::acos(glm::normalize(*ray).z)) : 0;
+    return exposure * falloff * radiance + camera.dark_level;
+  });
   const Lighting lighting = estimate({&frame, 1}, camera, {});
   for (const glm::vec3& texel : lighting.environment.radiance)  // half a code is 3e-5
     ASSERT_LT(glm::length(glm::dvec3(texel) - radiance), 3e-4);
@@ -53,12 +48,11 @@ HdrPicture clipped_square(int size, int side) {
                      std::vector<glm::vec3>(pixels, glm::vec3(0.2f)),
                      std::vector<std::uint8_t>(pixels),
                      {}};
-  for (int y = 8; y < 8 + side; ++y) {
+  for (int y = 8; y < 8 + side; ++y)
     for (int x = 8; x < 8 + side; ++x) {
       picture.radiance[static_cast<std::size_t>(y * size + x)] = glm::vec3(2, 2, 1);
       picture.flags[static_cast<std::size_t>(y * size + x)] = overexposed;
     }
-  }
   return picture;
 }
 
@@ -87,8 +81,7 @@ TEST(ExpandClipped, IsBoundedKeepsColourAndTouchesNothingElse) {
 
 // P5: one exposure only, a lamp that clips it; the report says how much the light is a guess.
 TEST(Estimate, ExpandsWhatOneExposureClipsAndSaysSo) {
-  LightCameraCalibration camera = test::fisheye_camera(256);
-  camera.world_from_camera = test::looking(0, 90);
+  const LightCameraCalibration camera = test::fisheye_camera(256, test::looking(0, 90));
   const glm::dvec3 lamp = test::towards(0, 60);
   constexpr double radius = 6 * degree, white = 1;
   const test::Sky sky = [&](const glm::dvec3& d) {

@@ -9,7 +9,6 @@
 #include "daemon/print/tag_cells.hpp"
 #include "daemon/print/tags.hpp"
 #include "daemon/tracking/tag_detector.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -40,20 +39,11 @@ std::vector<Frame> pages_of(const std::filesystem::path& pdf) {
   std::vector<Frame> pages;
   for (const std::filesystem::path& file : files) {
     const cv::Mat picture = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
-    Frame frame;
-    frame.width = picture.cols, frame.height = picture.rows;
-    frame.format = PixelFormat::gray8;
-    frame.bytes.assign(picture.data, picture.data + picture.total());
-    pages.push_back(std::move(frame));
+    pages.push_back(
+        test::gray_frame(picture.cols, picture.rows, {picture.datastart, picture.dataend}));
     std::filesystem::remove(file);
   }
   return pages;
-}
-
-ResponseCurve no_curve() {
-  ResponseCurve curve;
-  curve.kind = ResponseCurve::Kind::linear;
-  return curve;
 }
 
 std::vector<tracking::TagDetection> tags_in(const Frame& page, const std::string& family) {
@@ -61,14 +51,14 @@ std::vector<tracking::TagDetection> tags_in(const Frame& page, const std::string
   tracking::DetectorSettings settings;
   settings.family = family;
   settings.max_hamming = 0;
-  return tracking::TagDetector(settings, flat, no_curve()).detect(page, 1);
+  return tracking::TagDetector(settings, flat, test::linear_response).detect(page, 1);
 }
 
 double side_mm(const tracking::TagDetection& tag, std::size_t side) {
   return glm::distance(tag.corners[side], tag.corners[(side + 1) % 4]) / px_per_mm;
 }
 
-class Print : public ::testing::Test {
+class Print : public testing::Test {
  protected:
   void SetUp() override {
     if (std::system("pdftocairo -v >/dev/null 2>&1") != 0)
@@ -156,7 +146,7 @@ TEST_F(Print, AStickHasFourTagsAround) {
 void expect_board(const Frame& page, const std::string& text) {
   const calibrate::Board board = calibrate::parse_board(text);
   const calibrate::KnownLens lens = test::plain_lens(page.width, page.height, page.width);
-  const auto found = calibrate::make_board_finder(board, no_curve(), lens)->find(page);
+  const auto found = calibrate::make_board_finder(board, test::linear_response, lens)->find(page);
   ASSERT_EQ(found.ids.size(), board.points.size()) << text;
   for (std::size_t i = 1; i < found.ids.size(); ++i) {
     const glm::dvec3 at =
@@ -185,7 +175,8 @@ TEST_F(Print, KalibrsBoardHasItsForm) {
   const auto found = pages({draw_board(calibrate::parse_board(text), text)}, "A4");
   ASSERT_EQ(found.size(), 1u);
   expect_board(found[0], plain);
-  const auto finder = calibrate::make_board_finder(calibrate::parse_board(plain), no_curve());
+  const auto finder =
+      calibrate::make_board_finder(calibrate::parse_board(plain), test::linear_response);
   EXPECT_EQ(finder->find(found[0]).ids.size(), 4u * 12u);
   EXPECT_EQ(finder->form(), "the tags have a black border of two cells, squares at the corners");
 }
@@ -196,10 +187,8 @@ TEST_F(Print, WhatIsLargerThanThePaperIsCutIntoTiles) {
   const Drawing drawing = draw_board(calibrate::parse_board(text), text);
   const auto found = pages({drawing}, "A4");
   ASSERT_EQ(found.size(), 4u);
-  Frame whole;
-  whole.width = int(drawing.width * px_per_mm), whole.height = int(drawing.height * px_per_mm);
-  whole.format = PixelFormat::gray8;
-  whole.bytes.assign(std::size_t(whole.width) * std::size_t(whole.height), 255);
+  Frame whole = test::gray_frame(int(drawing.width * px_per_mm), int(drawing.height * px_per_mm));
+  std::ranges::fill(whole.bytes, std::uint8_t{255});
   for (std::size_t page = 0; page < found.size(); ++page) {
     const Placed& placed = sheets[page].placed[0];
     const Rectangle& window = placed.window;
@@ -234,38 +223,35 @@ TEST_F(Print, TheRulerIsAsLongAsItSays) {
   EXPECT_NEAR(ticks.back() - ticks.front(), 100, 1 / px_per_mm);
 }
 
-template <typename Action>
-std::string refused(const Action& action) {
-  return test::error_of([&] { action(); });
-}
-
 TEST(PrintRefusals, SayWhatIsPossible) {
   std::ostringstream out;
   TagOptions tags;
   tags.ids = "0-3", tags.size = "80";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("size \"80\""));
+  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("size \"80\""));
   tags.size = "1mm";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("needs 3.2 mm or more"));
+  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("needs 3.2 mm or more"));
   tags.size = "80mm", tags.ids = "3-1";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("ids \"3-1\""));
+  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("ids \"3-1\""));
   tags.ids = "587";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("it has 0 to 586"));
+  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("it has 0 to 586"));
   tags.ids = "0", tags.family = "tag99";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("known: tag36h11"));
+  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("known: tag36h11"));
   tags.family = "tag36h11", tags.paper = "A5";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("known: A4, A3, Letter"));
+  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("known: A4, A3, Letter"));
   tags.paper = "A4", tags.size = "3m";
-  EXPECT_THAT(refused([&] { print_tags(tags, out); }), HasSubstr("sheets of A4; at most 64"));
+  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }),
+              HasSubstr("sheets of A4; at most 64"));
   tags.size = "80mm", tags.ids = "1,2,3";
-  EXPECT_THAT(refused([&] { print_block(tags, out); }), HasSubstr("5 or 6 tags"));
-  EXPECT_THAT(refused([&] { print_stick(tags, out); }), HasSubstr("rings of four tags"));
+  EXPECT_THAT(test::error_of([&] { print_block(tags, out); }), HasSubstr("5 or 6 tags"));
+  EXPECT_THAT(test::error_of([&] { print_stick(tags, out); }), HasSubstr("rings of four tags"));
   BoardOptions board;
   board.board = "charuco:7x5:30mm:22mm:9x9_100";
-  EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("not a marker dictionary"));
+  EXPECT_THAT(test::error_of([&] { print_board(board, out); }),
+              HasSubstr("not a marker dictionary"));
   board.board = "aprilgrid:3x3:40mm:5mm:tagStandard41h12";
-  EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("gap of 32 mm or more"));
+  EXPECT_THAT(test::error_of([&] { print_board(board, out); }), HasSubstr("gap of 32 mm or more"));
   board.board = "aprilgrid:3x3:40mm:7mm:kalibr";  // a white cell about each of ten cells of 4 mm
-  EXPECT_THAT(refused([&] { print_board(board, out); }), HasSubstr("gap of 8 mm or more"));
+  EXPECT_THAT(test::error_of([&] { print_board(board, out); }), HasSubstr("gap of 8 mm or more"));
 }
 
 TEST(PrintReport, SaysWhatIsInTheFile) {
@@ -275,7 +261,7 @@ TEST(PrintReport, SaysWhatIsInTheFile) {
   std::ostringstream out;
   print_tags(tags, out);
   EXPECT_THAT(out.str(), HasSubstr("tags.pdf: 12 tags tag36h11 0-11, 80 mm, on 6 sheets of A4\n"));
-  EXPECT_THAT(session::read_file(tags.file), ::testing::StartsWith("%PDF-"));
+  EXPECT_THAT(session::read_file(tags.file), StartsWith("%PDF-"));
 }
 
 }  // namespace previz::print::print_test

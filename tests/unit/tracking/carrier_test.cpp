@@ -1,11 +1,8 @@
 // Carriers: things with tags that are moved by hand, on pictures whose poses the test knows.
 #include <glm/gtc/matrix_transform.hpp>
-#include <opencv2/core.hpp>
 
 #include "daemon/tracking/carrier_pose.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/pose_error.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::carrier_test {
@@ -40,9 +37,7 @@ glm::dmat4 placed(const glm::dvec3& position, double tilt_rad) {
 TEST(Carriers, AreFoundWhereTheyAre) {
   Held held;
   held.world_from_tray = placed({-0.02, -0.25, 0.08}, 0.3);
-  std::mt19937 random(1);
-  const auto tracker = make_apriltag_tracker(held.settings, held.scene.lens);
-  const Track track = tracker->track(picture(held.seen(), random));
+  const Track track = track_once(held.settings, held.seen(), 1);
   ASSERT_EQ(track.status, TrackStatus::tracked) << track.reason;
   EXPECT_EQ(track.pose->tags, (std::vector<int>{0, 1, 2}));
   EXPECT_EQ(track.seen_tags, (std::vector<int>{0, 1, 2, 10, 11}));
@@ -86,9 +81,7 @@ TEST(Carriers, CovarianceHoldsOnPictures) {
 
 TEST(Carriers, ThatAreNotInThePictureAreNotGuessed) {
   const Held held;
-  std::mt19937 random(2);
-  const auto tracker = make_apriltag_tracker(held.settings, held.scene.lens);
-  const Track track = tracker->track(picture(held.scene, random));
+  const Track track = track_once(held.settings, held.scene, 2);
   EXPECT_EQ(track.status, TrackStatus::tracked);
   ASSERT_EQ(track.carriers.size(), 1u);
   EXPECT_FALSE(track.carriers[0].pose);
@@ -101,9 +94,7 @@ TEST(Carriers, DoNotFindTheCamera) {
   held.world_from_tray = placed({-0.02, -0.25, 0.08}, 0.3);
   TagScene seen = held.seen();
   seen.tags.erase(seen.tags.begin(), seen.tags.begin() + 3);
-  std::mt19937 random(3);
-  const auto tracker = make_apriltag_tracker(held.settings, held.scene.lens);
-  const Track track = tracker->track(picture(seen, random));
+  const Track track = track_once(held.settings, seen, 3);
   EXPECT_EQ(track.status, TrackStatus::lost);
   EXPECT_EQ(track.reason, "no tag of this set in the picture");
   EXPECT_FALSE(track.carriers[0].pose);
@@ -112,12 +103,9 @@ TEST(Carriers, DoNotFindTheCamera) {
 TEST(Carriers, TagsAreInTheSetOnce) {
   Held held;
   held.settings.carriers.push_back({"stick", {flat_tag(1, 0.06, {0, 0, 0})}});
-  try {
-    make_apriltag_tracker(held.settings, held.scene.lens);
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("tag 1 of \"stick\""));
-  }
+  const std::string refusal =
+      test::error_of([&] { make_apriltag_tracker(held.settings, held.scene.lens); });
+  EXPECT_THAT(refusal, HasSubstr("tag 1 of \"stick\""));
 }
 
 // By hand: a camera 1 m along the carrier's Z turns by w about X. The carrier turns as much, and

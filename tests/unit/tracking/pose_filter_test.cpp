@@ -2,10 +2,7 @@
 // the tags are covered for a moment.
 #include "daemon/tracking/pose_filter.hpp"
 
-#include <opencv2/core.hpp>
-
 #include "tests/support/pose_error.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::pose_filter_test {
@@ -73,6 +70,13 @@ double step_size(const glm::dmat4& a, const glm::dmat4& b) {
   return std::sqrt(cv::norm(error_between(a, b), cv::NORM_L2SQR));
 }
 
+// Whether a pose is within what the filter calls no surprise; small angles: sin(x) = x to 1e-6
+// here.
+void expect_no_surprise(const std::array<double, 36>& covariance, const glm::dmat4& from,
+                        const glm::dmat4& to) {
+  EXPECT_LE(square_in_sigmas(covariance, from, to), pose_surprise * (1 + 1e-3));
+}
+
 // After two seconds of rest a pose is the mean of many: what is left of the jitter from frame to
 // frame is a small part of what the poses have.
 TEST(PoseFilter, ACameraAtRestIsCalm) {
@@ -132,10 +136,9 @@ TEST(PoseFilter, OtherTagsMakeNoJump) {
     const Track track = shoot.track({1}, bias);
     const ShownPose expected = *shoot.filter.expected(shoot.time_ns);
     const glm::dmat4 shown = shoot.show(track)->world_from_camera;
-    EXPECT_LE(square_in_sigmas(expected.covariance, expected.world_from_camera, shown),
-              pose_surprise * (1 + 1e-3))
-        << i;
-    EXPECT_LT(step_size(last, shown), 0.2 * std::sqrt(bias.dot(bias))) << i;
+    SCOPED_TRACE(i);
+    expect_no_surprise(expected.covariance, expected.world_from_camera, shown);
+    EXPECT_LT(step_size(last, shown), 0.2 * std::sqrt(bias.dot(bias)));
     last = shown;
   }
   const PoseError left = error_between(moved(shoot.at, bias), last);
@@ -153,8 +156,7 @@ TEST(PoseFilter, AMotionIsNotLaidToAMapThatFits) {
     shoot.at = moved(shoot.at, {0, 8 * sigma_rad, 0, 8 * sigma_m, 0, 0});
     const Track track = shoot.track(tags);
     const glm::dmat4 shown = shoot.show(track)->world_from_camera;
-    EXPECT_LE(square_in_sigmas(track.pose->covariance, shown, track.pose->world_from_camera),
-              pose_surprise * (1 + 1e-3));
+    expect_no_surprise(track.pose->covariance, shown, track.pose->world_from_camera);
   }
 }
 
@@ -166,9 +168,7 @@ TEST(PoseFilter, AWorsePoseCountsLess) {
     const Track track = shoot.track({2}, {}, 10);
     const ShownPose expected = *shoot.filter.expected(shoot.time_ns);
     const ShownPose shown = *shoot.show(track);
-    EXPECT_LE(
-        square_in_sigmas(expected.covariance, expected.world_from_camera, shown.world_from_camera),
-        pose_surprise * (1 + 1e-3));
+    expect_no_surprise(expected.covariance, expected.world_from_camera, shown.world_from_camera);
     EXPECT_LT(step_size(shoot.at, shown.world_from_camera), 3 * sigma_m);
   }
 }
@@ -177,7 +177,6 @@ TEST(PoseFilter, AWorsePoseCountsLess) {
 TEST(PoseFilter, HoldsWhileTheTagsAreCovered) {
   Shoot shoot;
   shoot.rest(50);
-  double last_s = 0;
   int held = 0;
   for (int i = 1; i <= 20; ++i) {
     const std::optional<ShownPose> pose = shoot.show(shoot.lost());
@@ -186,8 +185,6 @@ TEST(PoseFilter, HoldsWhileTheTagsAreCovered) {
     if (!pose) continue;
     ++held;
     EXPECT_NEAR(pose->held_s, 1e-9 * i * kFrameNs, 1e-12);
-    EXPECT_GT(pose->held_s, last_s);
-    last_s = pose->held_s;
     EXPECT_LT(square_in_sigmas(pose->covariance, pose->world_from_camera, shoot.at), 22.5) << i;
   }
   EXPECT_EQ(held, 12);
@@ -205,16 +202,13 @@ TEST(PoseFilter, GoesOnWithAMotionWhileItIsLikely) {
     shoot.show(shoot.track());
   }
   const glm::dmat4 before = shoot.at;
-  int held = 0;
   for (int i = 0; i < 2; ++i) {
     shoot.at = moved(shoot.at, step);
     const std::optional<ShownPose> pose = shoot.show(shoot.lost());
-    if (!pose) continue;
-    ++held;
+    ASSERT_TRUE(pose);
     // The velocity fades with 0.25 s: of 0.08 s at most a sixth of the way is missing.
     EXPECT_LT(step_size(pose->world_from_camera, shoot.at), 0.25 * step_size(before, shoot.at));
   }
-  EXPECT_EQ(held, 2);
 }
 
 // A camera that was swung may be anywhere soon: it is given up before one that stood.
@@ -237,9 +231,8 @@ TEST(PoseFilter, ACutBeginsAnew) {
   shoot.rest(20);
   shoot.at = camera_looking({-0.4, -0.5, 0.5}, {0.02, 0.03, 0});
   Track cut = shoot.track();
-  EXPECT_LE(square_in_sigmas(cut.pose->covariance, shoot.show(cut)->world_from_camera,
-                             cut.pose->world_from_camera),
-            pose_surprise * 1.001);
+  expect_no_surprise(cut.pose->covariance, shoot.show(cut)->world_from_camera,
+                     cut.pose->world_from_camera);
   // So does a pause, after which the last pose says nothing.
   shoot.time_ns += 2'000'000'000;
   EXPECT_FALSE(shoot.show(shoot.lost()));

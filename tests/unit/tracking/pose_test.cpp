@@ -1,10 +1,8 @@
 // The joint pose on corners made by the test: exact recovery, covariance, moved tags, two poses.
 #include <glm/gtc/matrix_transform.hpp>
-#include <glm/gtc/quaternion.hpp>
-#include <opencv2/core.hpp>
 
 #include "daemon/tracking/joint_pose.hpp"
-#include "tests/support/test.hpp"
+#include "tests/support/pose_error.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::tracking::pose_test {
@@ -40,19 +38,10 @@ double distance_m(const FittedPose& fit, const glm::dmat4& truth) {
   return glm::distance(glm::dvec3(world_from_camera(fit.pose)[3]), glm::dvec3(truth[3]));
 }
 
-double normalised_error(const FittedPose& fit, const glm::dmat4& truth) {
-  const glm::dmat4 d = glm::inverse(world_from_camera(fit.pose)) * truth;
-  glm::dquat q = glm::normalize(glm::quat_cast(glm::dmat3(d)));
-  if (q.w < 0) q = -q;
-  const glm::dvec3 w = glm::axis(q) * glm::angle(q);
-  const cv::Matx<double, 6, 1> e(w.x, w.y, w.z, d[3][0], d[3][1], d[3][2]);
-  return e.dot(cv::Matx<double, 6, 6>(fit.covariance.data()).solve(e, cv::DECOMP_SVD));
-}
-
 // Rounding alone: 1e-9 m at 1 m, at every scale and 1 km from the origin.
 TEST(TrackingPose, ExactCornersGiveTheExactPose) {
   std::mt19937 random(1);
-  for (double scale : {1e-3, 1.0, 1e3}) {
+  for (double scale : {1e-3, 1.0, 1e3})
     for (double offset : {0.0, 1000.0}) {
       TagScene scene = three_tags();
       for (set::Tag& tag : scene.tags) {
@@ -69,7 +58,6 @@ TEST(TrackingPose, ExactCornersGiveTheExactPose) {
       EXPECT_LT(distance_m(poses[0], scene.world_from_camera), tolerance);
       EXPECT_EQ(poses[0].used.size(), 3u);
     }
-  }
 }
 
 // The normalised error squared of n trials has mean 6 and standard error sqrt(12/n). The covariance
@@ -83,7 +71,8 @@ TEST(TrackingPose, CovarianceHolds) {
     for (int t = 0; t < trials; ++t) {
       const auto poses = solve_joint_pose(observe(scene, sigma, random), scene.lens, {});
       ASSERT_FALSE(poses.empty());
-      sum += normalised_error(poses[0], scene.world_from_camera);
+      sum += square_in_sigmas(poses[0].covariance, world_from_camera(poses[0].pose),
+                              scene.world_from_camera);
     }
     const double spread = 3 * std::sqrt(12.0 / trials);
     EXPECT_LT(sum / trials, 6 + spread) << sigma;

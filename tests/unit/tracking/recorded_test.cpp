@@ -1,6 +1,5 @@
 // Trackers that take no pictures: the poses of a recorded track, by the times of frames.
 #include "daemon/tracking/trackers.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::tracking::recorded_test {
@@ -58,12 +57,8 @@ TEST(RecordedTracker, FindsTheLinesOfLoopedFrames) {
 }
 
 TEST(MakeTracker, SaysWhereRecordedPosesAreMissing) {
-  try {
-    make_tracker(without_tags(), {}, nullptr);
-    FAIL() << "a track without poses was taken";
-  } catch (const Error& error) {
-    EXPECT_EQ(std::string(error.what()).find("stage.toml: tracking.enabled: "), 0u) << error.what();
-  }
+  EXPECT_THAT(test::error_of([] { make_tracker(without_tags(), {}, nullptr); }),
+              StartsWith("stage.toml: tracking.enabled: "));
 }
 
 }  // namespace previz::tracking::recorded_test

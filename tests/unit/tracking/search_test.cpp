@@ -2,7 +2,6 @@
 // the whole picture shows.
 #include "daemon/tracking/search_plan.hpp"
 #include "daemon/tracking/tag_detector.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::search_test {
@@ -154,7 +153,7 @@ TEST(SearchInParts, FollowsAsTheWholePictureDoes) {
     EXPECT_LT(distance(track.pose->world_from_camera, whole.pose->world_from_camera),
               0.1 * translation_sigma(*whole.pose));
     for (const int id : track.seen_tags) {
-      EXPECT_NE(std::ranges::find(whole.seen_tags, id), whole.seen_tags.end()) << id;
+      EXPECT_THAT(whole.seen_tags, Contains(id));
       if (id == 7 && i > 0) strangers.insert(i);
     }
   }
@@ -186,8 +185,8 @@ TEST(SearchInParts, FindsWhatEnters) {
     for (int i = 0; i < sweep_pictures; ++i, ++index) {
       const Track track = tracker->track(at_time(after, index));
       ASSERT_TRUE(track.pose);
-      EXPECT_NE(std::ranges::find(track.pose->tags, 4), track.pose->tags.end()) << i;
-      found |= std::ranges::find(track.seen_tags, 7) != track.seen_tags.end();
+      EXPECT_THAT(track.pose->tags, Contains(4)) << i;
+      found |= std::ranges::count(track.seen_tags, 7) > 0;
     }
     EXPECT_TRUE(found) << size;
   }

@@ -1,17 +1,13 @@
 // The whole tracker on pictures made by the test: poses, formats, loss. Extremes: tests/extremes.
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "drivers/error.hpp"
-#include "tests/support/test.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::tracker_test {
 
 TEST(Tracker, FindsTheCameraFromAllTags) {
   const TagScene scene = table();
-  std::mt19937 random(1);
-  const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
-  const Track track = tracker->track(picture(scene, random));
+  const Track track = track_once(settings_for(scene), scene, 1);
   ASSERT_EQ(track.status, TrackStatus::tracked) << track.reason;
   EXPECT_EQ(track.pose->tags, (std::vector<int>{0, 1, 2}));
   EXPECT_EQ(track.seen_tags, (std::vector<int>{0, 1, 2}));
@@ -29,9 +25,7 @@ TEST(Tracker, ReadsEveryPixelFormat) {
   const TagScene scene = table();
   for (PixelFormat format : {PixelFormat::rgb8, PixelFormat::rgb16, PixelFormat::gray8,
                              PixelFormat::gray16, PixelFormat::yuv422p8}) {
-    std::mt19937 random(1);
-    const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
-    const Track track = tracker->track(picture(scene, random, 20000, format));
+    const Track track = track_once(settings_for(scene), scene, 1, format);
     ASSERT_EQ(track.status, TrackStatus::tracked) << to_string(format) << track.reason;
     EXPECT_LT(distance(track.pose->world_from_camera, scene.world_from_camera), 0.003)
         << to_string(format);
@@ -45,9 +39,7 @@ TEST(Tracker, KnowsTheFamiliesOfTheLibrary) {
     TagScene scene = table();
     scene.family = family;
     for (set::Tag& tag : scene.tags) tag.size_m = 0.06;
-    std::mt19937 random(2);
-    const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
-    const Track track = tracker->track(picture(scene, random));
+    const Track track = track_once(settings_for(scene), scene, 2);
     ASSERT_EQ(track.status, TrackStatus::tracked) << family << ": " << track.reason;
     EXPECT_EQ(track.pose->tags.size(), 3u) << family << ": " << track.reason;
     EXPECT_LT(distance(track.pose->world_from_camera, scene.world_from_camera), 0.003) << family;
@@ -56,23 +48,18 @@ TEST(Tracker, KnowsTheFamiliesOfTheLibrary) {
 
 TEST(Tracker, RefusesWhatCannotBe) {
   const TagScene scene = table();
-  const auto refusal = [&](const set::Tracking& settings, const PinholeIntrinsics& lens) {
-    try {
-      make_apriltag_tracker(settings, lens);
-    } catch (const Error& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+  const auto refusal = [&](const set::Tracking& settings) {
+    return test::error_of([&] { make_apriltag_tracker(settings, scene.lens); });
   };
   set::Tracking settings = settings_for(scene);
   settings.family = "tag99";
-  EXPECT_THAT(refusal(settings, scene.lens), HasSubstr("tag36h11"));
+  EXPECT_THAT(refusal(settings), HasSubstr("tag36h11"));
   settings = settings_for(scene);
   settings.tags[1].id = 0;
-  EXPECT_THAT(refusal(settings, scene.lens), HasSubstr("twice"));
+  EXPECT_THAT(refusal(settings), HasSubstr("twice"));
   settings = settings_for(scene);
   settings.tags[1].size_m = 0;
-  EXPECT_THAT(refusal(settings, scene.lens), HasSubstr("size"));
+  EXPECT_THAT(refusal(settings), HasSubstr("size"));
 }
 
 TEST(Tracker, SaysWhyItIsLost) {
@@ -120,11 +107,9 @@ TEST(Tracker, LeavesOutTagsCutByTheBorder) {
 TEST(Tracker, ReportsAMovedTag) {
   TagScene scene = table();
   scene.tags.push_back(flat_tag(3, 0.08, {0.05, 0.2, 0}, 1.0));
-  const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
   TagScene moved = scene;
   moved.tags[1] = flat_tag(1, 0.08, {0.2, -0.01, 0}, 0.45);
-  std::mt19937 random(5);
-  const Track track = tracker->track(picture(moved, random));
+  const Track track = track_once(settings_for(scene), moved, 5);
   ASSERT_EQ(track.status, TrackStatus::tracked) << track.reason;
   EXPECT_EQ(track.pose->tags, (std::vector<int>{0, 2, 3}));
   EXPECT_THAT(track.reason, HasSubstr("tag 1: not where the set file says"));
@@ -136,9 +121,7 @@ TEST(Tracker, TwoTagsAtOddsAreNotGuessedAbout) {
   scene.tags.pop_back();
   TagScene moved = scene;
   moved.tags[1] = flat_tag(1, 0.08, {0.17, 0.05, 0}, 0.7);
-  std::mt19937 random(6);
-  const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
-  const Track track = tracker->track(picture(moved, random));
+  const Track track = track_once(settings_for(scene), moved, 6);
   EXPECT_EQ(track.status, TrackStatus::lost);
   EXPECT_THAT(track.reason, HasSubstr("disagree"));
 }
@@ -195,7 +178,7 @@ TEST(Tracker, PicturesOfAnySizeAndContent) {
   for (const auto& [w, h] :
        {std::pair(1, 1), std::pair(2, 3), std::pair(7, 5), std::pair(15, 40), std::pair(16, 16),
         std::pair(17, 19), std::pair(33, 31), std::pair(101, 67), std::pair(400, 3)}) {
-    for (double decimate : {1.0, 2.0, 3.0}) {
+    for (double decimate : {1.0, 2.0, 3.0})
       for (PixelFormat format : {PixelFormat::rgb8, PixelFormat::gray8, PixelFormat::gray16}) {
         TagScene scene = table();
         scene.lens = test::plain_lens(w, h, 100);
@@ -210,7 +193,6 @@ TEST(Tracker, PicturesOfAnySizeAndContent) {
           EXPECT_EQ(tracker->track(frame).status, TrackStatus::lost);
         }
       }
-    }
   }
 }
 
@@ -219,10 +201,7 @@ TEST(Tracker, NoiseHoldsNoTags) {
   std::uniform_int_distribution<int> byte(0, 255);
   TagScene scene = table();
   const auto tracker = make_apriltag_tracker(settings_for(scene), scene.lens);
-  Frame frame;
-  frame.width = scene.lens.width, frame.height = scene.lens.height;
-  frame.format = PixelFormat::gray8;
-  frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
+  Frame frame = test::gray_frame(scene.lens.width, scene.lens.height);
   for (int i = 0; i < 5; ++i) {
     for (std::uint8_t& b : frame.bytes) b = std::uint8_t(byte(random));
     EXPECT_TRUE(tracker->track(frame).seen_tags.empty());

@@ -2,7 +2,6 @@
 #include "daemon/trade/axes.hpp"
 
 #include "daemon/render/feature.hpp"
-#include "drivers/error.hpp"
 #include "shaders/lib/render_shared.h"
 #include "tests/support/test.hpp"
 
@@ -67,7 +66,7 @@ TEST(TradeAxes, TheFeaturesOfTheSceneDecideWhichThereAre) {
     return all;
   };
   const auto has = [](const std::vector<std::string>& all, const char* name) {
-    return std::ranges::find(all, name) != all.end();
+    return std::ranges::count(all, name) > 0;
   };
   TradeSettings own;
   EXPECT_TRUE(has(names(own, gpu::FEATURE_PHOTONS), "caustics"));

@@ -8,14 +8,13 @@ namespace previz::trade::measure_test {
 // Left half uncovered, right half covered; every channel the same.
 TradePicture made_up(float uncovered_added, float covered_shown, int width = 16, int height = 16) {
   TradePicture picture{width, height, {}, {}, {}};
-  for (int y = 0; y < height; ++y) {
+  for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
       const bool covered = 2 * x >= width;
       picture.mask.push_back(covered ? 1.0f : 0.0f);
       picture.added.emplace_back(covered ? covered_shown : uncovered_added);
       picture.shown.emplace_back(covered ? covered_shown : 1 + uncovered_added);
     }
-  }
   return picture;
 }
 

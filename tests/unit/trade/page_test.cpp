@@ -2,7 +2,6 @@
 #include "daemon/trade/page.hpp"
 
 #include "daemon/trade/chart.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/test.hpp"
 

@@ -2,7 +2,6 @@
 #include "daemon/trade/trade.hpp"
 
 #include "daemon/set/load.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -12,6 +11,8 @@ namespace previz::trade::trade_test {
 
 class Trade : public testing::Test {
  protected:
+  Trade() { test::write_small_take(directory_.path()); }
+
   // 32x24, as little as a sweep can be.
   TradeOptions options() const {
     TradeOptions options;
@@ -23,13 +24,15 @@ class Trade : public testing::Test {
     options.reference_samples = 16;
     return options;
   }
-  void expect_refused(const TradeOptions& refused, const std::string& words) {
-    try {
-      run_trade(refused, out_);
-      ADD_FAILURE() << "not refused: " << words;
-    } catch (const Error& error) {
-      EXPECT_THAT(error.what(), HasSubstr(words));
-    }
+  // Trades with options_; out_ has what this one said.
+  TradeReport trade() {
+    out_.str("");
+    return run_trade(options_, out_);
+  }
+  void expect_refused(const std::function<void(TradeOptions&)>& change, const std::string& words) {
+    options_ = options();
+    change(options_);
+    EXPECT_THAT(test::error_of([&] { trade(); }), HasSubstr(words));
   }
   void rewrite_set(const std::string& from, const std::string& to) {
     std::string text = session::read_file(directory_ / "set.toml");
@@ -38,12 +41,12 @@ class Trade : public testing::Test {
     std::ofstream(directory_ / "set.toml") << text;
   }
   test::TemporaryDirectory directory_;
+  TradeOptions options_ = options();
   std::ostringstream out_;
 };
 
 TEST_F(Trade, SweepsAndWritesTableAndPage) {
-  test::write_small_take(directory_.path());
-  const TradeReport report = run_trade(options(), out_);
+  const TradeReport report = trade();
   EXPECT_EQ(report.frame, 1u);  // frame 0 has no light yet
   EXPECT_EQ(report.width, 32);
   EXPECT_EQ(report.height, 24);
@@ -73,21 +76,17 @@ TEST_F(Trade, SweepsAndWritesTableAndPage) {
 // back. A plate of independent pixels of standard deviation s, averaged by fours and enlarged, is
 // off by about s itself: far more than any noise of the render.
 TEST_F(Trade, AHalfSizedPictureStaysOff) {
-  test::write_small_take(directory_.path());
-  TradeOptions only = options();
-  only.axes = {"resolution"};
-  const TradeReport report = run_trade(only, out_);
+  options_.axes = {"resolution"};
+  const TradeReport report = trade();
   ASSERT_EQ(report.plan.methods[1].name, "resolution half");
   EXPECT_GT(report.methods[1].bias->value, 0.1);
   EXPECT_EQ(report.methods[0].bias->value, 0.0);
 }
 
 TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
-  test::write_small_take(directory_.path());
-  TradeOptions only = options();
-  only.axes = {"parts"};
-  only.rounds = 1;
-  const TradeReport report = run_trade(only, out_);
+  options_.axes = {"parts"};
+  options_.rounds = 1;
+  const TradeReport report = trade();
   std::vector<std::string> carried;
   for (const TradeMethod& method : report.methods) {
     if (!method.changed_pixels) continue;
@@ -104,12 +103,10 @@ TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
 }
 
 TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
-  test::write_small_take(directory_.path());
-  TradeOptions asking = options();
-  asking.answers = true;
-  asking.fps = 2;
-  asking.error = 0.5;
-  const TradeReport report = run_trade(asking, out_);
+  options_.answers = true;
+  options_.fps = 2;
+  options_.error = 0.5;
+  const TradeReport report = trade();
   ASSERT_EQ(report.answers.size(), 3u);
   for (const TradeAnswer& answer : report.answers) {
     SCOPED_TRACE(answer.use + ": " + answer.words + "\n" + answer.toml);
@@ -133,7 +130,6 @@ TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
 }
 
 TEST_F(Trade, TakesASessionOrTheNewestTakeOfALiveSet) {
-  test::write_small_take(directory_.path());
   const auto frame_of = [](const TradeSource& source) { return TradeFrame(source, {}).index(); };
   EXPECT_EQ(frame_of({directory_ / "session"}), 1u);
   EXPECT_EQ(frame_of({directory_ / "session", directory_ / "set.toml"}), 1u);
@@ -152,51 +148,37 @@ TEST_F(Trade, SharesAreWrittenInTwoWays) {
 }
 
 TEST_F(Trade, RefusesWhatCannotBeTraded) {
-  test::write_small_take(directory_.path());
-  TradeOptions wrong = options();
-  wrong.frame = test::small_take_lost;
-  expect_refused(wrong, "frame 3: pose lost");
-  wrong.frame = test::small_take_unlit;
-  expect_refused(wrong, "frame 0: no light frame");
-  wrong.frame = 80;
-  expect_refused(wrong, "the last frame is 7");
-  for (const double scale : {0.0, 1.5, std::nan("")}) {
-    wrong = options();
-    wrong.scale = scale;
-    expect_refused(wrong, "must be above 0 and at most 1");
-  }
-  wrong = options();
-  wrong.directory = directory_ / "set.toml";
-  expect_refused(wrong, "is not a folder");
-  wrong = options();
-  wrong.axes = {"colour"};
-  expect_refused(wrong, "--axes colour: unknown axis; estimator, ");
-  wrong = options();
-  wrong.samples = {0};
-  expect_refused(wrong, "--samples 0: must be from 1");
+  expect_refused([](auto& o) { o.frame = test::small_take_lost; }, "frame 3: pose lost");
+  expect_refused([](auto& o) { o.frame = test::small_take_unlit; }, "frame 0: no light frame");
+  expect_refused([](auto& o) { o.frame = 80; }, "the last frame is 7");
+  for (const double scale : {0.0, 1.5, std::nan("")})
+    expect_refused([&](auto& o) { o.scale = scale; }, "must be above 0 and at most 1");
+  expect_refused([&](auto& o) { o.directory = directory_ / "set.toml"; }, "is not a folder");
+  expect_refused([](auto& o) { o.axes = {"colour"}; }, "--axes colour: unknown axis; estimator, ");
+  expect_refused([](auto& o) { o.samples = {0}; }, "--samples 0: must be from 1");
 }
 
 TEST_F(Trade, RefusesASetWithoutAReplayedCamera) {
-  test::write_small_take(directory_.path());
   rewrite_set("driver = \"replay\"\ndevice = \"session\"", "driver = \"none\"");
-  expect_refused(options(), "observer: a trade needs a take; ");
+  expect_refused([](auto&) {}, "observer: a trade needs a take; ");
 }
 
 TEST_F(Trade, RefusesAPictureWithNothingVirtualInIt) {
-  test::write_small_take(directory_.path(), false);
-  TradeOptions none = options();
-  none.reference_samples = 2;
-  expect_refused(none, "nothing virtual");
+  const test::TemporaryDirectory bare;
+  test::write_small_take(bare.path(), false);
+  const auto of_bare_take = [&](TradeOptions& options) {
+    options.source.set_or_session = bare / "set.toml";
+    options.reference_samples = 2;
+  };
+  expect_refused(of_bare_take, "nothing virtual");
 }
 
 // A page of what is known by then: the reference at least.
 TEST_F(Trade, AStopLeavesWhatIsKnown) {
-  test::write_small_take(directory_.path());
   std::stop_source stop;
   stop.request_stop();
-  TradeOptions stopped = options();
-  stopped.stop = stop.get_token();
-  const TradeReport report = run_trade(stopped, out_);
+  options_.stop = stop.get_token();
+  const TradeReport report = trade();
   EXPECT_TRUE(report.interrupted);
   const std::string page = session::read_file(report.page);
   EXPECT_THAT(page, HasSubstr("It was stopped before it had ended"));
@@ -207,12 +189,10 @@ TEST_F(Trade, AStopLeavesWhatIsKnown) {
 
 // Whatever the time, the set's own settings are measured and judged; the rest is named.
 TEST_F(Trade, TakesTheTimeThatItIsGiven) {
-  test::write_small_take(directory_.path());
-  TradeOptions hurried = options();
-  hurried.minutes = 1e-3;
-  hurried.answers = true;
-  hurried.fps = 1e-3;
-  const TradeReport report = run_trade(hurried, out_);
+  options_.minutes = 1e-3;
+  options_.answers = true;
+  options_.fps = 1e-3;
+  const TradeReport report = trade();
   EXPECT_FALSE(report.interrupted);
   ASSERT_FALSE(report.methods.front().points.empty());
   EXPECT_EQ(report.unmeasured.size(), report.methods.size() - 1);
@@ -233,12 +213,9 @@ TEST_F(Trade, TakesTheTimeThatItIsGiven) {
 // The second trade of the same frame and set measures only what the first did not: no method, and
 // with a reference that is whole no sample of it. Another depth is another picture.
 TEST_F(Trade, GoesOnFromItsLastTable) {
-  test::write_small_take(directory_.path());
-  TradeOptions once = options();
-  once.rounds = 1;
-  const TradeReport first = run_trade(once, out_);
-  out_.str("");
-  const TradeReport second = run_trade(once, out_);
+  options_.rounds = 1;
+  const TradeReport first = trade();
+  const TradeReport second = trade();
   EXPECT_THAT(out_.str(), HasSubstr("continuing the last table"));
   EXPECT_THAT(out_.str(), Not(HasSubstr("round 1 of 1")));
   EXPECT_EQ(second.reference_samples, first.reference_samples);
@@ -249,34 +226,28 @@ TEST_F(Trade, GoesOnFromItsLastTable) {
                 first.methods[m].points[i].errors.picture);
     }
 
-  once.rounds = 2;
-  *once.reference_samples *= 2;
-  out_.str("");
-  const TradeReport third = run_trade(once, out_);
+  options_.rounds = 2;
+  *options_.reference_samples *= 2;
+  const TradeReport third = trade();
   EXPECT_EQ(third.reference_samples, 2 * first.reference_samples);
   EXPECT_THAT(out_.str(), Not(HasSubstr("round 1 of 2")));
   EXPECT_THAT(out_.str(), HasSubstr("round 2 of 2"));
 
   rewrite_set("[quality]", "[estimator]\nmax_depth = 3\n\n[quality]");
-  out_.str("");
-  run_trade(once, out_);
+  trade();
   EXPECT_THAT(out_.str(), HasSubstr("measuring everything again"));
   EXPECT_THAT(out_.str(), HasSubstr("round 1 of 2"));
 }
 
 TEST_F(Trade, ADamagedMemoryIsSaidAndNotUsed) {
-  test::write_small_take(directory_.path());
-  TradeOptions once = options();
-  once.rounds = 1;
-  run_trade(once, out_);
+  options_.rounds = 1;
+  trade();
   const std::filesystem::path reference = directory_ / "out" / "reference.bin";
   std::filesystem::resize_file(reference, std::filesystem::file_size(reference) / 2);
-  out_.str("");
-  run_trade(once, out_);
+  trade();
   EXPECT_THAT(out_.str(), HasSubstr("it ends early; measuring everything again"));
   std::ofstream(directory_ / "out" / "trade.json") << "{]";
-  out_.str("");
-  EXPECT_NO_THROW(run_trade(once, out_));
+  EXPECT_NO_THROW(trade());
   EXPECT_THAT(out_.str(), HasSubstr("measuring everything again"));
 }
 
