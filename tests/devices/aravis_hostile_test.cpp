@@ -24,7 +24,6 @@
 #include "drivers/aravis/receiver_process.hpp"
 #include "drivers/camera_drivers.hpp"
 #include "drivers/descriptor.hpp"
-#include "drivers/error.hpp"
 #include "drivers/lifeline.hpp"
 #include "tests/devices/hostile_network.hpp"
 #include "tests/support/test.hpp"

@@ -4,7 +4,6 @@
 #include <arv.h>
 
 #include "drivers/camera_drivers.hpp"
-#include "drivers/error.hpp"
 #include "tests/devices/private_network.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

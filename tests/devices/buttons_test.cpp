@@ -7,7 +7,6 @@
 #include "drivers/button_queue.hpp"
 #include "drivers/debouncer.hpp"
 #include "drivers/descriptor.hpp"
-#include "drivers/error.hpp"
 #include "drivers/gpio/gpio_buttons.hpp"
 #include "drivers/hid/backend.hpp"
 #include "drivers/hid/hid_buttons.hpp"

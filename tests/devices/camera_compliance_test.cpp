@@ -1,6 +1,5 @@
 // Every camera driver must pass these tests, whatever device stands behind it; see
 // drivers/camera.hpp.
-#include "drivers/error.hpp"
 #include "tests/devices/device_under_test.hpp"
 #include "tests/support/test.hpp"
 

@@ -6,7 +6,6 @@
 
 #include "drivers/display_drivers.hpp"
 #include "drivers/display_lifeline.hpp"
-#include "drivers/error.hpp"
 #ifdef PREVIZ_WITH_KMS
 #include "drivers/kms/modes.hpp"
 #include "drivers/plate.hpp"

@@ -1,5 +1,4 @@
 // The V4L2 driver on a stand-in for the kernel: what it makes of the rate that a set asks for.
-#include "drivers/error.hpp"
 #include "drivers/v4l2/v4l2_camera.hpp"
 #include "tests/devices/v4l2_fake_node.hpp"
 #include "tests/support/test.hpp"

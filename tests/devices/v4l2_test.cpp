@@ -1,6 +1,5 @@
 // The V4L2 driver on a stand-in for the kernel: what is agreed, and what malformed buffers do. On
 // real nodes it runs in the compliance suite.
-#include "drivers/error.hpp"
 #include "drivers/v4l2/find.hpp"
 #include "drivers/v4l2/formats.hpp"
 #include "drivers/v4l2/v4l2_camera.hpp"

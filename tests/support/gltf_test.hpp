@@ -4,7 +4,6 @@
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

@@ -1,6 +1,5 @@
 #include "drivers/bracket.hpp"
 
-#include "drivers/error.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::bracket_test {

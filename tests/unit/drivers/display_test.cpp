@@ -3,7 +3,6 @@
 
 #include "drivers/display_drivers.hpp"
 #include "drivers/display_lifeline.hpp"
-#include "drivers/error.hpp"
 #include "drivers/gles/placement.hpp"
 #include "drivers/headless/headless_display.hpp"
 #include "drivers/plate.hpp"

@@ -1,6 +1,5 @@
 #include "drivers/faults.hpp"
 
-#include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"

@@ -1,4 +1,3 @@
-#include "drivers/error.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/test.hpp"

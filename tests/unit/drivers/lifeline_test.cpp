@@ -1,7 +1,6 @@
 // A device that comes and goes, in a time that passes only when somebody sleeps.
 #include "drivers/lifeline.hpp"
 
-#include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"

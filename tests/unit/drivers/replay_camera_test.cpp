@@ -1,5 +1,4 @@
 #include "drivers/replay/replay_camera.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 

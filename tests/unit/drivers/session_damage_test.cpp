@@ -6,7 +6,6 @@ extern "C" {
 #include <libavformat/avformat.h>
 }
 
-#include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"

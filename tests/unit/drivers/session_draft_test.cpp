@@ -6,7 +6,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

@@ -1,7 +1,6 @@
 // A damaged session is written anew as far as it is whole, and stays as it is itself.
 #include "drivers/session/repair.hpp"
 
-#include "drivers/error.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 

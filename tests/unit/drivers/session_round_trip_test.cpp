@@ -1,4 +1,3 @@
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/crc32.hpp"
 #include "drivers/session/session.hpp"

@@ -1,6 +1,5 @@
 #include "drivers/session/session_toml.hpp"
 #include "drivers/calibration/pose.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::session::session_toml_test {

@@ -2,7 +2,6 @@
 #include "daemon/post/check.hpp"
 #include "daemon/set/table.hpp"
 #include "daemon/tracking/apriltag_tracker.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

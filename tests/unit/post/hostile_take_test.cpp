@@ -7,7 +7,6 @@
 #include "daemon/output/salvage.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/post/takes.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/summary.hpp"
 #include "tests/support/small_take.hpp"

@@ -7,7 +7,6 @@
 #include "daemon/pipeline/take_shots.hpp"
 #include "daemon/post/render.hpp"
 #include "daemon/scene/load.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"

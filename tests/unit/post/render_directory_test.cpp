@@ -10,7 +10,6 @@
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/post/render.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"

@@ -8,7 +8,6 @@
 #include "daemon/output/png.hpp"
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/rig/live.hpp"
-#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -6,7 +6,6 @@
 #include "daemon/post/render_folder.hpp"
 #include "daemon/post/render_takes.hpp"
 #include "daemon/post/take_copy.hpp"
-#include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"

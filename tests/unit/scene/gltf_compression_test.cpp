@@ -1,8 +1,6 @@
 // Compressed glTF meshes against the same meshes uncompressed, and what is refused of them.
 #include <meshoptimizer.h>
 
-#include <glm/vec4.hpp>
-
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/gltf_test.hpp"
 

@@ -9,7 +9,6 @@
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/placement.hpp"
 #include "daemon/scene/scene.hpp"
-#include "drivers/error.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/gltf_sample.hpp"

@@ -2,8 +2,6 @@
 // shaders and the renderer take from it.
 #include "daemon/scene/material_extensions.hpp"
 
-#include <bit>
-
 #include "daemon/render/feature.hpp"
 #include "tests/support/gltf_test.hpp"
 

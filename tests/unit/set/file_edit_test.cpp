@@ -1,7 +1,6 @@
 // Values that are changed in a set file's text, and what stays as it was.
 #include "daemon/set/file_edit.hpp"
 
-#include "drivers/error.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::set::file_edit_test {

@@ -3,7 +3,6 @@
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/set/table.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::set::reference_test {

@@ -2,7 +2,6 @@
 #include "daemon/set/load.hpp"
 #include "daemon/set/pose.hpp"
 #include "daemon/set/set.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
