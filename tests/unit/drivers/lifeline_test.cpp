@@ -1,7 +1,6 @@
 // A device that comes and goes, in a time that passes only when somebody sleeps.
 #include "drivers/lifeline.hpp"
 
-#include "drivers/error.hpp"
 #include "drivers/replay/replay_camera.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
@@ -33,10 +32,22 @@ class LifelineTest : public testing::Test {
     return [this] { return open_replay(directory_ / "take", "observer", replay_, clock()); };
   }
 
-  Lifeline started(CameraOpener open) {
-    Lifeline lifeline("observer", std::move(open), options, clock());
+  Lifeline started(CameraOpener open, LifelineHooks hooks = {}) {
+    Lifeline lifeline("observer", std::move(open), options, clock(), std::move(hooks));
     lifeline.start();
     return lifeline;
+  }
+  // Of a device with faults.
+  Lifeline started(CameraOpener open, std::vector<Fault> plan, LifelineHooks hooks = {}) {
+    return started(with_faults(std::move(open), std::move(plan), clock()), std::move(hooks));
+  }
+  // Which keeps the times of its attempts, and has no device before a time.
+  CameraOpener take_from(milliseconds begin) {
+    return [=, this]() -> std::unique_ptr<Camera> {
+      attempts_ms_.push_back(static_cast<int>(elapsed().count()));
+      if (elapsed() < begin) throw Error("is not there");
+      return take()();
+    };
   }
 
   milliseconds elapsed() const {
@@ -64,6 +75,7 @@ class LifelineTest : public testing::Test {
   test::TemporaryDirectory directory_;
   ReplayOptions replay_;
   HostClock::Time now_{};
+  std::vector<int> attempts_ms_;
 };
 
 TEST_F(LifelineTest, ADeviceThatIsWellIsJustACamera) {
@@ -80,22 +92,17 @@ TEST_F(LifelineTest, ADeviceThatIsWellIsJustACamera) {
 
 // Attempts at 0, 250, 750, 1750, 3750, 7750 ms, and from then on every 4 s.
 TEST_F(LifelineTest, AnAbsentDeviceIsTriedEverLessOftenAndToldOnce) {
-  std::vector<int> attempts_ms;
-  Lifeline lifeline = started([&]() -> std::unique_ptr<Camera> {
-    attempts_ms.push_back(static_cast<int>(elapsed().count()));
-    if (elapsed() < milliseconds(12'000)) throw Error("is not there");
-    return take()();
-  });
+  Lifeline lifeline = started(take_from(milliseconds(12'000)));
   EXPECT_EQ(story(lifeline, milliseconds(17'000)),
             " [is not there; retrying until it is available] f");
-  EXPECT_EQ(attempts_ms, (std::vector<int>{0, 250, 750, 1750, 3750, 7750, 11'750, 15'750}));
+  EXPECT_EQ(attempts_ms_, (std::vector<int>{0, 250, 750, 1750, 3750, 7750, 11'750, 15'750}));
   EXPECT_EQ(lifeline.counters().at("not opened"), 7u);
   EXPECT_EQ(lifeline.counters().at("back-offs"), 7u);
   EXPECT_EQ(lifeline.counters().at("returned"), 0u);
 }
 
 TEST_F(LifelineTest, ADeviceThatNeverStartsIsOpenedAnew) {
-  Lifeline lifeline = started(with_faults(take(), {{Kind::stall, 0}}, clock()));
+  Lifeline lifeline = started(take(), {{Kind::stall, 0}});
   EXPECT_EQ(story(lifeline, milliseconds(6000)),
             " [sends no frame within 5000 ms of its start; reopening it] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 2u);
@@ -103,7 +110,7 @@ TEST_F(LifelineTest, ADeviceThatNeverStartsIsOpenedAnew) {
 }
 
 TEST_F(LifelineTest, AStalledDeviceIsToldThenLostThenBack) {
-  Lifeline lifeline = started(with_faults(take(), {{Kind::stall, 20}}, clock()));
+  Lifeline lifeline = started(take(), {{Kind::stall, 20}});
   std::vector<DeviceState> states;
   for (int i = 0; i < 60; ++i) {
     lifeline.next(milliseconds(100));
@@ -118,14 +125,13 @@ TEST_F(LifelineTest, AStalledDeviceIsToldThenLostThenBack) {
 
 TEST_F(LifelineTest, AStallThatEndsByItselfIsNotGivenUp) {
   // 60 frames of 40 ms are 2.4 s: longer than the stall time-out, shorter than the patience.
-  Lifeline lifeline = started(with_faults(take(), {{Kind::drop, 20, 60}}, clock()));
+  Lifeline lifeline = started(take(), {{Kind::drop, 20, 60}});
   EXPECT_EQ(story(lifeline, milliseconds(6000)), "f [has sent nothing for 2000 ms] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 1u);
 }
 
 TEST_F(LifelineTest, ALostDeviceIsPickedUpWhenItIsBack) {
-  Lifeline lifeline =
-      started(with_faults(take(), {{Kind::disconnect, 20, 1, std::chrono::seconds(3)}}, clock()));
+  Lifeline lifeline = started(take(), {{Kind::disconnect, 20, 1, std::chrono::seconds(3)}});
   EXPECT_EQ(story(lifeline, milliseconds(9000)),
             "f [was unplugged; reopening it] "
             " [the device is unplugged; retrying until it is available] f");
@@ -133,7 +139,7 @@ TEST_F(LifelineTest, ALostDeviceIsPickedUpWhenItIsBack) {
 }
 
 TEST_F(LifelineTest, TroubleOfOneFrameIsPassedOn) {
-  Lifeline lifeline = started(with_faults(take(), {{Kind::corrupt, 3}}, clock()));
+  Lifeline lifeline = started(take(), {{Kind::corrupt, 3}});
   EXPECT_EQ(story(lifeline, milliseconds(1000)), "f [frame 103 is damaged and skipped] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 1u);
 }
@@ -148,12 +154,12 @@ TEST_F(LifelineTest, TheEndOfATakeIsTheEnd) {
 TEST_F(LifelineTest, ADeviceMayComeBackWithAnotherFormat) {
   session::write_small_session(directory_ / "other", 10, 40, 30);
   int opened = 0;
-  Lifeline lifeline = started(with_faults(
+  Lifeline lifeline = started(
       [&] {
         const char* name = opened++ == 0 ? "take" : "other";
         return open_replay(directory_ / name, "observer", replay_, clock());
       },
-      {{Kind::disconnect, 5, 1, milliseconds(0)}}, clock()));
+      {{Kind::disconnect, 5, 1, milliseconds(0)}});
   for (int i = 0; i < 30; ++i) {
     const CameraEvent event = lifeline.next(milliseconds(100));
     const auto* frame = std::get_if<FramePtr>(&event);
@@ -205,47 +211,40 @@ TEST_F(LifelineTest, AnExposureThatCannotBeSetKeepsNoDeviceFromBeingOpened) {
 
 TEST_F(LifelineTest, SequenceNumbersIncreaseOverAllOpenings) {
   std::uint64_t openings = 0;
-  Lifeline lifeline = started(with_faults(
+  Lifeline lifeline = started(
       [&] {
         replay_.position = std::make_shared<ReplayPosition>();  // counts from the beginning again
         ++openings;
         return open_replay(directory_ / "take", "observer", replay_, clock());
       },
-      {{Kind::disconnect, 5, 1, milliseconds(0)}}, clock()));
+      {{Kind::disconnect, 5, 1, milliseconds(0)}});
   std::vector<std::uint64_t> sequences;
   while (sequences.size() < 12) {
     const CameraEvent event = lifeline.next(milliseconds(100));
     if (const auto* frame = std::get_if<FramePtr>(&event)) sequences.push_back((*frame)->sequence);
   }
   EXPECT_EQ(openings, 2u);
-  for (std::size_t i = 1; i < sequences.size(); ++i)
-    EXPECT_EQ(sequences[i], sequences[i - 1] + 1) << i;
+  std::vector<std::uint64_t> expected(sequences.size());
+  std::iota(expected.begin(), expected.end(), sequences.front());
+  EXPECT_EQ(sequences, expected);
 }
 
 TEST_F(LifelineTest, ADeviceThatIsPluggedInIsNotKeptWaiting) {
-  std::vector<int> attempts_ms;
   std::uint64_t arrivals = 3;
-  Lifeline lifeline("observer",
-                    [&]() -> std::unique_ptr<Camera> {
-                      attempts_ms.push_back(static_cast<int>(elapsed().count()));
-                      if (elapsed() < milliseconds(5100)) throw Error("is not there");
-                      return take()();
-                    },
-                    options, clock(), {[&] { return arrivals; }, {}});
-  lifeline.start();
+  Lifeline lifeline =
+      started(take_from(milliseconds(5100)), LifelineHooks{[&] { return arrivals; }, {}});
   story(lifeline, milliseconds(5000));
   arrivals = 4;  // its node follows 100 ms later
   EXPECT_EQ(story(lifeline, milliseconds(6000)), "f");
-  EXPECT_EQ(attempts_ms, (std::vector<int>{0, 250, 750, 1750, 3750, 5000, 5250}));
+  EXPECT_EQ(attempts_ms_, (std::vector<int>{0, 250, 750, 1750, 3750, 5000, 5250}));
 }
 
 TEST_F(LifelineTest, ADeviceThatIsSilentIsResetBeforeItIsOpenedAnew) {
   for (const char* why_not : {"", "Access denied"}) {
     now_ = {};
     replay_.position = std::make_shared<ReplayPosition>();
-    Lifeline lifeline("observer", with_faults(take(), {{Kind::stall, 5}}, clock()), options,
-                      clock(), {{}, [&] { return std::optional<std::string>(why_not); }});
-    lifeline.start();
+    Lifeline lifeline = started(take(), {{Kind::stall, 5}},
+                                {{}, [&] { return std::optional<std::string>(why_not); }});
     const std::string said = *why_not
                                  ? "is stalled; it cannot be reset (Access denied); reopening it"
                                  : "is stalled; it was reset; reopening it";
@@ -257,9 +256,8 @@ TEST_F(LifelineTest, ADeviceThatIsSilentIsResetBeforeItIsOpenedAnew) {
 
 // It says itself that it is gone: there is nothing to reset.
 TEST_F(LifelineTest, ADeviceThatIsPulledIsNotReset) {
-  Lifeline lifeline("observer", with_faults(take(), {{Kind::disconnect, 5}}, clock()), options,
-                    clock(), {{}, [] { return std::optional<std::string>(""); }});
-  lifeline.start();
+  Lifeline lifeline =
+      started(take(), {{Kind::disconnect, 5}}, {{}, [] { return std::optional<std::string>(""); }});
   EXPECT_EQ(story(lifeline, milliseconds(2000)), "f [was unplugged; reopening it] f");
   EXPECT_EQ(lifeline.counters().at("reset"), 0u);
 }

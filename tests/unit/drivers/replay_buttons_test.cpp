@@ -2,7 +2,6 @@
 
 #include <poll.h>
 
-#include "drivers/error.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 

@@ -1,5 +1,4 @@
 #include "drivers/replay/replay_camera.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 
@@ -8,27 +7,33 @@ namespace previz::replay_camera_test {
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 
-// Time that passes only when somebody sleeps.
-struct HeldTime {
-  HostClock::Time now{};
-  HostClock clock() {
-    return {[this] { return now; }, [this](HostClock::Time time) { now = std::max(now, time); }};
-  }
-};
-
 class Replay : public testing::Test {
  protected:
   void SetUp() override { session::write_small_session(take(), 5); }
-  std::filesystem::path take() const { return directory_.path() / "take"; }
-  std::unique_ptr<Camera> open(const ReplayOptions& options) {
-    auto camera = open_replay(take(), "observer", options, time_.clock());
+  std::filesystem::path take() const { return directory_ / "take"; }
+  std::unique_ptr<Camera> open(const ReplayOptions& options, const char* session = "take") {
+    auto camera = open_replay(directory_ / session, "observer", options, clock());
     camera->start();
     return camera;
   }
-  nanoseconds elapsed() const { return time_.now - HostClock::Time{}; }
+  // Time passes only when somebody sleeps.
+  HostClock clock() {
+    return {[this] { return now_; }, [this](HostClock::Time time) { now_ = std::max(now_, time); }};
+  }
+  nanoseconds elapsed() const { return now_ - HostClock::Time{}; }
+
+  // The next event is this frame of the take.
+  static void expect_frame(Camera& camera, milliseconds timeout, int index) {
+    const CameraEvent event = camera.next(timeout);
+    ASSERT_TRUE(std::holds_alternative<FramePtr>(event)) << index;
+    EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), index)) << index;
+  }
+  static void expect_end(Camera& camera) {
+    EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera.next(milliseconds(100))));
+  }
 
   test::TemporaryDirectory directory_;
-  HeldTime time_;
+  HostClock::Time now_{};
 };
 
 constexpr std::int64_t interval_ns = 40'000'003;  // of session::noise_frame
@@ -36,13 +41,11 @@ constexpr std::int64_t interval_ns = 40'000'003;  // of session::noise_frame
 TEST_F(Replay, DeliversEveryFrameInOrderAtItsTime) {
   const auto camera = open({});
   for (int i = 0; i < 5; ++i) {
-    const CameraEvent event = camera->next(milliseconds(100));
-    ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
-    EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), i));
+    expect_frame(*camera, milliseconds(100), i);
     EXPECT_EQ(elapsed(), nanoseconds(i * interval_ns));
   }
-  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(100))));
-  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(100))));
+  expect_end(*camera);
+  expect_end(*camera);
   EXPECT_FALSE(camera->set_exposure(0.01, 1));
   EXPECT_EQ(camera->name(), (take() / "observer").string());
 }
@@ -72,20 +75,16 @@ TEST_F(Replay, AShortWaitEndsWithoutAFrame) {
     EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(milliseconds(10))));
     EXPECT_EQ(elapsed(), milliseconds(10 * i));
   }
-  const CameraEvent event = camera->next(milliseconds(10));
-  ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
-  EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), 1));
+  expect_frame(*camera, milliseconds(10), 1);
   EXPECT_EQ(elapsed(), nanoseconds(interval_ns));
 }
 
 TEST_F(Replay, ALateReaderGetsEveryFrameAtOnce) {
   const auto camera = open({});
   camera->next(milliseconds(0));
-  time_.now += std::chrono::seconds(9);
+  now_ += std::chrono::seconds(9);
   for (int i = 1; i < 5; ++i) {
-    const CameraEvent event = camera->next(milliseconds(0));
-    ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
-    EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), i));
+    expect_frame(*camera, milliseconds(0), i);
   }
   EXPECT_EQ(elapsed(), std::chrono::seconds(9));
 }
@@ -95,9 +94,8 @@ TEST_F(Replay, ARangeOfFrames) {
   options.first = 1;
   options.last = 3;
   const auto camera = open(options);
-  for (int i = 1; i <= 3; ++i)
-    EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(camera->next(milliseconds(100))), i));
-  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(100))));
+  for (int i = 1; i <= 3; ++i) expect_frame(*camera, milliseconds(100), i);
+  expect_end(*camera);
   EXPECT_EQ(elapsed(), nanoseconds(2 * interval_ns));
 }
 
@@ -120,7 +118,7 @@ TEST_F(Replay, LoopsWithoutATimeJump) {
 
 TEST_F(Replay, StreamsShareAnOrigin) {
   ReplayOptions options;
-  options.origin = {time_.now + milliseconds(500),
+  options.origin = {now_ + milliseconds(500),
                     session::noise_frame("", 0, PixelFormat::rgb8, 1, 1).timestamp_ns};
   const auto camera = open(options);
   EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(milliseconds(499))));
@@ -131,12 +129,10 @@ TEST_F(Replay, StreamsShareAnOrigin) {
 // Whatever the recorded times are: a call waits no longer than it is asked to, frames come in the
 // order they were recorded in, and the first one is there at once.
 TEST_F(Replay, AbsurdTimesDoNoHarm) {
-  const std::filesystem::path odd = directory_.path() / "odd";
   {
-    session::SessionWriter writer(odd, {});
+    session::SessionWriter writer(directory_ / "odd", {});
     std::uint64_t sequence = 100;
-    for (const std::int64_t time : {std::numeric_limits<std::int64_t>::max(), std::int64_t{0},
-                                    std::numeric_limits<std::int64_t>::min()}) {
+    for (const std::int64_t time : {INT64_MAX, std::int64_t{0}, INT64_MIN}) {
       Frame frame = session::noise_frame("observer", 0, PixelFormat::gray8, 16, 16);
       frame.sequence = sequence++;
       frame.timestamp_ns = frame.arrival_ns = time;
@@ -147,8 +143,7 @@ TEST_F(Replay, AbsurdTimesDoNoHarm) {
     ReplayOptions options;
     options.speed = speed;
     options.loop = true;
-    const auto camera = open_replay(odd, "observer", options, time_.clock());
-    camera->start();
+    const auto camera = open(options, "odd");
     std::uint64_t frames = 0;
     for (int i = 0; i < 9; ++i) {
       const nanoseconds before = elapsed();
@@ -219,21 +214,19 @@ TEST_F(Replay, FramesWhileStoppedAreMissed) {
   camera->next(milliseconds(100));
   camera->stop();
   EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(milliseconds(100))));
-  time_.now += nanoseconds(2 * interval_ns + 1);
+  now_ += nanoseconds(2 * interval_ns + 1);
   camera->start();
-  const CameraEvent event = camera->next(milliseconds(100));
-  ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
-  EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), 3));
+  expect_frame(*camera, milliseconds(100), 3);
   EXPECT_EQ(elapsed(), nanoseconds(3 * interval_ns));
 }
 
 TEST_F(Replay, AReopenedDeviceGoesOnWhereItIsByThen) {
   ReplayOptions options;
   options.loop = true;
-  options.origin = {time_.now, session::noise_frame("", 0, PixelFormat::rgb8, 1, 1).timestamp_ns};
+  options.origin = {now_, session::noise_frame("", 0, PixelFormat::rgb8, 1, 1).timestamp_ns};
   options.position = std::make_shared<ReplayPosition>();
   open(options)->next(milliseconds(100));
-  time_.now += nanoseconds(1000 * 5 * interval_ns + interval_ns / 2);  // a thousand laps
+  now_ += nanoseconds(1000 * 5 * interval_ns + interval_ns / 2);  // a thousand laps
   const FramePtr frame = std::get<FramePtr>(open(options)->next(milliseconds(100)));
   EXPECT_EQ(frame->sequence, 100u + 5001);
   EXPECT_EQ(elapsed(), nanoseconds(5001 * interval_ns));
@@ -243,9 +236,8 @@ TEST_F(Replay, AtSpeedZeroNothingIsMissed) {
   ReplayOptions options;
   options.speed = 0;
   options.position = std::make_shared<ReplayPosition>();
-  for (int i = 0; i < 5; ++i)
-    EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(open(options)->next(milliseconds(0))), i));
-  EXPECT_TRUE(std::holds_alternative<EndOfStream>(open(options)->next(milliseconds(0))));
+  for (int i = 0; i < 5; ++i) expect_frame(*open(options), milliseconds(0), i);
+  expect_end(*open(options));
 }
 
 TEST_F(Replay, WrongOptionsAreErrors) {
@@ -256,7 +248,7 @@ TEST_F(Replay, WrongOptionsAreErrors) {
   options.first = 5;
   EXPECT_THROW(open(options), Error);
   EXPECT_THROW(open_replay(take(), "light"), Error);
-  EXPECT_THROW(open_replay(directory_.path() / "nowhere", "observer"), Error);
+  EXPECT_THROW(open_replay(directory_ / "nowhere", "observer"), Error);
 }
 
 }  // namespace previz::replay_camera_test
