@@ -104,19 +104,14 @@ TEST(Reports, AnEventIsLoggedEachTimeWithItsNumber) {
   for (int i = 1; i <= 23; ++i)
     reports(counted({Severity::error, "observer", "ended by signal " + std::to_string(4 + i % 2)}));
   reports(counted({Severity::error, "light camera", "ended by signal 5"}));
-  std::vector<std::string> lines;
-  std::istringstream in(out.str());
-  for (std::string line; std::getline(in, line);) lines.push_back(line);
-  ASSERT_EQ(lines.size(), 24u);
-  EXPECT_EQ(lines[0], "observer: ended by signal 5");
-  EXPECT_EQ(lines[1], "observer: ended by signal 4, the 2nd time in this run");
-  EXPECT_EQ(lines[2], "observer: ended by signal 5, the 3rd time in this run");
-  EXPECT_EQ(lines[3], "observer: ended by signal 4, the 4th time in this run");
-  EXPECT_EQ(lines[10], "observer: ended by signal 5, the 11th time in this run");
-  EXPECT_EQ(lines[12], "observer: ended by signal 5, the 13th time in this run");
-  EXPECT_EQ(lines[20], "observer: ended by signal 5, the 21st time in this run");
-  EXPECT_EQ(lines[22], "observer: ended by signal 5, the 23rd time in this run");
-  EXPECT_EQ(lines[23], "light camera: ended by signal 5");
+  const std::string lines = out.str();
+  EXPECT_EQ(std::ranges::count(lines, '\n'), 24);
+  EXPECT_THAT(lines, StartsWith("observer: ended by signal 5\n"));
+  for (const char* time : {"4, the 2nd", "5, the 3rd", "4, the 4th", "5, the 11th", "5, the 13th",
+                           "5, the 21st", "5, the 23rd"})
+    EXPECT_THAT(lines, HasSubstr("\nobserver: ended by signal " + std::string(time) +
+                                 " time in this run\n"));
+  EXPECT_THAT(lines, testing::EndsWith("\nlight camera: ended by signal 5\n"));
 }
 
 TEST(Reports, AStateIsLoggedFirstAndThenAtTheTenthHundredthAndThousandthTime) {

@@ -3,7 +3,6 @@
 #include "daemon/set/load.hpp"
 #include "daemon/set/pose.hpp"
 #include "daemon/set/set.hpp"
-#include "drivers/error.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/support/test.hpp"
 

@@ -2,7 +2,6 @@
 #include "daemon/set/load.hpp"
 #include "daemon/set/pose.hpp"
 #include "daemon/set/set.hpp"
-#include "drivers/error.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
@@ -17,6 +16,11 @@ void expect_near(const glm::dvec4& actual, const glm::dvec4& expected, double to
 
 Set parse(const std::string& text) {
   return parse_set(text, "folder/stage.toml");
+}
+
+// The only tag of a set, with these keys.
+Tag tag_of(const std::string& keys) {
+  return parse("[[tag]]\nid = 1\n" + keys).tracking.tags.at(0);
 }
 
 TEST(SetValues, EmptyFileIsTheDefaults) {
@@ -204,9 +208,8 @@ TEST(SetValues, SetsOfSessionsNameFilesOfTheirOwnFolderOnly) {
 }
 
 TEST(SetValues, RotationTurnsAboutWorldXThenYThenZ) {
-  const auto set =
-      parse("[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [1, 2, 3]\nrotation_deg = [90, 0, 90]\n");
-  const auto& m = set.tracking.tags.at(0).world_from_tag;
+  const auto m =
+      tag_of("size_m = 0.1\nposition_m = [1, 2, 3]\nrotation_deg = [90, 0, 90]\n").world_from_tag;
   // X turns nothing of the tag's right; Z then turns it to +Y. Up goes to +Z and stays there. Out
   // of the paper goes to -Y and on to +X.
   expect_near(m[0], {0, 1, 0, 0}, rounding);
@@ -216,18 +219,14 @@ TEST(SetValues, RotationTurnsAboutWorldXThenYThenZ) {
 }
 
 TEST(SetValues, WallTagFacesMinusY) {
-  const auto set =
-      parse("[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [0, 0, 1]\nrotation_deg = [90, 0, 0]\n");
-  expect_near(set.tracking.tags.at(0).world_from_tag[2], {0, -1, 0, 0}, rounding);
+  const Tag tag = tag_of("size_m = 0.1\nposition_m = [0, 0, 1]\nrotation_deg = [90, 0, 0]\n");
+  expect_near(tag.world_from_tag[2], {0, -1, 0, 0}, rounding);
 }
 
 TEST(SetValues, MatricesAreRowMajor) {
-  const auto set = parse(
-      "[[tag]]\nid = 1\nsize_m = 0.1\n"
-      "world_from_tag = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]\n"
-      "[[tag]]\nid = 2\nsize_m = 0.1\n"
-      "world_from_tag = [0, -1, 0, 1,  1, 0, 0, 2,  0, 0, 1, 3,  0, 0, 0, 1]\n");
-  for (const auto& tag : set.tracking.tags) {
+  for (const char* matrix : {"[[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]",
+                             "[0, -1, 0, 1,  1, 0, 0, 2,  0, 0, 1, 3,  0, 0, 0, 1]"}) {
+    const Tag tag = tag_of("size_m = 0.1\nworld_from_tag = " + std::string(matrix));
     expect_near(tag.world_from_tag[0], {0, 1, 0, 0}, 0);
     expect_near(tag.world_from_tag[3], {1, 2, 3, 1}, 0);
   }
@@ -236,20 +235,17 @@ TEST(SetValues, MatricesAreRowMajor) {
 // A pose typed with 4 digits is off by up to 5e-5 an entry: taken, and made exactly rigid, moving
 // no entry by more than the error that was tolerated.
 TEST(SetValues, RoundedPosesBecomeExactlyRigid) {
-  const auto set = parse(
-      "[[tag]]\nid = 1\nsize_m = 0.1\n"
+  const Tag tag = tag_of(
+      "size_m = 0.1\n"
       "world_from_tag = [[0.8660, -0.5, 0, 0], [0.5, 0.8660, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
-  const auto& m = set.tracking.tags.at(0).world_from_tag;
+  const auto& m = tag.world_from_tag;
   EXPECT_LT(rigidity_error(m), rounding);
   EXPECT_NEAR(m[0][0], 0.8660, rigid_tolerance);
   EXPECT_NEAR(m[0][1], 0.5, rigid_tolerance);
 }
 
 TEST(SetValues, CornersGiveSizeAndPose) {
-  const auto set = parse(
-      "[[tag]]\nid = 1\n"
-      "corners_m = [[1, 0, 2.0], [1, 0.1, 2.0], [1, 0.1, 2.1], [1, 0, 2.1]]\n");
-  const auto& tag = set.tracking.tags.at(0);
+  const Tag tag = tag_of("corners_m = [[1, 0, 2.0], [1, 0.1, 2.0], [1, 0.1, 2.1], [1, 0, 2.1]]\n");
   EXPECT_NEAR(tag.size_m, 0.1, rounding);
   expect_near(tag.world_from_tag[0], {0, 1, 0, 0}, rounding);
   expect_near(tag.world_from_tag[1], {0, 0, 1, 0}, rounding);
@@ -261,10 +257,9 @@ TEST(SetValues, CornersGiveSizeAndPose) {
 // e off; the fitted side is a mean of four differences, at most 2e off.
 TEST(SetValues, MeasuredCornersAreFitted) {
   constexpr double e = 0.001;
-  const auto set = parse(
-      "[[tag]]\nid = 1\nsize_m = 0.1\n"
+  const Tag tag = tag_of(
+      "size_m = 0.1\n"
       "corners_m = [[0.001, 0, 0], [0.1, 0.001, 0], [0.1, 0.1, 0.001], [0, 0.099, 0]]\n");
-  const auto& tag = set.tracking.tags.at(0);
   EXPECT_EQ(tag.size_m, 0.1);  // what was measured along the edge wins
   EXPECT_LT(rigidity_error(tag.world_from_tag), rounding);
   expect_near(tag.world_from_tag[3], {0.05, 0.05, 0, 1}, e);
@@ -272,24 +267,24 @@ TEST(SetValues, MeasuredCornersAreFitted) {
 
 TEST(SetValues, FilesAreRelativeToTheSetAndAssetsStandIn) {
   test::TemporaryDirectory directory;
-  std::filesystem::create_directories(directory.path() / "assets");
-  std::ofstream(directory.path() / "vase.glb") << "glTF";
-  std::ofstream(directory.path() / "assets" / "abc.glb") << "glTF";
-  const auto file = directory.path() / "stage.toml";
+  std::filesystem::create_directories(directory / "assets");
+  std::ofstream(directory / "vase.glb") << "glTF";
+  std::ofstream(directory / "assets/abc.glb") << "glTF";
+  const auto file = directory / "stage.toml";
   const std::string text =
       "[observer]\ndevice = 'takes/1'\n"
       "[[object]]\nname = 'vase'\nfile = 'vase.glb'\npresence = 'removed'\n"
       "position_m = [1, 0, 0]\nrotation_deg = [0, 0, 90]\nscale = 2\n";
   const auto set = parse_set(text, file);
-  EXPECT_EQ(set.objects.at(0).file, directory.path() / "vase.glb");
+  EXPECT_EQ(set.objects.at(0).file, directory / "vase.glb");
   EXPECT_EQ(set.objects[0].file_as_written, "vase.glb");
   EXPECT_EQ(set.objects[0].presence, Presence::removed);
   expect_near(set.objects[0].world_from_file[0], {0, 2, 0, 0}, rounding);
   expect_near(set.objects[0].world_from_file[3], {1, 0, 0, 1}, rounding);
-  EXPECT_EQ(set.observer.device, (directory.path() / "takes/1").string());
+  EXPECT_EQ(set.observer.device, (directory / "takes/1").string());
 
   const auto replayed = parse_set(text, file, {{"vase.glb", "assets/abc.glb"}});
-  EXPECT_EQ(replayed.objects.at(0).file, directory.path() / "assets" / "abc.glb");
+  EXPECT_EQ(replayed.objects.at(0).file, directory / "assets/abc.glb");
   EXPECT_EQ(replayed.objects[0].file_as_written, "vase.glb");
 }
 
