@@ -2,8 +2,6 @@
 
 namespace previz::test::gltf_mesh_test {
 
-using Json = GltfWriter::Json;
-
 using GltfMesh = GltfTest;
 
 const std::vector<glm::vec3> square = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
@@ -209,12 +207,9 @@ TEST_F(GltfMesh, SharesGeometryBetweenNodesAndMaterials) {
 }
 
 TEST_F(GltfMesh, NamesFileMeshAndPrimitiveOfBadIndicesAndAccessors) {
+  gltf.root("a", gltf.mesh(Json::object(), "statue"));
   const auto message_of = [&](const Json& primitive) {
-    gltf.json.erase("meshes");
-    gltf.json.erase("nodes");
-    gltf.json.erase("scenes");
-    gltf.root("a", gltf.mesh(primitive, "statue"));
-    return error();
+    return error_with("/meshes/0/primitives/0", primitive);
   };
   const int positions = gltf.positions(square);
   const std::string at = (directory / "test.gltf").string() + ": mesh 0 \"statue\", primitive 0";
@@ -237,20 +232,15 @@ TEST_F(GltfMesh, NamesFileMeshAndPrimitiveOfBadIndicesAndAccessors) {
 TEST_F(GltfMesh, RefusesAbsurdSizesBeforeAllocating) {
   const int positions = gltf.positions(square);
   gltf.root("a", gltf.mesh({{"attributes", {{"POSITION", positions}}}}));
-  const auto message_of = [&](const char* key, const Json& value) {
-    const Json before = gltf.json;
-    gltf.json["accessors"][positions][key] = value;
-    std::string message = error();
-    gltf.json = before;
-    return message;
-  };
-  EXPECT_THAT(message_of("count", 5), HasSubstr("5 elements do not fit into a view of 48 bytes"));
-  EXPECT_THAT(message_of("count", 4000000000u),
-              HasSubstr("4000000000 elements are more than its data can hold"));
-  EXPECT_THAT(message_of("byteOffset", 1ull << 53), HasSubstr("do not fit into a view"));
-  EXPECT_THAT(message_of("byteOffset", 1), HasSubstr("do not fit into a view"));
+  const std::string accessor = "/accessors/" + std::to_string(positions);
+  expect_refused({
+      {accessor + "/count", 5, "5 elements do not fit into a view of 48 bytes"},
+      {accessor + "/count", 4000000000u, "4000000000 elements are more than its data can hold"},
+      {accessor + "/byteOffset", 1ull << 53, "do not fit into a view"},
+      {accessor + "/byteOffset", 1, "do not fit into a view"},
+  });
   gltf.json["accessors"][positions].erase("bufferView");
-  EXPECT_THAT(message_of("count", 1u << 30), HasSubstr("more than its data can hold"));
+  expect_refused({{accessor + "/count", 1u << 30, "more than its data can hold"}});
 }
 
 // glTF 2.0, 3.7.2.1: factors of the base colour, linear, brought into 0 to 1.
@@ -277,8 +267,7 @@ TEST_F(GltfMesh, ReadsVertexColours) {
   EXPECT_EQ(scene.meshes[2].colors[0], glm::vec4(1, 0, 0.2f, 1));
   EXPECT_EQ(scene.meshes[3].colors[0], glm::vec4(1, 0, 1, 1));
   EXPECT_TRUE(scene.meshes[4].colors.empty());  // white changes nothing
-  EXPECT_THAT(scene.notes,
-              ::testing::ElementsAre(HasSubstr("1 vertex colour is outside of 0 to 1")));
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("1 vertex colour is outside of 0 to 1")));
 }
 
 }  // namespace previz::test::gltf_mesh_test

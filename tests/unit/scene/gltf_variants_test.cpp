@@ -5,15 +5,14 @@
 namespace previz::test::gltf_variants_test {
 
 using ::testing::AnyOf;
-using Json = GltfWriter::Json;
 
 class GltfVariants : public GltfTest {
  protected:
   GltfVariants() {
     object.name = "vase";
     gltf.json["extensionsUsed"] = {"KHR_materials_variants"};
-    gltf.json["extensions"]["KHR_materials_variants"]["variants"] = {{{"name", "red"}},
-                                                                     {{"name", "blue"}}};
+    gltf.json["extensions"]["KHR_materials_variants"]["variants"] =
+        R"([{"name": "red"}, {"name": "blue"}])"_json;
     for (const char* name : {"plain", "red paint", "blue paint"})
       gltf.add("materials", {{"name", name}});
   }
@@ -97,8 +96,7 @@ TEST_F(GltfVariants, OneMayLookAsTheFileDoesWithoutIt) {
 
 // A mesh has one set of texture coordinates; the trees of both are built once, at the start.
 TEST_F(GltfVariants, TexturesThatAreMappedOtherwiseTakeACopyOfTheMesh) {
-  const std::vector<unsigned char> texel = {255, 255, 255, 255};
-  const int texture = gltf.texture(1, 1, texel);
+  const int texture = gltf.texture(1, 1, {255, 255, 255, 255});
   gltf.json["materials"][1]["pbrMetallicRoughness"]["baseColorTexture"] = {
       {"index", texture}, {"extensions", {{"KHR_texture_transform", {{"scale", {3, 3}}}}}}};
   add_triangle(painted(), true);
@@ -125,18 +123,16 @@ TEST_F(GltfVariants, NamesThatAreMissingOrRepeatedBecomeNumbers) {
 }
 
 TEST_F(GltfVariants, DamagedOnesAreRefused) {
-  for (const Json& mappings :
-       {Json{{{"material", 1}, {"variants", {2}}}}, Json{{{"material", 1}, {"variants", {-1}}}},
-        Json{{{"material", 3}, {"variants", {0}}}}, Json{{{"variants", {0}}}},
-        Json{{{"material", 1}, {"variants", {"red"}}}}}) {
-    gltf.json.erase("meshes");
-    gltf.json.erase("nodes");
-    gltf.json.erase("scenes");
-    add_triangle(mappings);
-    EXPECT_THAT(error(), AnyOf(HasSubstr("which does not exist"), HasSubstr("a missing variant"),
-                               HasSubstr("it must be a whole number")))
-        << mappings;
-  }
+  add_triangle(painted());
+  const char* mappings = "/meshes/0/primitives/0/extensions/KHR_materials_variants/mappings";
+  for (const char* damaged :
+       {R"([{"material": 1, "variants": [2]}])", R"([{"material": 1, "variants": [-1]}])",
+        R"([{"material": 3, "variants": [0]}])", R"([{"variants": [0]}])",
+        R"([{"material": 1, "variants": ["red"]}])"})
+    EXPECT_THAT(error_with(mappings, Json::parse(damaged)),
+                AnyOf(HasSubstr("which does not exist"), HasSubstr("a missing variant"),
+                      HasSubstr("it must be a whole number")))
+        << damaged;
 }
 
 }  // namespace previz::test::gltf_variants_test
