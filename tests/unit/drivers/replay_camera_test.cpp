@@ -16,6 +16,11 @@ class Replay : public testing::Test {
     camera->start();
     return camera;
   }
+  static ReplayOptions at_speed(double speed) {
+    ReplayOptions options;
+    options.speed = speed;
+    return options;
+  }
   // Time passes only when somebody sleeps.
   HostClock clock() {
     return {[this] { return now_; }, [this](HostClock::Time time) { now_ = std::max(now_, time); }};
@@ -51,17 +56,13 @@ TEST_F(Replay, DeliversEveryFrameInOrderAtItsTime) {
 }
 
 TEST_F(Replay, SpeedScalesTime) {
-  ReplayOptions options;
-  options.speed = 4;
-  const auto camera = open(options);
+  const auto camera = open(at_speed(4));
   for (int i = 0; i < 5; ++i) camera->next(milliseconds(100));
   EXPECT_EQ(elapsed(), nanoseconds(interval_ns));
 }
 
 TEST_F(Replay, SpeedZeroNeverWaits) {
-  ReplayOptions options;
-  options.speed = 0;
-  const auto camera = open(options);
+  const auto camera = open(at_speed(0));
   for (int i = 0; i < 5; ++i)
     EXPECT_TRUE(std::holds_alternative<FramePtr>(camera->next(milliseconds(0))));
   EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(0))));
@@ -140,8 +141,7 @@ TEST_F(Replay, AbsurdTimesDoNoHarm) {
     }
   }
   for (const double speed : {1.0, 1e-300, 1e300}) {
-    ReplayOptions options;
-    options.speed = speed;
+    ReplayOptions options = at_speed(speed);
     options.loop = true;
     const auto camera = open(options, "odd");
     std::uint64_t frames = 0;
@@ -184,9 +184,7 @@ TEST_F(Replay, WhatTheSessionLacksIsToldFirst) {
 TEST_F(Replay, AnUnreadableFrameIsTroubleInItsPlace) {
   std::filesystem::remove_all(take());
   session::write_small_session(take(), 5, 200, 150);  // larger than what a reader reads ahead
-  ReplayOptions options;
-  options.speed = 0;
-  const auto camera = open(options);
+  const auto camera = open(at_speed(0));
   std::string video = session::content_of(take() / "observer.mkv");
   video[video.size() / 2] ^= 1;
   session::write_content(take() / "observer.mkv", video);
@@ -203,9 +201,7 @@ TEST_F(Replay, SaysWhatItsPicturesAre) {
   EXPECT_EQ(format.width, 24);
   EXPECT_EQ(format.height, 18);
   EXPECT_NEAR(format.rate_hz, 1e9 / interval_ns, 1e-6);
-  ReplayOptions twice;
-  twice.speed = 2;
-  EXPECT_NEAR(open(twice)->format().rate_hz, 2e9 / interval_ns, 1e-6);
+  EXPECT_NEAR(open(at_speed(2))->format().rate_hz, 2e9 / interval_ns, 1e-6);
 }
 
 // Frame i of the take is due at i intervals; what falls due while stopped is gone.
@@ -233,18 +229,15 @@ TEST_F(Replay, AReopenedDeviceGoesOnWhereItIsByThen) {
 }
 
 TEST_F(Replay, AtSpeedZeroNothingIsMissed) {
-  ReplayOptions options;
-  options.speed = 0;
+  ReplayOptions options = at_speed(0);
   options.position = std::make_shared<ReplayPosition>();
   for (int i = 0; i < 5; ++i) expect_frame(*open(options), milliseconds(0), i);
   expect_end(*open(options));
 }
 
 TEST_F(Replay, WrongOptionsAreErrors) {
+  EXPECT_THROW(open(at_speed(-1)), Error);
   ReplayOptions options;
-  options.speed = -1;
-  EXPECT_THROW(open(options), Error);
-  options.speed = 1;
   options.first = 5;
   EXPECT_THROW(open(options), Error);
   EXPECT_THROW(open_replay(take(), "light"), Error);

@@ -30,8 +30,8 @@ class Damage : public testing::Test {
   std::filesystem::path whole() const { return directory_ / "whole"; }
   std::filesystem::path copy() const { return directory_ / "copy"; }
   // The whole session's film and its lines.
-  std::string video() const { return content_of(whole() / "observer.mkv"); }
-  std::string lines() const { return content_of(whole() / "observer.jsonl"); }
+  std::string whole_video() const { return content_of(whole() / "observer.mkv"); }
+  std::string whole_lines() const { return content_of(whole() / "observer.jsonl"); }
 
   struct Opened {
     std::vector<std::uint64_t> frames;  // that came back, each bit for bit
@@ -81,7 +81,7 @@ TEST_F(Damage, AWholeSessionMissesNothing) {
 }
 
 TEST_F(Damage, AVideoCutAnywhereGivesAPrefix) {
-  const std::string video = this->video();
+  const std::string video = whole_video();
   std::size_t before = 0;
   for (std::size_t length = 0; length < video.size(); length += 1 + length % 37) {
     const Opened opened = open_with_video(video.substr(0, length));
@@ -96,7 +96,7 @@ TEST_F(Damage, AVideoCutAnywhereGivesAPrefix) {
 }
 
 TEST_F(Damage, LinesCutAnywhereGiveAPrefix) {
-  const std::string lines = this->lines();
+  const std::string lines = whole_lines();
   for (std::size_t length = 0; length + 1 < lines.size(); length += 1 + length % 11) {
     const Opened opened = open_with_lines(lines.substr(0, length));
     EXPECT_TRUE(is_prefix(opened.frames)) << "cut at " << length;
@@ -136,7 +136,7 @@ std::vector<std::pair<std::size_t, std::size_t>> packets_of(const std::filesyste
 void Damage::expect_no_changed_byte_is_shown(VideoCodec codec) {
   constexpr std::size_t few = 2;
   write_small_frames(few, 8, 8, codec);
-  const std::string video = this->video();
+  const std::string video = whole_video();
   const auto packets = packets_of(whole() / "observer.mkv");
   ASSERT_EQ(packets.size(), few);
   std::mt19937 random(2);
@@ -170,7 +170,7 @@ std::size_t head_of(const std::string& video) {
 // The head is one byte short of being right, is zeros up to some place, or the file lacks it: every
 // picture behind it is found by its checksum.
 TEST_F(Damage, ATornHeadCostsNoPictureBehindIt) {
-  const std::string video = this->video();
+  const std::string video = whole_video();
   const std::size_t head = head_of(video);
   ASSERT_NE(head, std::string::npos);
   std::string first_byte = video, zeros = video;
@@ -186,7 +186,7 @@ TEST_F(Damage, ATornHeadCostsNoPictureBehindIt) {
 
 // A block of zeros over head and first pictures costs those it touches; they are named.
 TEST_F(Damage, ATornFirstBlockCostsThePicturesInIt) {
-  const std::string video = this->video();
+  const std::string video = whole_video();
   const auto packets = packets_of(whole() / "observer.mkv");
   ASSERT_EQ(packets.size(), frame_count);
   std::string torn = video;
@@ -201,7 +201,7 @@ TEST_F(Damage, ATornFirstBlockCostsThePicturesInIt) {
 TEST_F(Damage, NoByteOfTheHeadCostsAPicture) {
   constexpr int few = 2;
   write_small_frames(few, 8, 8);
-  const std::string video = this->video();
+  const std::string video = whole_video();
   for (std::size_t at = 0; at < head_of(video); ++at) {
     for (const char byte : {'\0', static_cast<char>(~video[at])}) {
       std::string damaged = video;
@@ -264,7 +264,7 @@ TEST_F(Damage, AFolderInThePlaceOfTheVideoIsSaid) {
 }
 
 TEST_F(Damage, OneDamagedPictureCostsThatFrameOnly) {
-  std::string damaged = video();
+  std::string damaged = whole_video();
   damaged[damaged.size() / 2] ^= 0x10;
   const Opened opened = open_with_video(damaged);
   EXPECT_EQ(opened.frames.size(), frame_count - 1);
@@ -273,7 +273,7 @@ TEST_F(Damage, OneDamagedPictureCostsThatFrameOnly) {
 }
 
 TEST_F(Damage, AHoleInTheVideoDoesNotShiftTheRest) {
-  std::string video = this->video();
+  std::string video = whole_video();
   std::fill(video.begin() + video.size() * 3 / 10, video.begin() + video.size() * 5 / 10, '\0');
   const Opened opened = open_with_video(video);
   EXPECT_GE(opened.frames.size(), 3u);
@@ -283,7 +283,7 @@ TEST_F(Damage, AHoleInTheVideoDoesNotShiftTheRest) {
 
 // A changed byte costs the line it is in; where it ended that line, the next one, too.
 TEST_F(Damage, ChangedLinesAreLeftOut) {
-  std::string lines = this->lines();
+  std::string lines = whole_lines();
   std::mt19937 random(3);
   for (int round = 0; round < 150; ++round) {
     std::string damaged = lines;
@@ -306,7 +306,7 @@ TEST_F(Damage, ChangedLinesAreLeftOut) {
 }
 
 TEST_F(Damage, NumbersOfTheWrongKindAreDamage) {
-  const std::string lines = this->lines();
+  const std::string lines = whole_lines();
   const std::string rest = R"(,"arrival_ns":1,"exposure_s":1,"gain":1,"exposure":1,"video_ms":1,)";
   const std::string sum = R"("crc32":"00000000"})";
   for (const std::string& line :

@@ -49,14 +49,13 @@ TEST(Log, TheJournalGetsThePriorityOfTheSeverity) {
   log({Severity::error, "recorder", "take ended, the disk is full"});
   log({Severity::warning, "light", "{} is left out"});
   log({Severity::info, "", "live on a GPU"});
-  ASSERT_EQ(journal.size(), 3u);
-  EXPECT_EQ(journal[0]["PRIORITY"], "3");
-  EXPECT_EQ(journal[0]["MESSAGE"], "recorder: take ended, the disk is full");
-  EXPECT_EQ(journal[0]["SYSLOG_IDENTIFIER"], "previzd");
-  EXPECT_EQ(journal[1]["PRIORITY"], "4");
-  EXPECT_EQ(journal[1]["MESSAGE"], "light: {} is left out");
-  EXPECT_EQ(journal[2]["PRIORITY"], "6");
-  EXPECT_EQ(journal[2]["MESSAGE"], "live on a GPU");
+  const auto entry = [](const char* priority, const char* message) {
+    return std::map<std::string, std::string>{
+        {"PRIORITY", priority}, {"MESSAGE", message}, {"SYSLOG_IDENTIFIER", "previzd"}};
+  };
+  EXPECT_THAT(journal,
+              ElementsAre(entry("3", "recorder: take ended, the disk is full"),
+                          entry("4", "light: {} is left out"), entry("6", "live on a GPU")));
 }
 
 // previzd --log-level

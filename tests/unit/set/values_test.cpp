@@ -80,22 +80,9 @@ TEST(SetValues, AreInUnitsOfTheStructs) {
   const auto set = parse(R"(
 [observer]
 exposure = 2
-[observer.intrinsics]
-width = 640
-height = 480
-fx = 612
-fy = 613.5
-cx = 319.5
-cy = 239.5
-k1 = -0.1
-[observer.lens]
-focal_length_mm = 35
-f_number = 2.8
-focus_distance_m = 1.25
-[observer.response]
-kind = "table"
-table = [0, 0.25, 1]
-responsivity = 3.5
+intrinsics = {width = 640, height = 480, fx = 612, fy = 613.5, cx = 319.5, cy = 239.5, k1 = -0.1}
+lens = {focal_length_mm = 35, f_number = 2.8, focus_distance_m = 1.25}
+response = {kind = "table", table = [0, 0.25, 1], responsivity = 3.5}
 [light_camera.intrinsics]
 width = 512
 height = 512
@@ -106,12 +93,9 @@ cy = 255.5
 k = [0.01, 0, 0, 0]
 max_angle_deg = 100
 vignetting = [-0.05, 0, 0.001]
-[light_camera.response]
-kind = "gamma"
-gamma = 2.4
-dark_level = [0.01, 0.02, 0.01]
-[light_camera.pose]
-position_m = [1, 2, 3]
+[light_camera]
+response = {kind = "gamma", gamma = 2.4, dark_level = [0.01, 0.02, 0.01]}
+pose = {position_m = [1, 2, 3]}
 [lighting]
 environment_rotation_deg = -90
 unseen = "constant"
@@ -301,28 +285,11 @@ TEST(SetValues, RectangleGetsAnUpAcrossItsDirection) {
 // A stick with one tag, which is its frame, and a tray with two.
 TEST(SetValues, CarriersAreWhatTagsAreStuckTo) {
   const auto set = parse(R"(
-[[tag]]
-id = 1
-size_m = 0.08
-position_m = [0, 0, 0]
-[[tag]]
-id = 5
-size_m = 0.05
-carrier = "stick"
-[[tag]]
-id = 6
-size_m = 0.05
-carrier = "tray"
-position_m = [0.1, 0, 0]
-[[tag]]
-id = 7
-carrier = "tray"
-corners_m = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-[[light]]
-type = "point"
-emission = [1, 1, 1]
-position_m = [0, 0, 0.1]
-carrier = "stick"
+tag = [{id = 1, size_m = 0.08, position_m = [0, 0, 0]},
+       {id = 5, size_m = 0.05, carrier = "stick"},
+       {id = 6, size_m = 0.05, carrier = "tray", position_m = [0.1, 0, 0]},
+       {id = 7, carrier = "tray", corners_m = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]}]
+light = [{type = "point", emission = [1, 1, 1], position_m = [0, 0, 0.1], carrier = "stick"}]
 )");
   ASSERT_EQ(set.tracking.tags.size(), 1u);
   ASSERT_EQ(set.tracking.carriers.size(), 2u);
