@@ -23,6 +23,12 @@ class GltfTest : public ::testing::Test {
     return scene::load_scene(set);
   }
 
+  // A root node with a mesh of one primitive.
+  void add_mesh(Json attributes, Json primitive = Json::object()) {
+    primitive["attributes"] = std::move(attributes);
+    gltf.root("a", gltf.mesh(std::move(primitive)));
+  }
+
   // The message of the previz::Error that loading throws; "" where it loads.
   std::string error(const char* name = "test.gltf") {
     return test::error_of([&] { load(name); });

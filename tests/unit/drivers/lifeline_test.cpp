@@ -8,12 +8,10 @@
 namespace previz::lifeline_test {
 
 using std::chrono::milliseconds;
+using namespace std::chrono_literals;
 using Kind = Fault::Kind;
 
-constexpr LifelineOptions options{milliseconds(5000),
-                                  milliseconds(2000),
-                                  milliseconds(1000),
-                                  {milliseconds(250), milliseconds(4000)}};
+constexpr LifelineOptions options{5000ms, 2000ms, 1000ms, {250ms, 4000ms}};
 
 class LifelineTest : public testing::Test {
  protected:
@@ -58,7 +56,7 @@ class LifelineTest : public testing::Test {
   std::string story(Lifeline& lifeline, milliseconds end) {
     std::string story;
     while (elapsed() < end) {
-      const CameraEvent event = lifeline.next(milliseconds(100));
+      const CameraEvent event = lifeline.next(100ms);
       if (std::holds_alternative<FramePtr>(event)) {
         if (!story.ends_with('f')) story += 'f';
       } else if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) {
@@ -81,20 +79,19 @@ class LifelineTest : public testing::Test {
 TEST_F(LifelineTest, ADeviceThatIsWellIsJustACamera) {
   Lifeline lifeline = started(take());
   EXPECT_EQ(lifeline.state(), DeviceState::absent);
-  EXPECT_EQ(story(lifeline, milliseconds(3000)), "f");
+  EXPECT_EQ(story(lifeline, 3000ms), "f");
   EXPECT_EQ(lifeline.state(), DeviceState::streaming);
   EXPECT_EQ(lifeline.format().width, 24);
   EXPECT_EQ(lifeline.counters().at("opened"), 1u);
   lifeline.stop();
   EXPECT_EQ(lifeline.state(), DeviceState::absent);
-  EXPECT_TRUE(std::holds_alternative<NoFrame>(lifeline.next(milliseconds(100))));
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(lifeline.next(100ms)));
 }
 
 // Attempts at 0, 250, 750, 1750, 3750, 7750 ms, and from then on every 4 s.
 TEST_F(LifelineTest, AnAbsentDeviceIsTriedEverLessOftenAndToldOnce) {
-  Lifeline lifeline = started(take_from(milliseconds(12'000)));
-  EXPECT_EQ(story(lifeline, milliseconds(17'000)),
-            " [is not there; retrying until it is available] f");
+  Lifeline lifeline = started(take_from(12'000ms));
+  EXPECT_EQ(story(lifeline, 17'000ms), " [is not there; retrying until it is available] f");
   EXPECT_EQ(attempts_ms_, (std::vector<int>{0, 250, 750, 1750, 3750, 7750, 11'750, 15'750}));
   EXPECT_EQ(lifeline.counters().at("not opened"), 7u);
   EXPECT_EQ(lifeline.counters().at("back-offs"), 7u);
@@ -103,7 +100,7 @@ TEST_F(LifelineTest, AnAbsentDeviceIsTriedEverLessOftenAndToldOnce) {
 
 TEST_F(LifelineTest, ADeviceThatNeverStartsIsOpenedAnew) {
   Lifeline lifeline = started(take(), {{Kind::stall, 0}});
-  EXPECT_EQ(story(lifeline, milliseconds(6000)),
+  EXPECT_EQ(story(lifeline, 6000ms),
             " [sends no frame within 5000 ms of its start; reopening it] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 2u);
   EXPECT_EQ(lifeline.counters().at("lost"), 1u);
@@ -113,7 +110,7 @@ TEST_F(LifelineTest, AStalledDeviceIsToldThenLostThenBack) {
   Lifeline lifeline = started(take(), {{Kind::stall, 20}});
   std::vector<DeviceState> states;
   for (int i = 0; i < 60; ++i) {
-    lifeline.next(milliseconds(100));
+    lifeline.next(100ms);
     if (states.empty() || states.back() != lifeline.state()) states.push_back(lifeline.state());
   }
   EXPECT_EQ(states, (std::vector{DeviceState::streaming, DeviceState::stalled, DeviceState::lost,
@@ -126,13 +123,13 @@ TEST_F(LifelineTest, AStalledDeviceIsToldThenLostThenBack) {
 TEST_F(LifelineTest, AStallThatEndsByItselfIsNotGivenUp) {
   // 60 frames of 40 ms are 2.4 s: longer than the stall time-out, shorter than the patience.
   Lifeline lifeline = started(take(), {{Kind::drop, 20, 60}});
-  EXPECT_EQ(story(lifeline, milliseconds(6000)), "f [has sent nothing for 2000 ms] f");
+  EXPECT_EQ(story(lifeline, 6000ms), "f [has sent nothing for 2000 ms] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 1u);
 }
 
 TEST_F(LifelineTest, ALostDeviceIsPickedUpWhenItIsBack) {
-  Lifeline lifeline = started(take(), {{Kind::disconnect, 20, 1, std::chrono::seconds(3)}});
-  EXPECT_EQ(story(lifeline, milliseconds(9000)),
+  Lifeline lifeline = started(take(), {{Kind::disconnect, 20, 1, 3s}});
+  EXPECT_EQ(story(lifeline, 9000ms),
             "f [was unplugged; reopening it] "
             " [the device is unplugged; retrying until it is available] f");
   EXPECT_EQ(lifeline.state(), DeviceState::streaming);
@@ -140,15 +137,15 @@ TEST_F(LifelineTest, ALostDeviceIsPickedUpWhenItIsBack) {
 
 TEST_F(LifelineTest, TroubleOfOneFrameIsPassedOn) {
   Lifeline lifeline = started(take(), {{Kind::corrupt, 3}});
-  EXPECT_EQ(story(lifeline, milliseconds(1000)), "f [frame 103 is damaged and skipped] f");
+  EXPECT_EQ(story(lifeline, 1000ms), "f [frame 103 is damaged and skipped] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 1u);
 }
 
 TEST_F(LifelineTest, TheEndOfATakeIsTheEnd) {
   replay_.loop = false;
   Lifeline lifeline = started(take());
-  EXPECT_EQ(story(lifeline, milliseconds(1000)), "f end");
-  EXPECT_TRUE(std::holds_alternative<NoFrame>(lifeline.next(milliseconds(0))));
+  EXPECT_EQ(story(lifeline, 1000ms), "f end");
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(lifeline.next(0ms)));
 }
 
 TEST_F(LifelineTest, ADeviceMayComeBackWithAnotherFormat) {
@@ -159,9 +156,9 @@ TEST_F(LifelineTest, ADeviceMayComeBackWithAnotherFormat) {
         const char* name = opened++ == 0 ? "take" : "other";
         return open_replay(directory_ / name, "observer", replay_, clock());
       },
-      {{Kind::disconnect, 5, 1, milliseconds(0)}});
+      {{Kind::disconnect, 5, 1, 0ms}});
   for (int i = 0; i < 30; ++i) {
-    const CameraEvent event = lifeline.next(milliseconds(100));
+    const CameraEvent event = lifeline.next(100ms);
     const auto* frame = std::get_if<FramePtr>(&event);
     if (!frame) continue;
     EXPECT_EQ((*frame)->width, lifeline.counters().at("opened") == 1 ? 24 : 40);
@@ -197,7 +194,7 @@ TEST_F(LifelineTest, ADeviceWhoseDriverThrowsIsOpenedAnew) {
     if (++openings > 1) return take()();
     return std::make_unique<Throwing>(take()(), 3);
   });
-  EXPECT_EQ(story(lifeline, milliseconds(2000)), "f [has failed: lamp fell down; reopening it] f");
+  EXPECT_EQ(story(lifeline, 2000ms), "f [has failed: lamp fell down; reopening it] f");
   EXPECT_EQ(lifeline.counters().at("lost"), 1u);
   EXPECT_EQ(lifeline.counters().at("returned"), 1u);
 }
@@ -205,8 +202,7 @@ TEST_F(LifelineTest, ADeviceWhoseDriverThrowsIsOpenedAnew) {
 TEST_F(LifelineTest, AnExposureThatCannotBeSetKeepsNoDeviceFromBeingOpened) {
   Lifeline lifeline = started([&] { return std::make_unique<Throwing>(take()(), 1000); });
   EXPECT_TRUE(lifeline.set_exposure(0.25, 1));  // there is no device yet
-  EXPECT_EQ(story(lifeline, milliseconds(300)),
-            " [lamp fell down; retrying until it is available] f");
+  EXPECT_EQ(story(lifeline, 300ms), " [lamp fell down; retrying until it is available] f");
 }
 
 TEST_F(LifelineTest, SequenceNumbersIncreaseOverAllOpenings) {
@@ -217,10 +213,10 @@ TEST_F(LifelineTest, SequenceNumbersIncreaseOverAllOpenings) {
         ++openings;
         return open_replay(directory_ / "take", "observer", replay_, clock());
       },
-      {{Kind::disconnect, 5, 1, milliseconds(0)}});
+      {{Kind::disconnect, 5, 1, 0ms}});
   std::vector<std::uint64_t> sequences;
   while (sequences.size() < 12) {
-    const CameraEvent event = lifeline.next(milliseconds(100));
+    const CameraEvent event = lifeline.next(100ms);
     if (const auto* frame = std::get_if<FramePtr>(&event)) sequences.push_back((*frame)->sequence);
   }
   EXPECT_EQ(openings, 2u);
@@ -231,11 +227,10 @@ TEST_F(LifelineTest, SequenceNumbersIncreaseOverAllOpenings) {
 
 TEST_F(LifelineTest, ADeviceThatIsPluggedInIsNotKeptWaiting) {
   std::uint64_t arrivals = 3;
-  Lifeline lifeline =
-      started(take_from(milliseconds(5100)), LifelineHooks{[&] { return arrivals; }, {}});
-  story(lifeline, milliseconds(5000));
+  Lifeline lifeline = started(take_from(5100ms), LifelineHooks{[&] { return arrivals; }, {}});
+  story(lifeline, 5000ms);
   arrivals = 4;  // its node follows 100 ms later
-  EXPECT_EQ(story(lifeline, milliseconds(6000)), "f");
+  EXPECT_EQ(story(lifeline, 6000ms), "f");
   EXPECT_EQ(attempts_ms_, (std::vector<int>{0, 250, 750, 1750, 3750, 5000, 5250}));
 }
 
@@ -248,8 +243,7 @@ TEST_F(LifelineTest, ADeviceThatIsSilentIsResetBeforeItIsOpenedAnew) {
     const std::string said = *why_not
                                  ? "is stalled; it cannot be reset (Access denied); reopening it"
                                  : "is stalled; it was reset; reopening it";
-    EXPECT_EQ(story(lifeline, milliseconds(5000)),
-              "f [has sent nothing for 2000 ms]  [" + said + "] f");
+    EXPECT_EQ(story(lifeline, 5000ms), "f [has sent nothing for 2000 ms]  [" + said + "] f");
     EXPECT_EQ(lifeline.counters().at("reset"), *why_not ? 0u : 1u);
   }
 }
@@ -258,7 +252,7 @@ TEST_F(LifelineTest, ADeviceThatIsSilentIsResetBeforeItIsOpenedAnew) {
 TEST_F(LifelineTest, ADeviceThatIsPulledIsNotReset) {
   Lifeline lifeline =
       started(take(), {{Kind::disconnect, 5}}, {{}, [] { return std::optional<std::string>(""); }});
-  EXPECT_EQ(story(lifeline, milliseconds(2000)), "f [was unplugged; reopening it] f");
+  EXPECT_EQ(story(lifeline, 2000ms), "f [was unplugged; reopening it] f");
   EXPECT_EQ(lifeline.counters().at("reset"), 0u);
 }
 
@@ -288,7 +282,7 @@ TEST_F(LifelineTest, ExposuresAndCountersOutliveAnOpening) {
   std::vector<double> exposures;
   Lifeline lifeline = started([&] { return std::make_unique<Asked>(exposures); });
   EXPECT_TRUE(lifeline.set_exposure(0.25, 1));
-  story(lifeline, milliseconds(800));  // opened at 0, 250 and 750 ms
+  story(lifeline, 800ms);  // opened at 0, 250 and 750 ms
   EXPECT_EQ(exposures, (std::vector<double>{0.25, 0.25, 0.25}));
   EXPECT_EQ(lifeline.counters().at("frames cut short"), 6u);
 }
@@ -302,7 +296,7 @@ TEST_F(LifelineTest, WhatADeviceDoesOtherwiseIsPassedOnAtEveryOpening) {
   });
   const std::string opening =
       " [sends 5 frames per second; has no colour]  [is gone; reopening it] ";
-  EXPECT_EQ(story(lifeline, milliseconds(400)), opening + opening);
+  EXPECT_EQ(story(lifeline, 400ms), opening + opening);
   EXPECT_EQ(lifeline.counters().at("opened"), 2u);
   EXPECT_EQ(lifeline.counters().at("lost"), 2u);
 }

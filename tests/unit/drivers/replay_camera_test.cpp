@@ -5,6 +5,7 @@
 namespace previz::replay_camera_test {
 
 using std::chrono::milliseconds;
+using namespace std::chrono_literals;
 using std::chrono::nanoseconds;
 
 class Replay : public testing::Test {
@@ -34,7 +35,7 @@ class Replay : public testing::Test {
     EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), index)) << index;
   }
   static void expect_end(Camera& camera) {
-    EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera.next(milliseconds(100))));
+    EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera.next(100ms)));
   }
 
   test::TemporaryDirectory directory_;
@@ -46,7 +47,7 @@ constexpr std::int64_t interval_ns = 40'000'003;  // of session::noise_frame
 TEST_F(Replay, DeliversEveryFrameInOrderAtItsTime) {
   const auto camera = open({});
   for (int i = 0; i < 5; ++i) {
-    expect_frame(*camera, milliseconds(100), i);
+    expect_frame(*camera, 100ms, i);
     EXPECT_EQ(elapsed(), nanoseconds(i * interval_ns));
   }
   expect_end(*camera);
@@ -57,37 +58,36 @@ TEST_F(Replay, DeliversEveryFrameInOrderAtItsTime) {
 
 TEST_F(Replay, SpeedScalesTime) {
   const auto camera = open(at_speed(4));
-  for (int i = 0; i < 5; ++i) camera->next(milliseconds(100));
+  for (int i = 0; i < 5; ++i) camera->next(100ms);
   EXPECT_EQ(elapsed(), nanoseconds(interval_ns));
 }
 
 TEST_F(Replay, SpeedZeroNeverWaits) {
   const auto camera = open(at_speed(0));
-  for (int i = 0; i < 5; ++i)
-    EXPECT_TRUE(std::holds_alternative<FramePtr>(camera->next(milliseconds(0))));
-  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(0))));
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(std::holds_alternative<FramePtr>(camera->next(0ms)));
+  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(0ms)));
   EXPECT_EQ(elapsed(), nanoseconds(0));
 }
 
 TEST_F(Replay, AShortWaitEndsWithoutAFrame) {
   const auto camera = open({});
-  camera->next(milliseconds(0));
+  camera->next(0ms);
   for (int i = 1; i <= 4; ++i) {
-    EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(milliseconds(10))));
+    EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(10ms)));
     EXPECT_EQ(elapsed(), milliseconds(10 * i));
   }
-  expect_frame(*camera, milliseconds(10), 1);
+  expect_frame(*camera, 10ms, 1);
   EXPECT_EQ(elapsed(), nanoseconds(interval_ns));
 }
 
 TEST_F(Replay, ALateReaderGetsEveryFrameAtOnce) {
   const auto camera = open({});
-  camera->next(milliseconds(0));
-  now_ += std::chrono::seconds(9);
+  camera->next(0ms);
+  now_ += 9s;
   for (int i = 1; i < 5; ++i) {
-    expect_frame(*camera, milliseconds(0), i);
+    expect_frame(*camera, 0ms, i);
   }
-  EXPECT_EQ(elapsed(), std::chrono::seconds(9));
+  EXPECT_EQ(elapsed(), 9s);
 }
 
 TEST_F(Replay, ARangeOfFrames) {
@@ -95,7 +95,7 @@ TEST_F(Replay, ARangeOfFrames) {
   options.first = 1;
   options.last = 3;
   const auto camera = open(options);
-  for (int i = 1; i <= 3; ++i) expect_frame(*camera, milliseconds(100), i);
+  for (int i = 1; i <= 3; ++i) expect_frame(*camera, 100ms, i);
   expect_end(*camera);
   EXPECT_EQ(elapsed(), nanoseconds(2 * interval_ns));
 }
@@ -108,7 +108,7 @@ TEST_F(Replay, LoopsWithoutATimeJump) {
   const auto camera = open(options);
   std::int64_t first_ns = 0;
   for (int i = 0; i < 10; ++i) {
-    const FramePtr frame = std::get<FramePtr>(camera->next(milliseconds(100)));
+    const FramePtr frame = std::get<FramePtr>(camera->next(100ms));
     if (i == 0) first_ns = frame->timestamp_ns;
     EXPECT_EQ(frame->bytes, session::noise_frame("", 2 + i % 3, frame->format, 24, 18).bytes);
     EXPECT_EQ(frame->timestamp_ns, first_ns + i * interval_ns);
@@ -119,12 +119,12 @@ TEST_F(Replay, LoopsWithoutATimeJump) {
 
 TEST_F(Replay, StreamsShareAnOrigin) {
   ReplayOptions options;
-  options.origin = {now_ + milliseconds(500),
+  options.origin = {now_ + 500ms,
                     session::noise_frame("", 0, PixelFormat::rgb8, 1, 1).timestamp_ns};
   const auto camera = open(options);
-  EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(milliseconds(499))));
-  EXPECT_TRUE(std::holds_alternative<FramePtr>(camera->next(milliseconds(499))));
-  EXPECT_EQ(elapsed(), milliseconds(500));
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(499ms)));
+  EXPECT_TRUE(std::holds_alternative<FramePtr>(camera->next(499ms)));
+  EXPECT_EQ(elapsed(), 500ms);
 }
 
 // Whatever the recorded times are: a call waits no longer than it is asked to, frames come in the
@@ -147,8 +147,8 @@ TEST_F(Replay, AbsurdTimesDoNoHarm) {
     std::uint64_t frames = 0;
     for (int i = 0; i < 9; ++i) {
       const nanoseconds before = elapsed();
-      const CameraEvent event = camera->next(milliseconds(1));
-      EXPECT_LE(elapsed() - before, milliseconds(1)) << "speed " << speed << ", call " << i;
+      const CameraEvent event = camera->next(1ms);
+      EXPECT_LE(elapsed() - before, 1ms) << "speed " << speed << ", call " << i;
       ASSERT_FALSE(std::holds_alternative<EndOfStream>(event)) << "it loops";
       const auto* frame = std::get_if<FramePtr>(&event);
       if (i == 0) {
@@ -166,7 +166,7 @@ TEST_F(Replay, WhatTheSessionLacksIsToldFirst) {
   const auto camera = open({});
   int troubles = 0, frames = 0;
   for (;;) {
-    const CameraEvent event = camera->next(milliseconds(100));
+    const CameraEvent event = camera->next(100ms);
     if (std::holds_alternative<EndOfStream>(event)) break;
     if (std::holds_alternative<DeviceTrouble>(event)) {
       EXPECT_EQ(frames, 0);
@@ -190,9 +190,9 @@ TEST_F(Replay, AnUnreadableFrameIsTroubleInItsPlace) {
   session::write_content(take() / "observer.mkv", video);
   std::string seen;
   for (int i = 0; i < 5; ++i)
-    seen += std::holds_alternative<FramePtr>(camera->next(milliseconds(0))) ? 'f' : 't';
+    seen += std::holds_alternative<FramePtr>(camera->next(0ms)) ? 'f' : 't';
   EXPECT_EQ(std::count(seen.begin(), seen.end(), 't'), 1) << seen;
-  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(milliseconds(0))));
+  EXPECT_TRUE(std::holds_alternative<EndOfStream>(camera->next(0ms)));
 }
 
 TEST_F(Replay, SaysWhatItsPicturesAre) {
@@ -207,12 +207,12 @@ TEST_F(Replay, SaysWhatItsPicturesAre) {
 // Frame i of the take is due at i intervals; what falls due while stopped is gone.
 TEST_F(Replay, FramesWhileStoppedAreMissed) {
   const auto camera = open({});
-  camera->next(milliseconds(100));
+  camera->next(100ms);
   camera->stop();
-  EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(milliseconds(100))));
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(camera->next(100ms)));
   now_ += nanoseconds(2 * interval_ns + 1);
   camera->start();
-  expect_frame(*camera, milliseconds(100), 3);
+  expect_frame(*camera, 100ms, 3);
   EXPECT_EQ(elapsed(), nanoseconds(3 * interval_ns));
 }
 
@@ -221,9 +221,9 @@ TEST_F(Replay, AReopenedDeviceGoesOnWhereItIsByThen) {
   options.loop = true;
   options.origin = {now_, session::noise_frame("", 0, PixelFormat::rgb8, 1, 1).timestamp_ns};
   options.position = std::make_shared<ReplayPosition>();
-  open(options)->next(milliseconds(100));
+  open(options)->next(100ms);
   now_ += nanoseconds(1000 * 5 * interval_ns + interval_ns / 2);  // a thousand laps
-  const FramePtr frame = std::get<FramePtr>(open(options)->next(milliseconds(100)));
+  const FramePtr frame = std::get<FramePtr>(open(options)->next(100ms));
   EXPECT_EQ(frame->sequence, 100u + 5001);
   EXPECT_EQ(elapsed(), nanoseconds(5001 * interval_ns));
 }
@@ -231,7 +231,7 @@ TEST_F(Replay, AReopenedDeviceGoesOnWhereItIsByThen) {
 TEST_F(Replay, AtSpeedZeroNothingIsMissed) {
   ReplayOptions options = at_speed(0);
   options.position = std::make_shared<ReplayPosition>();
-  for (int i = 0; i < 5; ++i) expect_frame(*open(options), milliseconds(0), i);
+  for (int i = 0; i < 5; ++i) expect_frame(*open(options), 0ms, i);
   expect_end(*open(options));
 }
 

@@ -10,6 +10,14 @@ struct Picture {
   int width, height;
 };
 
+// A session of these frames and records, written and opened again.
+Session session_of(const TemporaryDirectory& directory, const auto&... what) {
+  SessionWriter writer(directory.path(), {});
+  (writer.write(what), ...);
+  writer.close();
+  return open_session(directory.path());
+}
+
 class RoundTrip : public testing::TestWithParam<std::tuple<Picture, VideoCodec>> {};
 
 TEST_P(RoundTrip, EveryFrameComesBackBitForBit) {
@@ -36,25 +44,17 @@ TEST_P(RoundTrip, EveryFrameComesBackBitForBit) {
   EXPECT_THROW(stream->read(3), Error);
 }
 
+std::vector<Picture> pictures() {
+  using enum PixelFormat;
+  return {{rgb8, 160, 120},     {rgb16, 160, 120}, {gray8, 160, 120}, {gray16, 160, 120},
+          {yuv422p8, 160, 120}, {rgb8, 8, 8},      {rgb16, 8, 9},     {gray8, 9, 8},
+          {gray16, 8, 8},       {yuv422p8, 9, 9},  {yuv422p8, 35, 8}, {rgb8, 2000, 8},
+          {yuv422p8, 8, 2000},  {rgb16, 8, 2000},  {gray8, 37, 21},   {rgb8, 643, 481},
+          {gray16, 643, 481}};
+}
+
 INSTANTIATE_TEST_SUITE_P(Formats, RoundTrip,
-                         testing::Combine(testing::ValuesIn(std::vector<Picture>{
-                                              {PixelFormat::rgb8, 160, 120},
-                                              {PixelFormat::rgb16, 160, 120},
-                                              {PixelFormat::gray8, 160, 120},
-                                              {PixelFormat::gray16, 160, 120},
-                                              {PixelFormat::yuv422p8, 160, 120},
-                                              {PixelFormat::rgb8, 8, 8},
-                                              {PixelFormat::rgb16, 8, 9},
-                                              {PixelFormat::gray8, 9, 8},
-                                              {PixelFormat::gray16, 8, 8},
-                                              {PixelFormat::yuv422p8, 9, 9},
-                                              {PixelFormat::yuv422p8, 35, 8},
-                                              {PixelFormat::rgb8, 2000, 8},
-                                              {PixelFormat::yuv422p8, 8, 2000},
-                                              {PixelFormat::rgb16, 8, 2000},
-                                              {PixelFormat::gray8, 37, 21},
-                                              {PixelFormat::rgb8, 643, 481},
-                                              {PixelFormat::gray16, 643, 481}}),
+                         testing::Combine(testing::ValuesIn(pictures()),
                                           testing::Values(VideoCodec::ffv1, VideoCodec::raw)));
 
 // By the check value of the CRC-32 of IEEE 802.3, in one piece and in two.
@@ -139,12 +139,7 @@ TEST(Session, WhatWasMovedAndRelitComesBackBitForBit) {
   stick.tags = {7, 11};
   TrackRecord plain;
   plain.frame = 1;
-  {
-    SessionWriter writer(directory.path(), {});
-    writer.write(record);
-    writer.write(plain);
-  }
-  const Session session = open_session(directory.path());
+  const Session session = session_of(directory, record, plain);
   ASSERT_EQ(session.track.size(), 2u);
   EXPECT_EQ(session.track[0].scene, record.scene);
   EXPECT_EQ(session.track[0].carriers, record.carriers);
@@ -189,15 +184,9 @@ TEST(Session, TwoStreamsAndTrackInOneSession) {
   TrackRecord lost;
   lost.frame = 1;
   lost.timestamp_ns = std::numeric_limits<std::int64_t>::max();
-  {
-    SessionWriter writer(directory.path(), {});
-    writer.write(noise_frame("light", 0, PixelFormat::gray16, 32, 32));
-    writer.write(noise_frame("observer", 0, PixelFormat::rgb8, 40, 30));
-    writer.write(tracked);
-    writer.write(noise_frame("light", 1, PixelFormat::gray16, 32, 32));
-    writer.write(lost);
-  }
-  Session session = open_session(directory.path());
+  Session session = session_of(directory, noise_frame("light", 0, PixelFormat::gray16, 32, 32),
+                               noise_frame("observer", 0, PixelFormat::rgb8, 40, 30), tracked,
+                               noise_frame("light", 1, PixelFormat::gray16, 32, 32), lost);
   EXPECT_TRUE(session.missing.empty());
   ASSERT_EQ(session.track.size(), 2u);
   EXPECT_EQ(session.track[0].world_from_camera, tracked.world_from_camera);

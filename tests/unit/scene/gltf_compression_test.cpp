@@ -234,10 +234,9 @@ TEST_F(GltfCompression, OfDracoCannotAskForMuch) {
     bytes.insert(bytes.end(), {0x80, 0x80, 0x80, 0x80, 0x04});
   bytes.resize(100);
   const int view = gltf.view(bytes);
-  Json primitive = {{"attributes", {{"POSITION", gltf.accessor(-1, 5126, "VEC3", 3)}}}};
-  primitive["extensions"]["KHR_draco_mesh_compression"] = {{"bufferView", view},
-                                                           {"attributes", {{"POSITION", 0}}}};
-  gltf.root("a", gltf.mesh(primitive));
+  const Json compressed = {{"bufferView", view}, {"attributes", {{"POSITION", 0}}}};
+  add_mesh({{"POSITION", gltf.accessor(-1, 5126, "VEC3", 3)}},
+           {{"extensions", {{"KHR_draco_mesh_compression", compressed}}}});
   EXPECT_THAT(error(), HasSubstr("100 bytes cannot hold 1073741824 triangles"));
 }
 

@@ -12,7 +12,7 @@ class GltfMaterials : public GltfTest {
     const Json attributes = {{"POSITION", gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}})},
                              {"TEXCOORD_0", gltf.uvs({{0, 0}, {1, 0}, {0, 1}})},
                              {"TEXCOORD_1", gltf.uvs({{0.5f, 0.5f}, {0.75f, 0}, {0, 0.75f}})}};
-    gltf.root("a", gltf.mesh({{"attributes", attributes}, {"material", index}}));
+    add_mesh(attributes, {{"material", index}});
   }
   // The same with an image as its base colour.
   void use_image(Json image) {

@@ -42,7 +42,7 @@ TEST(Placement, OfNothingIsTheSceneItself) {
   for (std::size_t i = 0; i < 3; ++i)
     EXPECT_EQ(placement.instances[i].world_from_object, stage.scene.instances[i].world_from_object);
   EXPECT_EQ(placement.lights.size(), 2u);
-  EXPECT_TRUE(placement.unknown.empty());
+  EXPECT_THAT(placement.unknown, IsEmpty());
 }
 
 // A quarter turn about Z through the world's origin, then 1 m up.
@@ -156,7 +156,7 @@ TEST(Placement, AVariantIsOfTheMaterialsOfItsObjectAlone) {
   stage.scene.instances[2].material = 4;
   stage.state.variants["torch"] = "lacquered";
   Placement placement = stage.placed();
-  EXPECT_TRUE(placement.unknown.empty());
+  EXPECT_THAT(placement.unknown, IsEmpty());
   EXPECT_EQ(placement.instances[2].material, 5u);
   EXPECT_EQ(placement.instances[2].mesh, 3u);
   EXPECT_EQ(placement.instances[1].material, 0u);
@@ -177,9 +177,7 @@ TEST(Placement, NamesTheSetHasNotAreTold) {
   stage.state.objects["ghost"] = glm::dmat4(1);
   stage.state.lights["moon"] = {};
   const Placement placement = stage.placed();
-  ASSERT_EQ(placement.unknown.size(), 2u);
-  EXPECT_THAT(placement.unknown[0], HasSubstr("\"ghost\""));
-  EXPECT_THAT(placement.unknown[1], HasSubstr("\"moon\""));
+  EXPECT_THAT(placement.unknown, ElementsAre(HasSubstr("\"ghost\""), HasSubstr("\"moon\"")));
 }
 
 }  // namespace previz::scene::placement_test

@@ -41,28 +41,16 @@ TEST(SetValues, AFolderIsTheSameWithASlashAtItsEnd) {
 }
 
 TEST(SetValues, StepsOfThePreviewStayInTheirOrder) {
-  const auto set = parse(R"(
-[quality]
-fps = 25
-[[quality.preview]]
-samples = 4
-denoise = false
-[[quality.preview]]
-scale = 0.5
-)");
+  const auto set =
+      parse("quality = {fps = 25, preview = [{samples = 4, denoise = false}, {scale = 0.5}]}");
   EXPECT_EQ(set.quality.fps, 25);
   EXPECT_EQ(set.quality.steps, (std::vector<PreviewStep>{{4, 1, false}, {1, 0.5, {}}}));
 }
 
 TEST(SetValues, AnOverlayReplacesKeysAndAllStepsTogether) {
   const char* own = R"(
-[quality]
-fps = 25
-samples = 8
-[[quality.preview]]
-samples = 4
-[estimator]
-max_depth = 5
+quality = {fps = 25, samples = 8, preview = [{samples = 4}]}
+estimator = {max_depth = 5}
 )";
   const Overlay with{"live.toml",
                      "[quality]\nfps = 50\n[[quality.preview]]\nscale = 0.5\n"
