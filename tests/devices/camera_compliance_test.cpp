@@ -6,6 +6,7 @@
 namespace previz::test::camera_compliance_test {
 
 using std::chrono::milliseconds;
+using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 // Far beyond what any device takes for a frame; reached only by a failure.
@@ -24,7 +25,7 @@ class CameraCompliance : public testing::TestWithParam<RegisteredDevice> {
   // The next frame; none where none comes in a long time or the device is lost.
   FramePtr next_frame(Camera& camera) {
     for (const auto end = Clock::now() + patience; Clock::now() < end;) {
-      CameraEvent event = camera.next(milliseconds(200));
+      CameraEvent event = camera.next(200ms);
       if (auto* frame = std::get_if<FramePtr>(&event)) return std::move(*frame);
       if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) {
         EXPECT_EQ(trouble->device, camera.name());
@@ -61,14 +62,14 @@ class CameraCompliance : public testing::TestWithParam<RegisteredDevice> {
   }
 
   void expect_silence(Camera& camera) {
-    EXPECT_TRUE(std::holds_alternative<NoFrame>(camera.next(milliseconds(0))));
-    EXPECT_TRUE(std::holds_alternative<NoFrame>(camera.next(milliseconds(50))));
+    EXPECT_TRUE(std::holds_alternative<NoFrame>(camera.next(0ms)));
+    EXPECT_TRUE(std::holds_alternative<NoFrame>(camera.next(50ms)));
   }
 
   // Until the device says that it is lost; frames before that may still come.
   std::optional<DeviceTrouble> wait_until_lost(Camera& camera) {
     for (const auto end = Clock::now() + patience; Clock::now() < end;) {
-      const CameraEvent event = camera.next(milliseconds(100));
+      const CameraEvent event = camera.next(100ms);
       const auto* trouble = std::get_if<DeviceTrouble>(&event);
       if (trouble && trouble->lost) return *trouble;
     }
@@ -161,7 +162,7 @@ TEST_P(CameraCompliance, StartsAndStopsWithoutAFrameTaken) {
 TEST_P(CameraCompliance, StopsWithRequestsInFlight) {
   const auto camera = started();
   ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
-  std::this_thread::sleep_for(milliseconds(150));
+  std::this_thread::sleep_for(150ms);
   camera->stop();
   const std::int64_t stopped_ns = std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
   expect_silence(*camera);
@@ -191,8 +192,7 @@ TEST_P(CameraCompliance, DoesNotWaitWhereItIsAskedNotTo) {
   for (int i = 0; i < 1000 && in_vain.size() < 101; ++i) {
     const auto begin = Clock::now();
     ASSERT_LT(begin, enough) << "a thousand calls take longer than that";
-    if (std::holds_alternative<NoFrame>(camera->next(milliseconds(0))))
-      in_vain.push_back(Clock::now() - begin);
+    if (std::holds_alternative<NoFrame>(camera->next(0ms))) in_vain.push_back(Clock::now() - begin);
   }
   if (const auto middle = median(in_vain)) {
     EXPECT_LT(*middle, 0.1 * frame_of(*camera));
@@ -210,7 +210,7 @@ TEST_P(CameraCompliance, ReturnsByItsDeadlineWhateverComes) {
     EXPECT_LT(*over, 0.1 * frame + millisecond);
   }
   if (!device_->spoil()) return;
-  for (const milliseconds asked : {half, milliseconds(100)}) {
+  for (const milliseconds asked : {half, 100ms}) {
     if (const auto over = overrun(*camera, asked)) {
       EXPECT_LT(*over, frame + millisecond) << asked.count();
     }
@@ -255,7 +255,7 @@ TEST_P(CameraUnplugged, TellsSoWhileItStreams) {
   ASSERT_TRUE(trouble);
   EXPECT_EQ(trouble->device, camera->name());
   EXPECT_FALSE(trouble->what.empty());
-  const CameraEvent after = camera->next(milliseconds(0));
+  const CameraEvent after = camera->next(0ms);
   EXPECT_TRUE(std::holds_alternative<DeviceTrouble>(after));
   camera->stop();
 }

@@ -9,6 +9,7 @@
 namespace previz::v4l2::v4l2_test {
 
 using std::chrono::milliseconds;
+using namespace std::chrono_literals;
 using test::error_of;
 
 CameraSettings settings() {
@@ -217,7 +218,7 @@ class V4l2Stream : public testing::Test {
 
   // Everything that is queued is looked at within less than a millisecond.
   FramePtr next() {
-    CameraEvent event = camera_->next(milliseconds(1));
+    CameraEvent event = camera_->next(1ms);
     auto* frame = std::get_if<FramePtr>(&event);
     return frame ? std::move(*frame) : nullptr;
   }
@@ -334,7 +335,7 @@ TEST_F(V4l2Stream, NoFrameFromBeforeAStop) {
 TEST_F(V4l2Stream, AnUnpluggedDeviceIsLostAndLetGo) {
   start();
   device_.unplugged = true;
-  for (int i = 0; i < 2; ++i) EXPECT_EQ(loss_of(camera_->next(milliseconds(0))), "was unplugged");
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(loss_of(camera_->next(0ms)), "was unplugged");
   camera_.reset();
   EXPECT_EQ(device_.mapped, 0);
 }
@@ -343,16 +344,16 @@ TEST_F(V4l2Stream, ErrorsInARowAreALoss) {
   start();
   device_.dequeue_errors.assign(9, EIO);
   device_.send(device_.now_ns, 1);
-  EXPECT_TRUE(std::holds_alternative<FramePtr>(camera_->next(milliseconds(1000))));
+  EXPECT_TRUE(std::holds_alternative<FramePtr>(camera_->next(1000ms)));
   EXPECT_EQ(counted("read errors"), 9u);
   device_.dequeue_errors.assign(10, EIO);
-  EXPECT_EQ(loss_of(camera_->next(milliseconds(1000))), "cannot be read: Input/output error");
+  EXPECT_EQ(loss_of(camera_->next(1000ms)), "cannot be read: Input/output error");
 }
 
 TEST_F(V4l2Stream, WaitsAsLongAsItIsAskedTo) {
   start();
-  for (const milliseconds asked : {milliseconds(30), milliseconds(0)}) {
-    device_.waited_in_vain = milliseconds(0);
+  for (const milliseconds asked : {30ms, 0ms}) {
+    device_.waited_in_vain = 0ms;
     EXPECT_TRUE(std::holds_alternative<NoFrame>(camera_->next(asked)));
     EXPECT_EQ(device_.waited_in_vain, asked);
   }
@@ -366,7 +367,7 @@ TEST_F(V4l2Stream, DamagedFramesWithoutEndDoNotMakeItWaitLonger) {
     device.send(0, 1, [](v4l2_buffer& buffer) { buffer.flags |= V4L2_BUF_FLAG_ERROR; });
   };
   const std::int64_t begin = device_.now_ns;
-  EXPECT_TRUE(std::holds_alternative<NoFrame>(camera_->next(milliseconds(30))));
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(camera_->next(30ms)));
   EXPECT_LE(device_.now_ns, begin + 31'000'000);  // a wait is rounded up to milliseconds
   EXPECT_LE(device_.dequeued, 30 / 5);
   EXPECT_GE(device_.dequeued, 30 / 5 - 1);
@@ -379,7 +380,7 @@ TEST_F(V4l2Stream, DamagedFramesWithoutEndDoNotMakeItWaitLonger) {
 TEST_F(V4l2Stream, DamagedFramesThatWaitAlreadyDoNotMakeItWaitLonger) {
   start();
   device_.damages_all = true;
-  device_.dequeue_time = milliseconds(40);
+  device_.dequeue_time = 40ms;
   for (const int asked_ms : {0, 1, 100, 1000}) {
     const std::int64_t begin = device_.now_ns;
     EXPECT_TRUE(std::holds_alternative<NoFrame>(camera_->next(milliseconds(asked_ms))));
@@ -405,7 +406,7 @@ TEST(V4l2Buffers, FewerThanAskedForAreEnoughIfThereAreTwo) {
     EXPECT_EQ(device.mapped, static_cast<int>(granted));
     for (std::uint32_t i = 0; i < 2 * granted; ++i) {
       device.send(device.now_ns, 1);
-      EXPECT_TRUE(std::holds_alternative<FramePtr>(camera->next(milliseconds(1)))) << i;
+      EXPECT_TRUE(std::holds_alternative<FramePtr>(camera->next(1ms))) << i;
     }
     camera->stop();
     EXPECT_EQ(device.mapped, 0);
@@ -458,7 +459,7 @@ TEST_F(V4l2Stream, ABufferThatCannotBeQueuedAgainIsALossAfterItsFrame) {
   start();
   device_.send(device_.now_ns, 1);
   EXPECT_TRUE(next());
-  EXPECT_NE(loss_of(camera_->next(milliseconds(1))), "");
+  EXPECT_NE(loss_of(camera_->next(1ms)), "");
 }
 
 // What S_FMT makes of a size, as a driver with a mistake in it, or a hostile device, would.
@@ -523,7 +524,7 @@ TEST_F(V4l2Stream, AChangeOfTheSourceIsALossSoThatItIsOpenedAnew) {
   device_.events = {other, change};
   device_.send(device_.now_ns, 1);
   for (int i = 0; i < 2; ++i)
-    EXPECT_EQ(loss_of(camera_->next(milliseconds(0))), "has changed its picture size");
+    EXPECT_EQ(loss_of(camera_->next(0ms)), "has changed its picture size");
 }
 
 // A driver whose events never end must not hold the camera up.

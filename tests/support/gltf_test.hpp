@@ -29,6 +29,8 @@ class GltfTest : public ::testing::Test {
     gltf.root("a", gltf.mesh(std::move(primitive)));
   }
 
+  Json& first_primitive() { return gltf.json["meshes"][0]["primitives"][0]; }
+
   // The message of the previz::Error that loading throws; "" where it loads.
   std::string error(const char* name = "test.gltf") {
     return test::error_of([&] { load(name); });

@@ -15,8 +15,7 @@ class GltfComponents : public GltfTest {
     gltf = {};
     gltf.root("a", gltf.triangle_mesh());
     const int view = gltf.view(GltfWriter::bytes_of(values), 4 * sizeof(T));
-    gltf.json["meshes"][0]["primitives"][0]["attributes"][attribute] =
-        gltf.accessor(view, type, shape, 3, normalized);
+    first_primitive()["attributes"][attribute] = gltf.accessor(view, type, shape, 3, normalized);
   }
 };
 

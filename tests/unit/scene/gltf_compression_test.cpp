@@ -33,9 +33,6 @@ std::vector<Corners> triangles_of(const Grid& grid) {
 class GltfCompression : public GltfTest {
  protected:
   scene::Mesh mesh(const char* name = "test.gltf") { return load(name).meshes.at(0); }
-  void set_attribute(const char* name, int accessor) {
-    gltf.json["meshes"][0]["primitives"][0]["attributes"][name] = accessor;
-  }
 };
 
 TEST_F(GltfCompression, OfMeshoptIsWithoutLoss) {
@@ -60,8 +57,7 @@ TEST_F(GltfCompression, OfIndicesInAnyOrder) {
   bytes.resize(meshopt_encodeIndexSequence(bytes.data(), bytes.size(), given.indices.data(),
                                            given.indices.size()));
   const int view = meshopt_view(gltf, bytes, "INDICES", given.indices.size(), 2);
-  gltf.json["meshes"][0]["primitives"][0]["indices"] =
-      gltf.accessor(view, 5123, "SCALAR", given.indices.size());
+  first_primitive()["indices"] = gltf.accessor(view, 5123, "SCALAR", given.indices.size());
   EXPECT_EQ(triangles_of(mesh()), triangles_of(given));
 }
 
@@ -78,7 +74,7 @@ TEST_F(GltfCompression, OfFilteredNormals) {
   meshopt_encodeFilterOct(filtered.data(), count, 4, 8, &normals[0].x);
   const int view = meshopt_view(gltf, meshopt_vertices(filtered.data(), count, 4), "ATTRIBUTES",
                                 count, 4, "OCTAHEDRAL");
-  set_attribute("NORMAL", gltf.accessor(view, 5120, "VEC3", count, true));
+  first_primitive()["attributes"]["NORMAL"] = gltf.accessor(view, 5120, "VEC3", count, true);
   const scene::Mesh decoded = mesh();
   for (std::size_t i = 0; i < count; ++i)
     EXPECT_LT(glm::distance(decoded.normals[i], given.normals[i]), 0.0235f) << i;
@@ -94,7 +90,7 @@ TEST_F(GltfCompression, OfFilteredPositions) {
   meshopt_encodeFilterExp(filtered.data(), count, 12, 15, &given.positions[0].x);
   const int view = meshopt_view(gltf, meshopt_vertices(filtered.data(), count, 12), "ATTRIBUTES",
                                 count, 12, "EXPONENTIAL");
-  set_attribute("POSITION", gltf.accessor(view, 5126, "VEC3", count));
+  first_primitive()["attributes"]["POSITION"] = gltf.accessor(view, 5126, "VEC3", count);
   const scene::Mesh decoded = mesh();
   for (std::size_t i = 0; i < count; ++i)
     for (int k = 0; k < 3; ++k)
@@ -155,12 +151,12 @@ TEST_F(GltfCompression, OfDracoIsWithinItsSteps) {
 TEST_F(GltfCompression, DoesNotMatterWhereThereIsUncompressedDataToo) {
   gltf = plain_grid();
   const scene::Mesh plain = mesh();
-  gltf.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"] = {
+  first_primitive()["extensions"]["KHR_draco_mesh_compression"] = {
       {"bufferView", 0}, {"attributes", {{"POSITION", 0}}}};
   gltf.json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0}};
   gltf.json["extensionsUsed"] = {"EXT_meshopt_compression", "KHR_draco_mesh_compression"};
-  gltf.json["meshes"][0]["primitives"][0].erase("indices");
-  gltf.json["meshes"][0]["primitives"][0]["indices"] = 3;
+  first_primitive().erase("indices");
+  first_primitive()["indices"] = 3;
   EXPECT_EQ(mesh().positions, plain.positions);
 }
 

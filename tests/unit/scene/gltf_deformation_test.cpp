@@ -37,7 +37,7 @@ class GltfDeformations : public GltfTest {
     gltf.json["skins"] = {{{"joints", {1, 2}}, {"inverseBindMatrices", inverse}}};
   }
 
-  Json& attributes() { return gltf.json["meshes"][0]["primitives"][0]["attributes"]; }
+  Json& attributes() { return first_primitive()["attributes"]; }
 
   // Moves the tip by 4 m along glTF's X within 2 s.
   void bow() {
@@ -209,7 +209,7 @@ TEST_F(GltfDeformations, TargetsAndSetsAreCountedBeforeTheyAreRead) {
   EXPECT_THAT(error(), HasSubstr(words));
 
   gltf.json["meshes"][0].erase("weights");
-  gltf.json["meshes"][0]["primitives"][0].erase("targets");
+  first_primitive().erase("targets");
   for (int set = 0; set < 17; ++set) {
     attributes()["JOINTS_" + std::to_string(set)] = zeros4;
     attributes()["WEIGHTS_" + std::to_string(set)] = 99;
@@ -255,7 +255,7 @@ TEST_F(GltfDeformations, AreRefusedWhereTheyMakeNoSense) {
   gltf = {};
   morphed();
   smile();
-  const Json first_target = gltf.json["meshes"][0]["primitives"][0]["targets"][0];
+  const Json first_target = first_primitive()["targets"][0];
   expect_refused({{"/meshes/0/weights", {1}, "1 weights for 2 morph targets"},
                   {primitive + "targets", Json::array({first_target}),
                    "4 numbers for 2 times and 1 morph targets"}});

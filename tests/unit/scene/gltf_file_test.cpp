@@ -121,7 +121,7 @@ TEST_F(GltfFiles, TakeWholeNumbersWithAPoint) {
 
 TEST_F(GltfFiles, NotesWhatIsNotShown) {
   gltf.root("a", gltf.triangle_mesh());
-  gltf.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 0;
+  first_primitive()["attributes"]["COLOR_0"] = 0;
   gltf.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 1}}}}};
   gltf.json["animations"] = Json::array({gltf.animation(0, "translation", {0}, 0)});
   EXPECT_THAT(load().notes, ElementsAre(HasSubstr("has 1 cameras; ignored"),

@@ -72,7 +72,7 @@ TEST_F(GltfVariants, OneThatIsNotThereIsRefusedWithThoseThatAre) {
   EXPECT_THAT(error(), AllOf(HasSubstr("test.gltf: no variant \"green\""),
                              HasSubstr("it has \"red\", \"blue\"")));
   gltf.json["extensions"].erase("KHR_materials_variants");
-  gltf.json["meshes"][0]["primitives"][0].erase("extensions");
+  first_primitive().erase("extensions");
   EXPECT_THAT(error(), HasSubstr("no variant \"green\"; it has none"));
 }
 
