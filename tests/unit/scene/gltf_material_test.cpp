@@ -210,12 +210,12 @@ TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
 }
 
 TEST_F(GltfMaterials, DecodesColoursBySrgbAndDataAsTheyAre) {
-  const int texture = gltf.texture(2, 1, two_texels);
-  use({{"pbrMetallicRoughness",
-        {{"baseColorTexture", {{"index", texture}}},
-         {"metallicRoughnessTexture", {{"index", texture}}}}},
-       {"emissiveTexture", {{"index", texture}}},
-       {"normalTexture", {{"index", texture}, {"scale", 0.5}}}});
+  ASSERT_EQ(gltf.texture(2, 1, two_texels), 0);
+  use(R"({
+    "pbrMetallicRoughness": {"baseColorTexture": {"index": 0},
+                             "metallicRoughnessTexture": {"index": 0}},
+    "emissiveTexture": {"index": 0},
+    "normalTexture": {"index": 0, "scale": 0.5}})"_json);
   const scene::Scene scene = load();
   const scene::Material& m = scene.materials.at(0);
   ASSERT_EQ(scene.textures.size(), 2u);  // one image, as colour and as data
@@ -281,18 +281,18 @@ TEST_F(GltfMaterials, MakesTextureCoordinatesOfTheSetAndTransformAsked) {
 
 // A mesh has the coordinates of every mapping once, and the textures say which they are read by.
 TEST_F(GltfMaterials, ReadsEveryTextureByItsOwnMapping) {
-  const int texture = gltf.texture(2, 1, two_texels);
-  const Json scaled = {{"KHR_texture_transform", {{"scale", {2, 3}}}}};
-  use({{"name", "three"},
-       {"pbrMetallicRoughness",
-        {{"baseColorTexture", {{"index", texture}, {"texCoord", 1}}},
-         {"metallicRoughnessTexture", {{"index", texture}}}}},
-       {"emissiveTexture", {{"index", texture}, {"extensions", scaled}}},
-       {"normalTexture", {{"index", texture}, {"texCoord", 1}}},
-       {"extensions",
-        {{"KHR_materials_clearcoat",
-          {{"clearcoatFactor", 1},
-           {"clearcoatTexture", {{"index", texture}, {"extensions", scaled}}}}}}}});
+  ASSERT_EQ(gltf.texture(2, 1, two_texels), 0);
+  use(R"({
+    "name": "three",
+    "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1},
+                             "metallicRoughnessTexture": {"index": 0}},
+    "emissiveTexture": {"index": 0,
+                        "extensions": {"KHR_texture_transform": {"scale": [2, 3]}}},
+    "normalTexture": {"index": 0, "texCoord": 1},
+    "extensions": {"KHR_materials_clearcoat": {
+      "clearcoatFactor": 1,
+      "clearcoatTexture": {"index": 0,
+                           "extensions": {"KHR_texture_transform": {"scale": [2, 3]}}}}}})"_json);
   const scene::Scene scene = load();
   const scene::Material& m = scene.materials.at(0);
   const auto mapping = [&](std::uint32_t scene::Material::*of) { return scene::mapping_of(m, of); };
@@ -313,25 +313,21 @@ TEST_F(GltfMaterials, ReadsEveryTextureByItsOwnMapping) {
 // The files of KHR_materials_*: which texture, and in which encoding. An alpha is the same in
 // either.
 TEST_F(GltfMaterials, ReadsTheTexturesOfExtensions) {
-  const Json texture = {{"index", gltf.texture(2, 1, two_texels)}};
-  use({{"extensions",
-        {{"KHR_materials_transmission",
-          {{"transmissionFactor", 1}, {"transmissionTexture", texture}}},
-         {"KHR_materials_clearcoat",
-          {{"clearcoatFactor", 1},
-           {"clearcoatTexture", texture},
-           {"clearcoatRoughnessTexture", texture},
-           {"clearcoatNormalTexture", {{"index", texture["index"]}, {"scale", 0.5}}}}},
-         {"KHR_materials_sheen",
-          {{"sheenColorFactor", {1, 1, 1}},
-           {"sheenRoughnessFactor", 1},
-           {"sheenColorTexture", texture},
-           {"sheenRoughnessTexture", texture}}},
-         {"KHR_materials_specular",
-          {{"specularTexture", texture}, {"specularColorTexture", texture}}}}}});
-  use({{"extensions",
-        {{"KHR_materials_anisotropy",
-          {{"anisotropyStrength", 1}, {"anisotropyTexture", texture}}}}}});
+  ASSERT_EQ(gltf.texture(2, 1, two_texels), 0);
+  use(R"({"extensions": {
+    "KHR_materials_transmission": {"transmissionFactor": 1, "transmissionTexture": {"index": 0}},
+    "KHR_materials_clearcoat": {
+      "clearcoatFactor": 1,
+      "clearcoatTexture": {"index": 0},
+      "clearcoatRoughnessTexture": {"index": 0},
+      "clearcoatNormalTexture": {"index": 0, "scale": 0.5}},
+    "KHR_materials_sheen": {
+      "sheenColorFactor": [1, 1, 1], "sheenColorTexture": {"index": 0},
+      "sheenRoughnessFactor": 1, "sheenRoughnessTexture": {"index": 0}},
+    "KHR_materials_specular": {"specularTexture": {"index": 0},
+                               "specularColorTexture": {"index": 0}}}})"_json);
+  use(with("KHR_materials_anisotropy",
+           {{"anisotropyStrength", 1}, {"anisotropyTexture", {{"index", 0}}}}));
   const scene::Scene scene = load();
   ASSERT_EQ(scene.textures.size(), 2u);  // one image, as colour and as data
   const scene::Material& m = scene.materials.at(0);
