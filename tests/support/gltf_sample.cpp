@@ -69,7 +69,8 @@ GltfWriter gltf_sample() {
       "KHR_materials_sheen": {"sheenColorFactor": [0.5, 1, 0.25], "sheenRoughnessFactor": 0.5},
       "KHR_materials_anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": 1},
       "KHR_materials_specular": {"specularFactor": 0.5, "specularColorFactor": [1, 0.5, 2]},
-      "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25}}})"_json);
+      "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25}
+    }})"_json);
   gltf.add("materials", R"({"name": "night", "emissiveFactor": [0, 0, 1]})"_json);
   const int positions =
       gltf.positions({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5f, 0.5f, 1}});
