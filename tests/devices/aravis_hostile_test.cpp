@@ -22,11 +22,11 @@
 #include "drivers/aravis/receiver/bpf.hpp"
 #include "drivers/aravis/receiver/sandbox.hpp"
 #include "drivers/aravis/receiver_process.hpp"
-#include "drivers/camera_drivers.hpp"
-#include "drivers/descriptor.hpp"
 #include "drivers/lifeline.hpp"
 #include "tests/devices/hostile_network.hpp"
+#include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::test::aravis_hostile_test {
 
@@ -40,9 +40,7 @@ TEST_F(HostileNetwork, FramesGoOnAmongMalformedPacketsInTheCamerasName) {
 
 // A packet that is well formed and in the camera's name makes the receiver lose frames at most.
 TEST_F(HostileNetwork, AForgedPromiseOfAnAnswerHoldsUpNoCall) {
-  const auto camera = open();
-  camera->start();
-  ASSERT_TRUE(takes_a_frame(*camera));
+  const auto camera = open_streaming();
   const std::vector<std::uint16_t> ports = udp_ports();
   for (const char* from : {another, address}) Sender(from).send(pending(0x7fffffff), ports);
   EXPECT_TRUE(camera->set_exposure(0.004, 1));
@@ -75,13 +73,7 @@ TEST_F(HostileNetwork, ADescriptionThatIsAFileOfThisMachineIsRefused) {
     ASSERT_TRUE(arv_fake_camera_write_memory(fake_, url_register,
                                              static_cast<guint32>(bytes.size()), bytes.data()));
     const auto begin = Clock::now();
-    std::string refusal = "it was opened";
-    try {
-      open();
-    } catch (const Error& error) {
-      refusal = error.what();
-    }
-    EXPECT_THAT(refusal, StartsWith("127.0.0.1: ")) << url;
+    EXPECT_THAT(error_of(open), StartsWith("127.0.0.1: ")) << url;
     EXPECT_LT(Clock::now() - begin, seconds(5)) << url;
   }
 }
@@ -130,18 +122,14 @@ INSTANTIATE_TEST_SUITE_P(Signals, LostReceiver, testing::Values(SIGKILL, SIGSTOP
 
 // What the service's stop sends to all of its processes ends no camera before the take is closed.
 TEST_F(HostileNetwork, AReceiverOutlivesTheSignalsOfAStop) {
-  const auto camera = open();
-  camera->start();
-  ASSERT_TRUE(takes_a_frame(*camera));
+  const auto camera = open_streaming();
   for (const int signal : {SIGTERM, SIGINT, SIGHUP}) kill(receivers().at(0), signal);
   for (int i = 0; i < 5; ++i) EXPECT_TRUE(takes_a_frame(*camera));
 }
 
 TEST_F(HostileNetwork, AReceiverHasNothingElseInReach) {
   const int secret = ::open("/etc/passwd", O_RDONLY);  // not closed in programs that are started
-  const auto camera = open();
-  camera->start();
-  ASSERT_TRUE(takes_a_frame(*camera));
+  const auto camera = open_streaming();
   const fs::path process = fs::path("/proc") / std::to_string(receivers().at(0));
   for (const fs::directory_entry& entry : fs::directory_iterator(process / "fd")) {
     const std::string target = fs::read_symlink(entry.path());
@@ -153,13 +141,9 @@ TEST_F(HostileNetwork, AReceiverHasNothingElseInReach) {
                                 [&](const std::string&) { return entry.path().filename() == "2"; },
                                 testing::IsTrue())));
   }
-  std::stringstream status;
-  status << std::ifstream(process / "status").rdbuf();
-  EXPECT_THAT(status.str(), HasSubstr("NoNewPrivs:\t1"));
-  EXPECT_THAT(status.str(), HasSubstr("Seccomp:\t2"));
-  std::stringstream environment;
-  environment << std::ifstream(process / "environ").rdbuf();
-  EXPECT_EQ(environment.str(), "");
+  EXPECT_THAT(session::content_of(process / "status"),
+              AllOf(HasSubstr("NoNewPrivs:\t1"), HasSubstr("Seccomp:\t2")));
+  EXPECT_EQ(session::content_of(process / "environ"), "");
   close(secret);
 }
 
@@ -175,15 +159,10 @@ TEST(Receiver, EndsWithTheProcessThatStartedIt) {
   }
   pid_t receiver = 0;
   ASSERT_EQ(read(ends[0], &receiver, sizeof receiver), ssize_t{sizeof receiver});
-  const auto until = [](const auto& holds) {
-    const auto end = Clock::now() + seconds(5);
-    while (!holds() && Clock::now() < end) std::this_thread::sleep_for(milliseconds(10));
-    return holds();
-  };
-  EXPECT_TRUE(until([&] { return is_running(receiver); }));
+  EXPECT_TRUE(wait_until("the receiver runs", [&] { return is_running(receiver); }));
   kill(owner, SIGKILL);
   waitpid(owner, nullptr, 0);
-  EXPECT_TRUE(until([&] { return !is_running(receiver); }));
+  EXPECT_TRUE(wait_until("the receiver ends", [&] { return !is_running(receiver); }));
   close(ends[0]);
   close(ends[1]);
 }
@@ -235,8 +214,8 @@ TEST(Receiver, ThatOnlyTalksIsEndedAtTheDeadline) {
   };
   const auto before = descriptors();
   const auto begin = Clock::now();
-  EXPECT_THAT([&] { receiver.ask(aravis::Kind::list, {}, milliseconds(300)); },
-              testing::ThrowsMessage<Error>(HasSubstr("for 300 ms")));
+  EXPECT_THAT(error_of([&] { receiver.ask(aravis::Kind::list, {}, milliseconds(300)); }),
+              HasSubstr("for 300 ms"));
   EXPECT_LT(Clock::now() - begin, seconds(3));
   EXPECT_TRUE(receiver.gone());
   EXPECT_LE(descriptors(), before);  // what it passed along is closed
@@ -260,11 +239,7 @@ template <class Call>
 int in_sandbox(bool usb, const Call& call) {
   const pid_t child = fork();
   if (child == 0) {
-    try {
-      aravis::enter_sandbox(usb);
-    } catch (const Error&) {
-      _exit(255);
-    }
+    if (!error_of([&] { aravis::enter_sandbox(usb); }).empty()) _exit(255);
     _exit(call() < 0 ? errno : 0);
   }
   int status = 0;
@@ -333,11 +308,7 @@ std::string trouble_without(long system_call, int error, const Call& call) {
     if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
         prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program, 0, 0) != 0)
       said = "no filter";
-    try {
-      call();
-    } catch (const Error& trouble) {
-      said += trouble.what();
-    }
+    said += error_of(call);
     _exit(write(ends[1], said.data(), said.size()) < 0);
   }
   close(ends[1]);

@@ -57,12 +57,7 @@ class AbsurdCamera : public testing::Test {
     return camera_driver("aravis").open(settings);
   }
   static std::string refusal(std::optional<double> rate_hz = std::nullopt) {
-    try {
-      open(rate_hz);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "it was opened";
+    return error_of([&] { open(rate_hz); });
   }
 
   // Takes what comes until `what` has been counted so often, for at most ten seconds.
@@ -107,7 +102,7 @@ TEST_F(AbsurdCamera, ASizeThatCannotBeIsRefused) {
   write(ARV_FAKE_CAMERA_REGISTER_WIDTH, 0);
   EXPECT_THAT(refusal(), HasSubstr("reports pictures of 0x48 pixels, which is impossible"));
   write(ARV_FAKE_CAMERA_REGISTER_WIDTH, 64);
-  EXPECT_EQ(refusal(), "it was opened");
+  EXPECT_EQ(refusal(), "");
 }
 
 TEST_F(AbsurdCamera, AFrameSizeThatDoesNotFitThePictureIsRefused) {
@@ -182,8 +177,7 @@ TEST_F(AbsurdCamera, StreamCountersHavePlainNames) {
        {"stream failures", "stream underruns", "stream missing packets", "stream resent packets",
         "stream timeouts", "stream transferred bytes", "stream duplicated packets"})
     EXPECT_TRUE(camera->counters().contains(name)) << name;
-  for (const auto& [name, count] : camera->counters())
-    EXPECT_THAT(name, testing::Not(HasSubstr("_")));
+  for (const auto& [name, count] : camera->counters()) EXPECT_THAT(name, Not(HasSubstr("_")));
 }
 
 }  // namespace previz::test::aravis_malformed_test

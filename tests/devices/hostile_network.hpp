@@ -53,6 +53,13 @@ class HostileNetwork : public testing::Test {
     return camera_driver("aravis").open(settings);
   }
 
+  static std::unique_ptr<Camera> open_streaming() {
+    std::unique_ptr<Camera> camera = open();
+    camera->start();
+    EXPECT_TRUE(takes_a_frame(*camera));
+    return camera;
+  }
+
   // Takes a frame; false, with what was counted, if none comes within two seconds.
   static testing::AssertionResult takes_a_frame(Camera& camera) {
     for (const auto end = Clock::now() + seconds(2); Clock::now() < end;) {
@@ -66,9 +73,7 @@ class HostileNetwork : public testing::Test {
 
   // Sends everything malformed while frames come, each at least once between two of them.
   static void expect_frames_among(const char* from) {
-    const auto camera = open();
-    camera->start();
-    ASSERT_TRUE(takes_a_frame(*camera));
+    const auto camera = open_streaming();
     const std::vector<pid_t> before = receivers();
     const std::vector<std::uint16_t> ports = udp_ports();
     const Sender sender(from);

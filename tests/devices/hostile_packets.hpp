@@ -85,17 +85,19 @@ class Sender {
   OwnedDescriptor socket_;
 };
 
+// Puts the lowest `size` bytes of a number at a place, the highest of them first.
+inline void put(Bytes& bytes, std::size_t at, std::uint32_t number, std::size_t size) {
+  for (std::size_t i = 0; i < size; ++i)
+    bytes.at(at + i) = static_cast<std::uint8_t>(number >> 8 * (size - 1 - i));
+}
+
 // A packet of the streaming protocol with a header of 8 bytes, or of 20 with extended ids.
 inline Bytes packet(std::uint8_t type, std::uint32_t number, std::uint16_t frame,
                     std::size_t rest) {
-  Bytes bytes{0,
-              0,
-              static_cast<std::uint8_t>(frame >> 8),
-              static_cast<std::uint8_t>(frame),
-              type,
-              static_cast<std::uint8_t>(number >> 16),
-              static_cast<std::uint8_t>(number >> 8),
-              static_cast<std::uint8_t>(number)};
+  Bytes bytes(8);
+  put(bytes, 2, frame, 2);
+  bytes[4] = type;
+  put(bytes, 5, number, 3);
   bytes.resize(bytes.size() + rest, 0x41);
   return bytes;
 }
@@ -103,9 +105,8 @@ inline Bytes extended(std::uint8_t type, std::uint32_t number, std::uint16_t fra
                       std::size_t rest) {
   Bytes bytes(20);
   bytes[4] = static_cast<std::uint8_t>(0x80 | type);
-  bytes[14] = static_cast<std::uint8_t>(frame >> 8);
-  bytes[15] = static_cast<std::uint8_t>(frame);
-  for (int i = 0; i < 4; ++i) bytes[16 + i] = static_cast<std::uint8_t>(number >> (24 - 8 * i));
+  put(bytes, 14, frame, 2);
+  put(bytes, 16, number, 4);
   bytes.resize(bytes.size() + rest, 0x41);
   return bytes;
 }
@@ -149,18 +150,9 @@ inline Bytes noise(std::mt19937& random) {
 
 // An answer on the control channel that says that the answer takes so long.
 inline Bytes pending(std::uint32_t ms) {
-  return {0,
-          0,
-          0,
-          0x89,
-          0,
-          4,
-          0x12,
-          0x34,
-          static_cast<std::uint8_t>(ms >> 24),
-          static_cast<std::uint8_t>(ms >> 16),
-          static_cast<std::uint8_t>(ms >> 8),
-          static_cast<std::uint8_t>(ms)};
+  Bytes bytes{0, 0, 0, 0x89, 0, 4, 0x12, 0x34, 0, 0, 0, 0};
+  put(bytes, 8, ms, 4);
+  return bytes;
 }
 
 }  // namespace previz::test::hostile

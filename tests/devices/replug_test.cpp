@@ -7,12 +7,13 @@
 namespace previz::test::replug_test {
 
 using std::chrono::milliseconds;
+using namespace std::chrono_literals;
 
 constexpr int cycles = 100;
 constexpr int warm_cycles = 20;  // until what is made once a process has been made
 
 LifelineOptions impatient(milliseconds stall_timeout) {
-  return {milliseconds(5000), stall_timeout, milliseconds(0), {milliseconds(10), milliseconds(40)}};
+  return {5000ms, stall_timeout, 0ms, {10ms, 40ms}};
 }
 
 class Replugging : public testing::TestWithParam<RegisteredDevice> {
@@ -26,10 +27,10 @@ class Replugging : public testing::TestWithParam<RegisteredDevice> {
 
   // Each frame must be of the opening it comes from.
   void take(Lifeline& lifeline, int count) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto end = std::chrono::steady_clock::now() + 20s;
     while (count > 0) {
       ASSERT_LT(std::chrono::steady_clock::now(), end) << to_string(lifeline.state());
-      const CameraEvent event = lifeline.next(milliseconds(50));
+      const CameraEvent event = lifeline.next(50ms);
       const auto* frame = std::get_if<FramePtr>(&event);
       if (!frame) continue;
       ASSERT_EQ((*frame)->width, lifeline.format().width);
@@ -40,10 +41,10 @@ class Replugging : public testing::TestWithParam<RegisteredDevice> {
 
   // Until the lifeline has closed the device that was pulled.
   void wait_for_loss(Lifeline& lifeline, std::uint64_t lost) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto end = std::chrono::steady_clock::now() + 20s;
     while (lifeline.counters().at("lost") < lost) {
       ASSERT_LT(std::chrono::steady_clock::now(), end) << to_string(lifeline.state());
-      lifeline.next(milliseconds(50));
+      lifeline.next(50ms);
     }
   }
 
@@ -59,7 +60,7 @@ TEST_P(Replugging, AHundredTimesLeavesNothingBehind) {
     ASSERT_NO_FATAL_FAILURE(take(lifeline, 2));
     if (cycle == warm_cycles) descriptors = open_descriptors(), bytes = live_bytes();
     device_->unplug();
-    lifeline.next(milliseconds(0));
+    lifeline.next(0ms);
     device_->plug();
     ASSERT_NO_FATAL_FAILURE(wait_for_loss(lifeline, static_cast<std::uint64_t>(cycle) + 1));
   }

@@ -71,7 +71,7 @@ TEST_P(UsbCamera, ThatIsWedgedIsResetAndSendsAgain) {
   std::ofstream(wedge()).close();
   const std::vector<std::string> reports =
       trouble_until_a_frame(lifeline, [this] { return !exists(wedge()); });
-  EXPECT_THAT(reports, testing::Contains(testing::HasSubstr("it was reset")));
+  EXPECT_THAT(reports, Contains(HasSubstr("it was reset")));
   EXPECT_GE(lifeline.counters().at("reset"), 1u);
 }
 

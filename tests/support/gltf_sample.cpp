@@ -15,8 +15,7 @@ void add_figure(GltfWriter& gltf, Json attributes, int indices) {
   const std::vector<glm::vec4> weights(5, glm::vec4(0.75f, 0.25f, 0, 0));
   const std::vector<glm::mat4> inverse(2, glm::mat4(1));
   attributes["JOINTS_0"] = gltf.accessor(gltf.view(joints), 5121, "VEC4", 5);
-  attributes["WEIGHTS_0"] =
-      gltf.accessor(gltf.view(GltfWriter::bytes_of(weights)), 5126, "VEC4", 5);
+  attributes["WEIGHTS_0"] = gltf.values(5126, "VEC4", weights);
   const std::vector<glm::vec3> offsets(5, glm::vec3(0, 0.5f, 0));
   const int mesh = gltf.mesh(
       {{"attributes", attributes},
@@ -26,8 +25,7 @@ void add_figure(GltfWriter& gltf, Json attributes, int indices) {
   const int tip = gltf.add("nodes", {{"translation", {0, 1, 0}}});
   gltf.root("foot", -1, {{"children", {tip}}});
   gltf.root("figure", mesh, {{"skin", 0}, {"weights", {0.5}}});
-  const int bind =
-      gltf.accessor(gltf.view(GltfWriter::bytes_of(inverse)), 5126, "MAT4", inverse.size());
+  const int bind = gltf.values(5126, "MAT4", inverse);
   gltf.json["skins"] = {{{"joints", {tip + 1, tip}}, {"inverseBindMatrices", bind}}};
   const int times = gltf.values<float>(5126, "SCALAR", {0, 1});
   const int places = gltf.positions({{0, 1, 0}, {1, 1, 0}});
@@ -48,35 +46,32 @@ GltfWriter gltf_sample() {
   std::vector<unsigned char> rgba;
   for (int i = 0; i < 4 * 4 * 4; ++i) rgba.push_back(static_cast<unsigned char>(37 * i));
   const int texture = gltf.texture(4, 4, rgba, {{"magFilter", 9728}, {"wrapS", 33071}});
-  gltf.add(
-      "materials",
-      {{"name", "glass"},
-       {"alphaMode", "BLEND"},
-       {"pbrMetallicRoughness",
-        {{"baseColorFactor", {1, 1, 0.5, 0.5}},
-         {"baseColorTexture",
-          {{"index", texture},
-           {"texCoord", 0},
-           {"extensions", {{"KHR_texture_transform", {{"offset", {0.5, 0}}, {"rotation", 1}}}}}}},
-         {"metallicFactor", 0.5}}},
-       {"emissiveFactor", {1, 0, 0}},
-       {"extensions",
-        {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
-         {"KHR_materials_ior", {{"ior", 1.5}}},
-         {"KHR_materials_volume", {{"thicknessFactor", 0.1}, {"attenuationDistance", 2}}},
-         {"KHR_materials_emissive_strength", {{"emissiveStrength", 3}}}}}});
-  gltf.add(
-      "materials",
-      {{"name", "cloth"},
-       {"extensions",
-        {{"KHR_materials_sheen",
-          {{"sheenColorFactor", {0.5, 1, 0.25}}, {"sheenRoughnessFactor", 0.5}}},
-         {"KHR_materials_anisotropy", {{"anisotropyStrength", 0.5}, {"anisotropyRotation", 1}}},
-         {"KHR_materials_specular",
-          {{"specularFactor", 0.5}, {"specularColorFactor", {1, 0.5, 2}}}},
-         {"KHR_materials_clearcoat",
-          {{"clearcoatFactor", 0.5}, {"clearcoatRoughnessFactor", 0.25}}}}}});
-  gltf.add("materials", {{"name", "night"}, {"emissiveFactor", {0, 0, 1}}});
+  Json glass = R"({
+    "name": "glass",
+    "alphaMode": "BLEND",
+    "pbrMetallicRoughness": {
+      "baseColorFactor": [1, 1, 0.5, 0.5],
+      "baseColorTexture": {
+        "texCoord": 0,
+        "extensions": {"KHR_texture_transform": {"offset": [0.5, 0], "rotation": 1}}},
+      "metallicFactor": 0.5},
+    "emissiveFactor": [1, 0, 0],
+    "extensions": {
+      "KHR_materials_transmission": {"transmissionFactor": 1},
+      "KHR_materials_ior": {"ior": 1.5},
+      "KHR_materials_volume": {"thicknessFactor": 0.1, "attenuationDistance": 2},
+      "KHR_materials_emissive_strength": {"emissiveStrength": 3}}})"_json;
+  glass["pbrMetallicRoughness"]["baseColorTexture"]["index"] = texture;
+  gltf.add("materials", glass);
+  gltf.add("materials", R"({
+    "name": "cloth",
+    "extensions": {
+      "KHR_materials_sheen": {"sheenColorFactor": [0.5, 1, 0.25], "sheenRoughnessFactor": 0.5},
+      "KHR_materials_anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": 1},
+      "KHR_materials_specular": {"specularFactor": 0.5, "specularColorFactor": [1, 0.5, 2]},
+      "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25}
+    }})"_json);
+  gltf.add("materials", R"({"name": "night", "emissiveFactor": [0, 0, 1]})"_json);
   const int positions =
       gltf.positions({{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5f, 0.5f, 1}});
   const int sparse_indices = gltf.view(GltfWriter::bytes_of(std::vector<std::uint16_t>{4}));

@@ -4,6 +4,7 @@
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
+#include "drivers/session/records.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -12,6 +13,8 @@ namespace previz::test {
 
 class GltfTest : public ::testing::Test {
  protected:
+  using Json = GltfWriter::Json;
+
   scene::Scene load(const char* name = "test.gltf") {
     gltf.save(directory / name);
     set::Set set = a_set;
@@ -20,9 +23,50 @@ class GltfTest : public ::testing::Test {
     return scene::load_scene(set);
   }
 
+  // A root node with a mesh of one primitive.
+  void add_mesh(Json attributes, Json primitive = Json::object()) {
+    primitive["attributes"] = std::move(attributes);
+    gltf.root("a", gltf.mesh(std::move(primitive)));
+  }
+
+  Json& first_primitive() { return gltf.json["meshes"][0]["primitives"][0]; }
+
   // The message of the previz::Error that loading throws; "" where it loads.
   std::string error(const char* name = "test.gltf") {
     return test::error_of([&] { load(name); });
+  }
+
+  // The same with one value of the JSON, given by its JSON pointer, set to another for this time.
+  std::string error_with(const std::string& pointer, const Json& value) {
+    const Json sound = gltf.json;
+    gltf.json[Json::json_pointer(pointer)] = value;
+    std::string message = error();
+    gltf.json = sound;
+    return message;
+  }
+
+  struct Refusal {
+    std::string pointer;
+    Json value;
+    std::string words;  // of the message
+  };
+  void expect_refused(const std::vector<Refusal>& refusals) {
+    for (const auto& [pointer, value, words] : refusals)
+      EXPECT_THAT(error_with(pointer, value), HasSubstr(words)) << pointer << ": " << value;
+  }
+
+  // Makes "go", an animation of one property of a node, the only one of the file and the object's.
+  void animate(int node, const char* path, const std::vector<float>& times_s, int output) {
+    Json animation = gltf.animation(node, path, times_s, output);
+    animation["name"] = object.animation = "go";
+    gltf.json["animations"] = Json::array({animation});
+  }
+
+  // The state of the set at a time of the animation.
+  static session::SceneState state_at(double animation_s) {
+    session::SceneState state;
+    state.animation_s = animation_s;
+    return state;
   }
 
   test::TemporaryDirectory directory;

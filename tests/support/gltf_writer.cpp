@@ -52,6 +52,13 @@ int GltfWriter::triangle_mesh(int material) {
   return mesh(std::move(primitive), "triangle");
 }
 
+GltfWriter::Json GltfWriter::animation(int node, const char* path,
+                                       const std::vector<float>& times_s, int output) {
+  const int input = values(5126, "SCALAR", times_s);
+  return {{"channels", {{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}}}},
+          {"samplers", {{{"input", input}, {"output", output}}}}};
+}
+
 int GltfWriter::root(const char* name, int mesh, Json more) {
   more["name"] = name;
   if (mesh >= 0) more["mesh"] = mesh;
@@ -98,9 +105,9 @@ std::string base64(const std::vector<unsigned char>& bytes) {
 std::vector<unsigned char> png(int width, int height, const std::vector<unsigned char>& rgba) {
   std::vector<unsigned char> bytes;
   const auto append = [](void* to, void* data, int size) {
+    auto& all = *static_cast<std::vector<unsigned char>*>(to);
     const auto* begin = static_cast<unsigned char*>(data);
-    static_cast<std::vector<unsigned char>*>(to)->insert(
-        static_cast<std::vector<unsigned char>*>(to)->end(), begin, begin + size);
+    all.insert(all.end(), begin, begin + size);
   };
   if (rgba.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 4 ||
       !stbi_write_png_to_func(append, &bytes, width, height, 4, rgba.data(), 4 * width))

@@ -40,6 +40,8 @@ class GltfWriter {
   }
   // A mesh of one right triangle (0,0,0) (1,0,0) (0,1,0) without normals.
   int triangle_mesh(int material = -1);
+  // An animation, without a name and not added, of one property of a node by an accessor's values.
+  Json animation(int node, const char* path, const std::vector<float>& times_s, int output);
   // A node in scene 0; its "mesh" is left out where negative.
   int root(const char* name, int mesh = -1, Json more = Json::object());
   // An image of RGBA bytes, as PNG in the buffer; and a texture of it with the sampler given.

@@ -105,12 +105,15 @@ TEST(Yuv, ColourBarsOfBt601) {
   }
 }
 
+constexpr WireFormat yuyv_of_bt709{Layout::yuyv, 8, Packing::words, YuvMatrix::bt709,
+                                   YuvRange::limited};
+
 TEST(Yuv, Bt709Limited422KeepsItsSamples) {
-  WireFormat format{Layout::yuyv, 8, Packing::words, YuvMatrix::bt709, YuvRange::limited};
   const Frame yuyv =
-      converted(format, 4, 2, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
+      converted(yuyv_of_bt709, 4, 2, {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16});
   EXPECT_EQ(yuyv.format, PixelFormat::yuv422p8);
   EXPECT_EQ(yuyv.bytes, (Bytes{1, 3, 5, 7, 9, 11, 13, 15, 2, 6, 10, 14, 4, 8, 12, 16}));
+  WireFormat format = yuyv_of_bt709;
   format.layout = Layout::uyvy;
   const Frame uyvy =
       converted(format, 4, 2, {2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15});
@@ -118,9 +121,8 @@ TEST(Yuv, Bt709Limited422KeepsItsSamples) {
 }
 
 TEST(Yuv, OddWidthsHaveHalfAMacroPixel) {
-  const WireFormat format{Layout::yuyv, 8, Packing::words, YuvMatrix::bt709, YuvRange::limited};
-  EXPECT_EQ(row_bytes(format, 3), 8u);
-  const Frame frame = converted(format, 3, 1, {1, 2, 3, 4, 5, 6, 99, 8});
+  EXPECT_EQ(row_bytes(yuyv_of_bt709, 3), 8u);
+  const Frame frame = converted(yuyv_of_bt709, 3, 1, {1, 2, 3, 4, 5, 6, 99, 8});
   EXPECT_EQ(frame.bytes, (Bytes{1, 3, 5, 2, 6, 4, 8}));
 }
 
@@ -255,8 +257,7 @@ TEST(Mono, EveryCodeOfEveryDepthStaysApartAndOnTheLine) {
   for (int bits = 9; bits <= 16; ++bits) {
     const int codes = 1 << bits;
     std::vector<std::uint16_t> all(static_cast<std::size_t>(codes));
-    for (int v = 0; v < codes; ++v)
-      all[static_cast<std::size_t>(v)] = static_cast<std::uint16_t>(v);
+    std::iota(all.begin(), all.end(), std::uint16_t{0});
     const Frame frame = converted(plain(Layout::mono, bits), 256, codes / 256, bytes_of(all));
     EXPECT_EQ(frame.format, PixelFormat::gray16);
     const std::vector<std::uint16_t> words = words_of(frame.bytes);
@@ -270,50 +271,47 @@ TEST(Mono, WhatLiesAboveASamplesBitsIsIgnored) {
   EXPECT_EQ(words_of(frame.bytes), (std::vector<std::uint16_t>{65535, 0}));
 }
 
+// The samples of a picture are these codes of 0 to `white`.
+void expect_codes(const Frame& frame, const std::vector<int>& codes, int white) {
+  for (std::size_t i = 0; i < codes.size(); ++i)
+    EXPECT_EQ(words_of(frame.bytes)[i], std::lround(65535.0 * codes[i] / white)) << i;
+}
+
 // PFNC 2.1, "Mono10p" and "Mono12p": samples follow each other from the lowest bit of each byte.
 TEST(Mono, PackedAsOneStreamOfBits) {
-  const Frame ten = converted(plain(Layout::mono, 10, Packing::bits), 4, 1,
-                              {0xff, 0x03, 0x50, 0x95, 0xaa});  // 0x3ff, 0x000, 0x155, 0x2aa
-  for (int i = 0; i < 4; ++i)
-    EXPECT_EQ(words_of(ten.bytes)[i],
-              std::lround(65535.0 * std::array{0x3ff, 0x000, 0x155, 0x2aa}[i] / 0x3ff));
-  const Frame twelve =
-      converted(plain(Layout::mono, 12, Packing::bits), 2, 1, {0xbc, 0x3a, 0x12});  // 0xabc, 0x123
-  EXPECT_EQ(words_of(twelve.bytes)[0], std::lround(65535.0 * 0xabc / 0xfff));
-  EXPECT_EQ(words_of(twelve.bytes)[1], std::lround(65535.0 * 0x123 / 0xfff));
+  expect_codes(
+      converted(plain(Layout::mono, 10, Packing::bits), 4, 1, {0xff, 0x03, 0x50, 0x95, 0xaa}),
+      {0x3ff, 0x000, 0x155, 0x2aa}, 0x3ff);
+  expect_codes(converted(plain(Layout::mono, 12, Packing::bits), 2, 1, {0xbc, 0x3a, 0x12}),
+               {0xabc, 0x123}, 0xfff);
 }
 
 // GigE Vision 2.0, "Mono12Packed" and "Mono10Packed".
 TEST(Mono, PackedAsGigeVisionDoes) {
-  const Frame twelve = converted(plain(Layout::mono, 12, Packing::gige), 2, 1, {0xab, 0x3c, 0x12});
-  EXPECT_EQ(words_of(twelve.bytes)[0], std::lround(65535.0 * 0xabc / 0xfff));
-  EXPECT_EQ(words_of(twelve.bytes)[1], std::lround(65535.0 * 0x123 / 0xfff));
-  const Frame ten = converted(plain(Layout::mono, 10, Packing::gige), 2, 1, {0xff, 0x13, 0x80});
-  EXPECT_EQ(words_of(ten.bytes)[0], 65535);
-  EXPECT_EQ(words_of(ten.bytes)[1], std::lround(65535.0 * 0x201 / 0x3ff));
+  expect_codes(converted(plain(Layout::mono, 12, Packing::gige), 2, 1, {0xab, 0x3c, 0x12}),
+               {0xabc, 0x123}, 0xfff);
+  expect_codes(converted(plain(Layout::mono, 10, Packing::gige), 2, 1, {0xff, 0x13, 0x80}),
+               {0x3ff, 0x201}, 0x3ff);
 }
 
 // MIPI CSI-2, "RAW10", "RAW12" and "RAW14": the high bytes of a group, then its low bits, the first
 // sample's lowest.
 TEST(Mono, PackedAsCsi2Does) {
-  const auto expect = [](const Frame& frame, const std::vector<int>& codes, int white) {
-    for (std::size_t i = 0; i < codes.size(); ++i)
-      EXPECT_EQ(words_of(frame.bytes)[i], std::lround(65535.0 * codes[i] / white)) << i;
-  };
   // 0x3ff, 0x001, 0x156, 0x2aa: low bits 3, 1, 2, 2
-  expect(converted(plain(Layout::mono, 10, Packing::csi2), 4, 1, {0xff, 0x00, 0x55, 0xaa, 0xa7}),
-         {0x3ff, 0x001, 0x156, 0x2aa}, 0x3ff);
-  expect(
+  expect_codes(
+      converted(plain(Layout::mono, 10, Packing::csi2), 4, 1, {0xff, 0x00, 0x55, 0xaa, 0xa7}),
+      {0x3ff, 0x001, 0x156, 0x2aa}, 0x3ff);
+  expect_codes(
       converted(plain(Layout::mono, 12, Packing::csi2), 4, 1, {0xab, 0x12, 0x3c, 0xff, 0x00, 0x1f}),
       {0xabc, 0x123, 0xfff, 0x001}, 0xfff);
   // 0x3fff, 0x0001, 0x2aaa, 0x1555: low bits 3f, 01, 2a, 15
-  expect(converted(plain(Layout::mono, 14, Packing::csi2), 4, 1,
-                   {0xff, 0x00, 0xaa, 0x55, 0x7f, 0xa0, 0x56}),
-         {0x3fff, 0x0001, 0x2aaa, 0x1555}, 0x3fff);
+  expect_codes(converted(plain(Layout::mono, 14, Packing::csi2), 4, 1,
+                         {0xff, 0x00, 0xaa, 0x55, 0x7f, 0xa0, 0x56}),
+               {0x3fff, 0x0001, 0x2aaa, 0x1555}, 0x3fff);
   // 5x2: a row that ends within a group still has the whole group.
-  expect(converted(plain(Layout::mono, 10, Packing::csi2), 5, 2,
-                   {0, 0, 0, 0, 0, 0xff, 0, 0, 0, 0x03, 0, 0, 0, 0, 0, 0x80, 0, 0, 0, 0x01}),
-         {0, 0, 0, 0, 0x3ff, 0, 0, 0, 0, 0x201}, 0x3ff);
+  expect_codes(converted(plain(Layout::mono, 10, Packing::csi2), 5, 2,
+                         {0, 0, 0, 0, 0, 0xff, 0, 0, 0, 0x03, 0, 0, 0, 0, 0, 0x80, 0, 0, 0, 0x01}),
+               {0, 0, 0, 0, 0x3ff, 0, 0, 0, 0, 0x201}, 0x3ff);
   for (const int bits : {9, 11, 13, 15, 16}) {
     const Bytes bytes(100);
     Frame frame;
@@ -336,8 +334,7 @@ TEST(Rgb, BothOrdersAtEveryDepth) {
 
 TEST(Rows, WhatLiesBetweenThemIsLeftOut) {
   EXPECT_EQ(converted(plain(Layout::mono), 2, 2, {1, 2, 99, 3, 4}, 3).bytes, (Bytes{1, 2, 3, 4}));
-  const WireFormat yuyv{Layout::yuyv, 8, Packing::words, YuvMatrix::bt709, YuvRange::limited};
-  EXPECT_EQ(converted(yuyv, 2, 2, {1, 2, 3, 4, 99, 99, 5, 6, 7, 8}, 6).bytes,
+  EXPECT_EQ(converted(yuyv_of_bt709, 2, 2, {1, 2, 3, 4, 99, 99, 5, 6, 7, 8}, 6).bytes,
             (Bytes{1, 3, 5, 7, 2, 6, 4, 8}));
 }
 
@@ -452,8 +449,8 @@ TEST(Malformed, ShortAndAbsurdPicturesAreRefusedInWords) {
     EXPECT_EQ(damage_of(9, 7, 0, whole - 1), "is truncated: " + std::to_string(whole - 1) + " of " +
                                                  std::to_string(whole) + " bytes");
     EXPECT_NE(damage_of(9, 7, 0, 0), "");
-    EXPECT_NE(damage_of(9, 7, row_bytes(format, 9) - 1, 10'000).find("rows of"), std::string::npos);
-    EXPECT_NE(damage_of(9, 7, std::size_t{1} << 40, 10'000).find("truncated"), std::string::npos);
+    EXPECT_THAT(damage_of(9, 7, row_bytes(format, 9) - 1, 10'000), HasSubstr("rows of"));
+    EXPECT_THAT(damage_of(9, 7, std::size_t{1} << 40, 10'000), HasSubstr("truncated"));
     EXPECT_NE(damage_of(0, 7, 0, 10'000), "");
     EXPECT_NE(damage_of(9, -7, 0, 10'000), "");
     EXPECT_NE(damage_of(1 << 20, 1 << 20, 0, 10'000), "");
@@ -471,7 +468,7 @@ TEST(Malformed, ShortAndAbsurdPicturesAreRefusedInWords) {
 
 TEST(DeepSamples, KeepTheirBitsUpToTheLinearFloatPicture) {
   std::vector<std::uint16_t> all(65536);
-  for (std::size_t v = 0; v < all.size(); ++v) all[v] = static_cast<std::uint16_t>(v);
+  std::iota(all.begin(), all.end(), std::uint16_t{0});
   const Plate plate = to_plate(converted(plain(Layout::mono, 16), 256, 256, bytes_of(all)));
   ASSERT_EQ(plate.bits, 16);
   ResponseCurve linear;

@@ -1,4 +1,3 @@
-#include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/test.hpp"
 
@@ -59,23 +58,6 @@ TEST(Frame, GrayIsRepeated) {
   const Plate plate = to_plate(frame_of(PixelFormat::gray8, 2, 1, {7, 255}));
   EXPECT_EQ(plate.bits, 8);
   EXPECT_EQ(plate.samples, (std::vector<std::uint16_t>{7, 7, 7, 255, 255, 255}));
-}
-
-// The 100 % colour bars of BT.709 as 8-bit limited-range codes (ITU-R BT.709-6: Y' = 16 + 219 E'y,
-// C = 128 + 224 E'c, rounded). A code is off its exact value by at most 1/2, so R and B are off by
-// at most 255 (0.5/219 + 1.8556 * 0.5/224) = 1.64 and round to within 2.
-TEST(Frame, ColourBarsOfBt709) {
-  struct Bar {
-    std::uint8_t y, cb, cr;
-    Rgb rgb;
-  };
-  for (const Bar& bar : {Bar{235, 128, 128, {255, 255, 255}}, Bar{219, 16, 138, {255, 255, 0}},
-                         Bar{188, 154, 16, {0, 255, 255}}, Bar{173, 42, 26, {0, 255, 0}},
-                         Bar{78, 214, 230, {255, 0, 255}}, Bar{63, 102, 240, {255, 0, 0}},
-                         Bar{32, 240, 118, {0, 0, 255}}, Bar{16, 128, 128, {0, 0, 0}}}) {
-    const Rgb rgb = rgb_of_yuv(bar.y, bar.cb, bar.cr);
-    for (int c = 0; c < 3; ++c) EXPECT_NEAR(rgb[c], bar.rgb[c], 2) << "luma " << int(bar.y);
-  }
 }
 
 // Exact values of the rational formula, worked by hand: e.g. y = 126, cb = 90, cr = 200:

@@ -8,12 +8,10 @@
 namespace previz::lifeline_test {
 
 using std::chrono::milliseconds;
+using namespace std::chrono_literals;
 using Kind = Fault::Kind;
 
-constexpr LifelineOptions options{milliseconds(5000),
-                                  milliseconds(2000),
-                                  milliseconds(1000),
-                                  {milliseconds(250), milliseconds(4000)}};
+constexpr LifelineOptions options{5000ms, 2000ms, 1000ms, {250ms, 4000ms}};
 
 class LifelineTest : public testing::Test {
  protected:
@@ -32,10 +30,22 @@ class LifelineTest : public testing::Test {
     return [this] { return open_replay(directory_ / "take", "observer", replay_, clock()); };
   }
 
-  Lifeline started(CameraOpener open) {
-    Lifeline lifeline("observer", std::move(open), options, clock());
+  Lifeline started(CameraOpener open, LifelineHooks hooks = {}) {
+    Lifeline lifeline("observer", std::move(open), options, clock(), std::move(hooks));
     lifeline.start();
     return lifeline;
+  }
+  // Of a device with faults.
+  Lifeline started(CameraOpener open, std::vector<Fault> plan, LifelineHooks hooks = {}) {
+    return started(with_faults(std::move(open), std::move(plan), clock()), std::move(hooks));
+  }
+  // Which keeps the times of its attempts, and has no device before a time.
+  CameraOpener take_from(milliseconds begin) {
+    return [=, this]() -> std::unique_ptr<Camera> {
+      attempts_ms_.push_back(static_cast<int>(elapsed().count()));
+      if (elapsed() < begin) throw Error("is not there");
+      return take()();
+    };
   }
 
   milliseconds elapsed() const {
@@ -46,7 +56,7 @@ class LifelineTest : public testing::Test {
   std::string story(Lifeline& lifeline, milliseconds end) {
     std::string story;
     while (elapsed() < end) {
-      const CameraEvent event = lifeline.next(milliseconds(100));
+      const CameraEvent event = lifeline.next(100ms);
       if (std::holds_alternative<FramePtr>(event)) {
         if (!story.ends_with('f')) story += 'f';
       } else if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) {
@@ -63,49 +73,44 @@ class LifelineTest : public testing::Test {
   test::TemporaryDirectory directory_;
   ReplayOptions replay_;
   HostClock::Time now_{};
+  std::vector<int> attempts_ms_;
 };
 
 TEST_F(LifelineTest, ADeviceThatIsWellIsJustACamera) {
   Lifeline lifeline = started(take());
   EXPECT_EQ(lifeline.state(), DeviceState::absent);
-  EXPECT_EQ(story(lifeline, milliseconds(3000)), "f");
+  EXPECT_EQ(story(lifeline, 3000ms), "f");
   EXPECT_EQ(lifeline.state(), DeviceState::streaming);
   EXPECT_EQ(lifeline.format().width, 24);
   EXPECT_EQ(lifeline.counters().at("opened"), 1u);
   lifeline.stop();
   EXPECT_EQ(lifeline.state(), DeviceState::absent);
-  EXPECT_TRUE(std::holds_alternative<NoFrame>(lifeline.next(milliseconds(100))));
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(lifeline.next(100ms)));
 }
 
 // Attempts at 0, 250, 750, 1750, 3750, 7750 ms, and from then on every 4 s.
 TEST_F(LifelineTest, AnAbsentDeviceIsTriedEverLessOftenAndToldOnce) {
-  std::vector<int> attempts_ms;
-  Lifeline lifeline = started([&]() -> std::unique_ptr<Camera> {
-    attempts_ms.push_back(static_cast<int>(elapsed().count()));
-    if (elapsed() < milliseconds(12'000)) throw Error("is not there");
-    return take()();
-  });
-  EXPECT_EQ(story(lifeline, milliseconds(17'000)),
-            " [is not there; retrying until it is available] f");
-  EXPECT_EQ(attempts_ms, (std::vector<int>{0, 250, 750, 1750, 3750, 7750, 11'750, 15'750}));
+  Lifeline lifeline = started(take_from(12'000ms));
+  EXPECT_EQ(story(lifeline, 17'000ms), " [is not there; retrying until it is available] f");
+  EXPECT_EQ(attempts_ms_, (std::vector<int>{0, 250, 750, 1750, 3750, 7750, 11'750, 15'750}));
   EXPECT_EQ(lifeline.counters().at("not opened"), 7u);
   EXPECT_EQ(lifeline.counters().at("back-offs"), 7u);
   EXPECT_EQ(lifeline.counters().at("returned"), 0u);
 }
 
 TEST_F(LifelineTest, ADeviceThatNeverStartsIsOpenedAnew) {
-  Lifeline lifeline = started(with_faults(take(), {{Kind::stall, 0}}, clock()));
-  EXPECT_EQ(story(lifeline, milliseconds(6000)),
+  Lifeline lifeline = started(take(), {{Kind::stall, 0}});
+  EXPECT_EQ(story(lifeline, 6000ms),
             " [sends no frame within 5000 ms of its start; reopening it] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 2u);
   EXPECT_EQ(lifeline.counters().at("lost"), 1u);
 }
 
 TEST_F(LifelineTest, AStalledDeviceIsToldThenLostThenBack) {
-  Lifeline lifeline = started(with_faults(take(), {{Kind::stall, 20}}, clock()));
+  Lifeline lifeline = started(take(), {{Kind::stall, 20}});
   std::vector<DeviceState> states;
   for (int i = 0; i < 60; ++i) {
-    lifeline.next(milliseconds(100));
+    lifeline.next(100ms);
     if (states.empty() || states.back() != lifeline.state()) states.push_back(lifeline.state());
   }
   EXPECT_EQ(states, (std::vector{DeviceState::streaming, DeviceState::stalled, DeviceState::lost,
@@ -117,44 +122,43 @@ TEST_F(LifelineTest, AStalledDeviceIsToldThenLostThenBack) {
 
 TEST_F(LifelineTest, AStallThatEndsByItselfIsNotGivenUp) {
   // 60 frames of 40 ms are 2.4 s: longer than the stall time-out, shorter than the patience.
-  Lifeline lifeline = started(with_faults(take(), {{Kind::drop, 20, 60}}, clock()));
-  EXPECT_EQ(story(lifeline, milliseconds(6000)), "f [has sent nothing for 2000 ms] f");
+  Lifeline lifeline = started(take(), {{Kind::drop, 20, 60}});
+  EXPECT_EQ(story(lifeline, 6000ms), "f [has sent nothing for 2000 ms] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 1u);
 }
 
 TEST_F(LifelineTest, ALostDeviceIsPickedUpWhenItIsBack) {
-  Lifeline lifeline =
-      started(with_faults(take(), {{Kind::disconnect, 20, 1, std::chrono::seconds(3)}}, clock()));
-  EXPECT_EQ(story(lifeline, milliseconds(9000)),
+  Lifeline lifeline = started(take(), {{Kind::disconnect, 20, 1, 3s}});
+  EXPECT_EQ(story(lifeline, 9000ms),
             "f [was unplugged; reopening it] "
             " [the device is unplugged; retrying until it is available] f");
   EXPECT_EQ(lifeline.state(), DeviceState::streaming);
 }
 
 TEST_F(LifelineTest, TroubleOfOneFrameIsPassedOn) {
-  Lifeline lifeline = started(with_faults(take(), {{Kind::corrupt, 3}}, clock()));
-  EXPECT_EQ(story(lifeline, milliseconds(1000)), "f [frame 103 is damaged and skipped] f");
+  Lifeline lifeline = started(take(), {{Kind::corrupt, 3}});
+  EXPECT_EQ(story(lifeline, 1000ms), "f [frame 103 is damaged and skipped] f");
   EXPECT_EQ(lifeline.counters().at("opened"), 1u);
 }
 
 TEST_F(LifelineTest, TheEndOfATakeIsTheEnd) {
   replay_.loop = false;
   Lifeline lifeline = started(take());
-  EXPECT_EQ(story(lifeline, milliseconds(1000)), "f end");
-  EXPECT_TRUE(std::holds_alternative<NoFrame>(lifeline.next(milliseconds(0))));
+  EXPECT_EQ(story(lifeline, 1000ms), "f end");
+  EXPECT_TRUE(std::holds_alternative<NoFrame>(lifeline.next(0ms)));
 }
 
 TEST_F(LifelineTest, ADeviceMayComeBackWithAnotherFormat) {
   session::write_small_session(directory_ / "other", 10, 40, 30);
   int opened = 0;
-  Lifeline lifeline = started(with_faults(
+  Lifeline lifeline = started(
       [&] {
         const char* name = opened++ == 0 ? "take" : "other";
         return open_replay(directory_ / name, "observer", replay_, clock());
       },
-      {{Kind::disconnect, 5, 1, milliseconds(0)}}, clock()));
+      {{Kind::disconnect, 5, 1, 0ms}});
   for (int i = 0; i < 30; ++i) {
-    const CameraEvent event = lifeline.next(milliseconds(100));
+    const CameraEvent event = lifeline.next(100ms);
     const auto* frame = std::get_if<FramePtr>(&event);
     if (!frame) continue;
     EXPECT_EQ((*frame)->width, lifeline.counters().at("opened") == 1 ? 24 : 40);
@@ -190,7 +194,7 @@ TEST_F(LifelineTest, ADeviceWhoseDriverThrowsIsOpenedAnew) {
     if (++openings > 1) return take()();
     return std::make_unique<Throwing>(take()(), 3);
   });
-  EXPECT_EQ(story(lifeline, milliseconds(2000)), "f [has failed: lamp fell down; reopening it] f");
+  EXPECT_EQ(story(lifeline, 2000ms), "f [has failed: lamp fell down; reopening it] f");
   EXPECT_EQ(lifeline.counters().at("lost"), 1u);
   EXPECT_EQ(lifeline.counters().at("returned"), 1u);
 }
@@ -198,68 +202,57 @@ TEST_F(LifelineTest, ADeviceWhoseDriverThrowsIsOpenedAnew) {
 TEST_F(LifelineTest, AnExposureThatCannotBeSetKeepsNoDeviceFromBeingOpened) {
   Lifeline lifeline = started([&] { return std::make_unique<Throwing>(take()(), 1000); });
   EXPECT_TRUE(lifeline.set_exposure(0.25, 1));  // there is no device yet
-  EXPECT_EQ(story(lifeline, milliseconds(300)),
-            " [lamp fell down; retrying until it is available] f");
+  EXPECT_EQ(story(lifeline, 300ms), " [lamp fell down; retrying until it is available] f");
 }
 
 TEST_F(LifelineTest, SequenceNumbersIncreaseOverAllOpenings) {
   std::uint64_t openings = 0;
-  Lifeline lifeline = started(with_faults(
+  Lifeline lifeline = started(
       [&] {
         replay_.position = std::make_shared<ReplayPosition>();  // counts from the beginning again
         ++openings;
         return open_replay(directory_ / "take", "observer", replay_, clock());
       },
-      {{Kind::disconnect, 5, 1, milliseconds(0)}}, clock()));
+      {{Kind::disconnect, 5, 1, 0ms}});
   std::vector<std::uint64_t> sequences;
   while (sequences.size() < 12) {
-    const CameraEvent event = lifeline.next(milliseconds(100));
+    const CameraEvent event = lifeline.next(100ms);
     if (const auto* frame = std::get_if<FramePtr>(&event)) sequences.push_back((*frame)->sequence);
   }
   EXPECT_EQ(openings, 2u);
-  for (std::size_t i = 1; i < sequences.size(); ++i)
-    EXPECT_EQ(sequences[i], sequences[i - 1] + 1) << i;
+  std::vector<std::uint64_t> expected(sequences.size());
+  std::iota(expected.begin(), expected.end(), sequences.front());
+  EXPECT_EQ(sequences, expected);
 }
 
 TEST_F(LifelineTest, ADeviceThatIsPluggedInIsNotKeptWaiting) {
-  std::vector<int> attempts_ms;
   std::uint64_t arrivals = 3;
-  Lifeline lifeline("observer",
-                    [&]() -> std::unique_ptr<Camera> {
-                      attempts_ms.push_back(static_cast<int>(elapsed().count()));
-                      if (elapsed() < milliseconds(5100)) throw Error("is not there");
-                      return take()();
-                    },
-                    options, clock(), {[&] { return arrivals; }, {}});
-  lifeline.start();
-  story(lifeline, milliseconds(5000));
+  Lifeline lifeline = started(take_from(5100ms), LifelineHooks{[&] { return arrivals; }, {}});
+  story(lifeline, 5000ms);
   arrivals = 4;  // its node follows 100 ms later
-  EXPECT_EQ(story(lifeline, milliseconds(6000)), "f");
-  EXPECT_EQ(attempts_ms, (std::vector<int>{0, 250, 750, 1750, 3750, 5000, 5250}));
+  EXPECT_EQ(story(lifeline, 6000ms), "f");
+  EXPECT_EQ(attempts_ms_, (std::vector<int>{0, 250, 750, 1750, 3750, 5000, 5250}));
 }
 
 TEST_F(LifelineTest, ADeviceThatIsSilentIsResetBeforeItIsOpenedAnew) {
   for (const char* why_not : {"", "Access denied"}) {
     now_ = {};
     replay_.position = std::make_shared<ReplayPosition>();
-    Lifeline lifeline("observer", with_faults(take(), {{Kind::stall, 5}}, clock()), options,
-                      clock(), {{}, [&] { return std::optional<std::string>(why_not); }});
-    lifeline.start();
+    Lifeline lifeline = started(take(), {{Kind::stall, 5}},
+                                {{}, [&] { return std::optional<std::string>(why_not); }});
     const std::string said = *why_not
                                  ? "is stalled; it cannot be reset (Access denied); reopening it"
                                  : "is stalled; it was reset; reopening it";
-    EXPECT_EQ(story(lifeline, milliseconds(5000)),
-              "f [has sent nothing for 2000 ms]  [" + said + "] f");
+    EXPECT_EQ(story(lifeline, 5000ms), "f [has sent nothing for 2000 ms]  [" + said + "] f");
     EXPECT_EQ(lifeline.counters().at("reset"), *why_not ? 0u : 1u);
   }
 }
 
 // It says itself that it is gone: there is nothing to reset.
 TEST_F(LifelineTest, ADeviceThatIsPulledIsNotReset) {
-  Lifeline lifeline("observer", with_faults(take(), {{Kind::disconnect, 5}}, clock()), options,
-                    clock(), {{}, [] { return std::optional<std::string>(""); }});
-  lifeline.start();
-  EXPECT_EQ(story(lifeline, milliseconds(2000)), "f [was unplugged; reopening it] f");
+  Lifeline lifeline =
+      started(take(), {{Kind::disconnect, 5}}, {{}, [] { return std::optional<std::string>(""); }});
+  EXPECT_EQ(story(lifeline, 2000ms), "f [was unplugged; reopening it] f");
   EXPECT_EQ(lifeline.counters().at("reset"), 0u);
 }
 
@@ -289,7 +282,7 @@ TEST_F(LifelineTest, ExposuresAndCountersOutliveAnOpening) {
   std::vector<double> exposures;
   Lifeline lifeline = started([&] { return std::make_unique<Asked>(exposures); });
   EXPECT_TRUE(lifeline.set_exposure(0.25, 1));
-  story(lifeline, milliseconds(800));  // opened at 0, 250 and 750 ms
+  story(lifeline, 800ms);  // opened at 0, 250 and 750 ms
   EXPECT_EQ(exposures, (std::vector<double>{0.25, 0.25, 0.25}));
   EXPECT_EQ(lifeline.counters().at("frames cut short"), 6u);
 }
@@ -303,7 +296,7 @@ TEST_F(LifelineTest, WhatADeviceDoesOtherwiseIsPassedOnAtEveryOpening) {
   });
   const std::string opening =
       " [sends 5 frames per second; has no colour]  [is gone; reopening it] ";
-  EXPECT_EQ(story(lifeline, milliseconds(400)), opening + opening);
+  EXPECT_EQ(story(lifeline, 400ms), opening + opening);
   EXPECT_EQ(lifeline.counters().at("opened"), 2u);
   EXPECT_EQ(lifeline.counters().at("lost"), 2u);
 }

@@ -6,13 +6,12 @@ extern "C" {
 #include <libavformat/avformat.h>
 }
 
-#include "drivers/session/session.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::session::session_damage_test {
 
-constexpr int frame_count = 6;
+constexpr std::size_t frame_count = 6;
 
 // A whole small session, and copies of it in which one file is not as it was.
 class Damage : public testing::Test {
@@ -28,8 +27,11 @@ class Damage : public testing::Test {
     write_small_session(whole(), count, width, height, codec);
     std::filesystem::copy(whole(), copy());
   }
-  std::filesystem::path whole() const { return directory_.path() / "whole"; }
-  std::filesystem::path copy() const { return directory_.path() / "copy"; }
+  std::filesystem::path whole() const { return directory_ / "whole"; }
+  std::filesystem::path copy() const { return directory_ / "copy"; }
+  // The whole session's film and its lines.
+  std::string whole_video() const { return content_of(whole() / "observer.mkv"); }
+  std::string whole_lines() const { return content_of(whole() / "observer.jsonl"); }
 
   struct Opened {
     std::vector<std::uint64_t> frames;  // that came back, each bit for bit
@@ -52,6 +54,15 @@ class Damage : public testing::Test {
     return opened;
   }
 
+  Opened open_with_video(const std::string& video) const {
+    write_content(copy() / "observer.mkv", video);
+    return open_copy();
+  }
+  Opened open_with_lines(const std::string& lines) const {
+    write_content(copy() / "observer.jsonl", lines);
+    return open_copy();
+  }
+
   static bool is_prefix(const std::vector<std::uint64_t>& frames) {
     for (std::size_t i = 0; i < frames.size(); ++i)
       if (frames[i] != i) return false;
@@ -65,16 +76,15 @@ class Damage : public testing::Test {
 
 TEST_F(Damage, AWholeSessionMissesNothing) {
   const Opened opened = open_copy();
-  EXPECT_EQ(opened.frames.size(), std::size_t{frame_count});
+  EXPECT_EQ(opened.frames.size(), frame_count);
   EXPECT_TRUE(opened.missing.empty());
 }
 
 TEST_F(Damage, AVideoCutAnywhereGivesAPrefix) {
-  const std::string video = content_of(whole() / "observer.mkv");
+  const std::string video = whole_video();
   std::size_t before = 0;
   for (std::size_t length = 0; length < video.size(); length += 1 + length % 37) {
-    write_content(copy() / "observer.mkv", video.substr(0, length));
-    const Opened opened = open_copy();
+    const Opened opened = open_with_video(video.substr(0, length));
     EXPECT_TRUE(is_prefix(opened.frames)) << "cut at " << length;
     EXPECT_GE(opened.frames.size(), before) << "cut at " << length;
     if (opened.frames.size() < frame_count) {
@@ -82,16 +92,15 @@ TEST_F(Damage, AVideoCutAnywhereGivesAPrefix) {
     }
     before = opened.frames.size();
   }
-  EXPECT_EQ(before, std::size_t{frame_count});  // what is cut off last is only the index
+  EXPECT_EQ(before, frame_count);  // what is cut off last is only the index
 }
 
 TEST_F(Damage, LinesCutAnywhereGiveAPrefix) {
-  const std::string lines = content_of(whole() / "observer.jsonl");
+  const std::string lines = whole_lines();
   for (std::size_t length = 0; length + 1 < lines.size(); length += 1 + length % 11) {
-    write_content(copy() / "observer.jsonl", lines.substr(0, length));
-    const Opened opened = open_copy();
+    const Opened opened = open_with_lines(lines.substr(0, length));
     EXPECT_TRUE(is_prefix(opened.frames)) << "cut at " << length;
-    EXPECT_LE(opened.frames.size(), std::size_t{frame_count});
+    EXPECT_LE(opened.frames.size(), frame_count);
     const auto whole_lines = std::count(lines.begin(), lines.begin() + length, '\n');
     EXPECT_GE(opened.frames.size(), static_cast<std::size_t>(whole_lines));
     if (opened.frames.size() < frame_count) {
@@ -127,15 +136,14 @@ std::vector<std::pair<std::size_t, std::size_t>> packets_of(const std::filesyste
 void Damage::expect_no_changed_byte_is_shown(VideoCodec codec) {
   constexpr std::size_t few = 2;
   write_small_frames(few, 8, 8, codec);
-  const std::string video = content_of(whole() / "observer.mkv");
+  const std::string video = whole_video();
   const auto packets = packets_of(whole() / "observer.mkv");
   ASSERT_EQ(packets.size(), few);
   std::mt19937 random(2);
   for (std::size_t at = 0; at < video.size(); ++at) {
     std::string damaged = video;
     damaged[at] = static_cast<char>(damaged[at] ^ (1 + random() % 255));
-    write_content(copy() / "observer.mkv", damaged);
-    const Opened opened = open_copy();
+    const Opened opened = open_with_video(damaged);
     if (opened.frames.size() < few) {
       EXPECT_FALSE(opened.missing.empty()) << "byte " << at;
     }
@@ -162,15 +170,14 @@ std::size_t head_of(const std::string& video) {
 // The head is one byte short of being right, is zeros up to some place, or the file lacks it: every
 // picture behind it is found by its checksum.
 TEST_F(Damage, ATornHeadCostsNoPictureBehindIt) {
-  const std::string video = content_of(whole() / "observer.mkv");
+  const std::string video = whole_video();
   const std::size_t head = head_of(video);
   ASSERT_NE(head, std::string::npos);
   std::string first_byte = video, zeros = video;
   first_byte[0] = 0;
   std::fill_n(zeros.begin(), head, '\0');
   for (const std::string& torn : {first_byte, zeros, video.substr(head)}) {
-    write_content(copy() / "observer.mkv", torn);
-    const Opened opened = open_copy();
+    const Opened opened = open_with_video(torn);
     EXPECT_EQ(opened.frames, (std::vector<std::uint64_t>{0, 1, 2, 3, 4, 5}));
     EXPECT_TRUE(mentions(opened.missing, "6 pictures of 6 found one by one"));
     EXPECT_FALSE(mentions(opened.missing, "no picture can be read"));
@@ -179,13 +186,12 @@ TEST_F(Damage, ATornHeadCostsNoPictureBehindIt) {
 
 // A block of zeros over head and first pictures costs those it touches; they are named.
 TEST_F(Damage, ATornFirstBlockCostsThePicturesInIt) {
-  const std::string video = content_of(whole() / "observer.mkv");
+  const std::string video = whole_video();
   const auto packets = packets_of(whole() / "observer.mkv");
-  ASSERT_EQ(packets.size(), std::size_t{frame_count});
+  ASSERT_EQ(packets.size(), frame_count);
   std::string torn = video;
   std::fill_n(torn.begin(), packets[1].first + 10, '\0');
-  write_content(copy() / "observer.mkv", torn);
-  const Opened opened = open_copy();
+  const Opened opened = open_with_video(torn);
   EXPECT_EQ(opened.frames, (std::vector<std::uint64_t>{2, 3, 4, 5}));
   EXPECT_TRUE(mentions(opened.missing, "the pictures of frames 0 to 1 are missing"));
   EXPECT_TRUE(mentions(opened.missing, "4 of 6 recorded frames are complete"));
@@ -195,13 +201,12 @@ TEST_F(Damage, ATornFirstBlockCostsThePicturesInIt) {
 TEST_F(Damage, NoByteOfTheHeadCostsAPicture) {
   constexpr int few = 2;
   write_small_frames(few, 8, 8);
-  const std::string video = content_of(whole() / "observer.mkv");
+  const std::string video = whole_video();
   for (std::size_t at = 0; at < head_of(video); ++at) {
     for (const char byte : {'\0', static_cast<char>(~video[at])}) {
       std::string damaged = video;
       damaged[at] = byte;
-      write_content(copy() / "observer.mkv", damaged);
-      EXPECT_EQ(open_copy().frames.size(), std::size_t{few}) << "byte " << at;
+      EXPECT_EQ(open_with_video(damaged).frames.size(), std::size_t{few}) << "byte " << at;
     }
   }
 }
@@ -209,27 +214,24 @@ TEST_F(Damage, NoByteOfTheHeadCostsAPicture) {
 // The video header is made anew from session.toml, and the pictures come back bit for bit, in every
 // format and with every number of slices.
 TEST_F(Damage, EveryFormatIsReadWithoutAHead) {
-  struct Size {
-    int width, height;
-  };
   for (const VideoCodec codec : {VideoCodec::ffv1, VideoCodec::raw})
     for (const PixelFormat format : {PixelFormat::rgb8, PixelFormat::rgb16, PixelFormat::gray8,
                                      PixelFormat::gray16, PixelFormat::yuv422p8})
-      for (const Size size : {Size{24, 18}, Size{160, 120}, Size{400, 300}, Size{640, 480}}) {
+      for (const auto& [width, height] : {std::pair{24, 18}, {160, 120}, {400, 300}, {640, 480}}) {
         const TemporaryDirectory directory;
-        const std::filesystem::path take = directory.path() / "take";
+        const std::filesystem::path take = directory / "take";
         {
           SessionWriter writer(take, {}, std::chrono::seconds(1), codec);
           for (std::uint64_t i = 0; i < 2; ++i)
-            writer.write(noise_frame("observer", i, format, size.width, size.height));
+            writer.write(noise_frame("observer", i, format, width, height));
         }
         std::string video = content_of(take / "observer.mkv");
         std::fill_n(video.begin(), head_of(video), '\0');
         write_content(take / "observer.mkv", video);
         Session session = open_session(take);
         const auto stream = open_stream(session, "observer");
-        ASSERT_EQ(stream->records().size(), 2u) << size.width;
-        for (std::size_t i : {1, 0}) EXPECT_TRUE(is_frame(*stream->read(i), i)) << size.width;
+        ASSERT_EQ(stream->records().size(), 2u) << width;
+        for (std::size_t i : {1, 0}) EXPECT_TRUE(is_frame(*stream->read(i), i)) << width;
       }
 }
 
@@ -246,9 +248,8 @@ TEST_F(Damage, AFileOfNestedClustersIsSearchedInLinearTime) {
   for (const std::string& unit : {nested, walked, block}) {
     std::string video;
     while (video.size() < (std::size_t{8} << 20)) video += unit;
-    write_content(copy() / "observer.mkv", video);
     const auto start = std::chrono::steady_clock::now();
-    EXPECT_TRUE(open_copy().frames.empty());
+    EXPECT_TRUE(open_with_video(video).frames.empty());
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     EXPECT_LT(took.count(), 60.0);
   }
@@ -263,29 +264,26 @@ TEST_F(Damage, AFolderInThePlaceOfTheVideoIsSaid) {
 }
 
 TEST_F(Damage, OneDamagedPictureCostsThatFrameOnly) {
-  const std::string video = content_of(whole() / "observer.mkv");
-  std::string damaged = video;
-  damaged[video.size() / 2] ^= 0x10;
-  write_content(copy() / "observer.mkv", damaged);
-  const Opened opened = open_copy();
-  EXPECT_EQ(opened.frames.size(), std::size_t{frame_count} - 1);
+  std::string damaged = whole_video();
+  damaged[damaged.size() / 2] ^= 0x10;
+  const Opened opened = open_with_video(damaged);
+  EXPECT_EQ(opened.frames.size(), frame_count - 1);
   EXPECT_TRUE(mentions(opened.missing, "observer.mkv: the pictures of frame ")) << "sentence";
   EXPECT_TRUE(mentions(opened.missing, "5 of 6 recorded frames are complete"));
 }
 
 TEST_F(Damage, AHoleInTheVideoDoesNotShiftTheRest) {
-  std::string video = content_of(whole() / "observer.mkv");
+  std::string video = whole_video();
   std::fill(video.begin() + video.size() * 3 / 10, video.begin() + video.size() * 5 / 10, '\0');
-  write_content(copy() / "observer.mkv", video);
-  const Opened opened = open_copy();
+  const Opened opened = open_with_video(video);
   EXPECT_GE(opened.frames.size(), 3u);
-  EXPECT_LT(opened.frames.size(), std::size_t{frame_count});
-  EXPECT_EQ(opened.frames.back(), std::uint64_t{frame_count} - 1);
+  EXPECT_LT(opened.frames.size(), frame_count);
+  EXPECT_EQ(opened.frames.back(), frame_count - 1);
 }
 
 // A changed byte costs the line it is in; where it ended that line, the next one, too.
 TEST_F(Damage, ChangedLinesAreLeftOut) {
-  std::string lines = content_of(whole() / "observer.jsonl");
+  std::string lines = whole_lines();
   std::mt19937 random(3);
   for (int round = 0; round < 150; ++round) {
     std::string damaged = lines;
@@ -294,44 +292,43 @@ TEST_F(Damage, ChangedLinesAreLeftOut) {
     write_content(copy() / "observer.jsonl", damaged);
     const std::size_t cost = lines[at] == '\n' ? 2 : 1;
     const Opened opened = open_copy();
-    EXPECT_GE(opened.frames.size() + cost, std::size_t{frame_count}) << "round " << round;
+    EXPECT_GE(opened.frames.size() + cost, frame_count) << "round " << round;
     if (opened.frames.size() < frame_count) {
       EXPECT_FALSE(opened.missing.empty()) << "round " << round;
     }
   }
   const auto third = lines.find('\n', lines.find('\n') + 1) + 1;
   lines.replace(third, 5, "#####");
-  write_content(copy() / "observer.jsonl", lines);
-  const Opened opened = open_copy();
+  const Opened opened = open_with_lines(lines);
   EXPECT_EQ(opened.frames, (std::vector<std::uint64_t>{0, 1, 3, 4, 5}));
   EXPECT_TRUE(mentions(opened.missing, "observer.jsonl: line 3 unreadable"));
   EXPECT_TRUE(mentions(opened.missing, "1 picture of observer.mkv"));
 }
 
 TEST_F(Damage, NumbersOfTheWrongKindAreDamage) {
-  const std::string lines = content_of(whole() / "observer.jsonl");
-  for (
-      const char* line :
-      {"{}", "[]", "null", "7", "{\"frame\":1e300}",
-       R"({"frame":-1,"sequence":1,"timestamp_ns":1,"arrival_ns":1,"exposure_s":1,"gain":1,"exposure":1,"video_ms":1,"crc32":"00000000"})",
-       R"({"frame":9,"sequence":1,"timestamp_ns":1e40,"arrival_ns":1,"exposure_s":1,"gain":1,"exposure":1,"video_ms":1,"crc32":"00000000"})",
-       R"({"frame":9,"sequence":1,"timestamp_ns":18446744073709551615,"arrival_ns":1,"exposure_s":1,"gain":1,"exposure":1,"video_ms":1,"crc32":"00000000"})",
-       R"({"frame":9,"sequence":1,"timestamp_ns":1,"arrival_ns":1,"exposure_s":1,"gain":1,"exposure":1,"video_ms":1,"crc32":"xyz"})"}) {
-    write_content(copy() / "observer.jsonl", lines + line + "\n");
-    const Opened opened = open_copy();
-    EXPECT_EQ(opened.frames.size(), std::size_t{frame_count});
+  const std::string lines = whole_lines();
+  const std::string rest = R"(,"arrival_ns":1,"exposure_s":1,"gain":1,"exposure":1,"video_ms":1,)";
+  const std::string sum = R"("crc32":"00000000"})";
+  for (const std::string& line :
+       {std::string("{}"), std::string("[]"), std::string("null"), std::string("7"),
+        std::string(R"({"frame":1e300})"),
+        R"({"frame":-1,"sequence":1,"timestamp_ns":1)" + rest + sum,
+        R"({"frame":9,"sequence":1,"timestamp_ns":1e40)" + rest + sum,
+        R"({"frame":9,"sequence":1,"timestamp_ns":18446744073709551615)" + rest + sum,
+        R"({"frame":9,"sequence":1,"timestamp_ns":1)" + rest + R"("crc32":"xyz"})"}) {
+    const Opened opened = open_with_lines(lines + line + "\n");
+    EXPECT_EQ(opened.frames.size(), frame_count);
     EXPECT_TRUE(mentions(opened.missing, "line 7 unreadable")) << line;
   }
 }
 
 TEST_F(Damage, MoreLinesThanPictures) {
-  write_content(copy() / "observer.jsonl",
-                content_of(whole() / "observer.jsonl") +
-                    R"({"frame":6,"sequence":1,"timestamp_ns":1,"arrival_ns":1,"exposure_s":1,)"
-                    R"("gain":1,"exposure":1,"video_ms":99999,"crc32":"00000000"})"
-                    "\n");
-  const Opened opened = open_copy();
-  EXPECT_EQ(opened.frames.size(), std::size_t{frame_count});
+  const Opened opened =
+      open_with_lines(content_of(whole() / "observer.jsonl") +
+                      R"({"frame":6,"sequence":1,"timestamp_ns":1,"arrival_ns":1,"exposure_s":1,)"
+                      R"("gain":1,"exposure":1,"video_ms":99999,"crc32":"00000000"})"
+                      "\n");
+  EXPECT_EQ(opened.frames.size(), frame_count);
   EXPECT_TRUE(mentions(opened.missing, "observer.mkv: the pictures of frame 6 are missing"));
 }
 
@@ -407,7 +404,7 @@ TEST_F(Damage, LightThatIsNoneCostsItsLine) {
   const TemporaryDirectory directory;
   SessionWriter(directory.path(), {}).close();
   const auto lines_read = [&](const std::string& second) {
-    write_content(directory.path() / "track.jsonl",
+    write_content(directory / "track.jsonl",
                   R"({"frame":0,"timestamp_ns":0,"tracked":false,"tags":[]})"
                   "\n" +
                       second);
@@ -437,9 +434,9 @@ TEST_F(Damage, TrackLinesCutAnywhere) {
       writer.write(record);
     }
   }
-  const std::string lines = content_of(directory.path() / "track.jsonl");
+  const std::string lines = content_of(directory / "track.jsonl");
   for (std::size_t length = 0; length < lines.size(); length += 1 + length % 11) {
-    write_content(directory.path() / "track.jsonl", lines.substr(0, length));
+    write_content(directory / "track.jsonl", lines.substr(0, length));
     const Session session = open_session(directory.path());
     EXPECT_LE(session.track.size(), 3u);
     for (std::size_t i = 0; i < session.track.size(); ++i) EXPECT_EQ(session.track[i].frame, i);

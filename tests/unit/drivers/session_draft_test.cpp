@@ -14,11 +14,12 @@ namespace previz::session::session_draft_test {
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> names_in(const fs::path& folder) {
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder))
-    names.push_back(entry.path().filename().string());
-  return names;
+std::ptrdiff_t files_in(const test::TemporaryDirectory& folder) {
+  return std::distance(fs::directory_iterator(folder.path()), {});
+}
+
+unsigned mode_of(const fs::path& file) {
+  return static_cast<unsigned>(fs::status(file).permissions());
 }
 
 TEST(Draft, IsNotThereUntilItIsPut) {
@@ -29,12 +30,12 @@ TEST(Draft, IsNotThereUntilItIsPut) {
     draft.file().append("half of it");
     EXPECT_FALSE(fs::exists(file));
   }
-  EXPECT_TRUE(names_in(directory.path()).empty());
+  EXPECT_EQ(files_in(directory), 0);
   Draft draft(file);
   draft.file().append("whole");
   draft.put();
   EXPECT_EQ(read_file(file), "whole");
-  EXPECT_EQ(names_in(directory.path()).size(), 1u);
+  EXPECT_EQ(files_in(directory), 1);
 }
 
 TEST(Draft, OfANameThatIsAsLongAsNamesMayBe) {
@@ -53,7 +54,7 @@ TEST(Draft, TakesNoNameThatIsTaken) {
   EXPECT_TRUE(draft.put_as_new(directory / "2"));
   EXPECT_EQ(read_file(directory / "1"), "old");
   EXPECT_EQ(read_file(directory / "2"), "new");
-  EXPECT_EQ(names_in(directory.path()).size(), 2u);
+  EXPECT_EQ(files_in(directory), 2);
 }
 
 // Whatever lies in the folder: what a link leads to is neither written nor given another mode.
@@ -66,9 +67,7 @@ TEST(Draft, FollowsNoLink) {
   fs::create_symlink(victim, directory / "a.toml");
   replace_file(directory / "a.toml", "new");
   EXPECT_EQ(read_file(victim), "as it was");
-  struct stat status {};
-  ASSERT_EQ(::stat(victim.c_str(), &status), 0);
-  EXPECT_EQ(status.st_mode & 07777, 0600u);
+  EXPECT_EQ(mode_of(victim), 0600u);
   EXPECT_EQ(read_plain_file(directory / "a.toml"), "new");
 }
 
@@ -78,9 +77,7 @@ TEST(Draft, KeepsTheModeOfWhatItReplaces) {
   replace_file(file, "old");
   ASSERT_EQ(::chmod(file.c_str(), 0640), 0);
   replace_file(file, "new");
-  struct stat status {};
-  ASSERT_EQ(::stat(file.c_str(), &status), 0);
-  EXPECT_EQ(status.st_mode & 07777, 0640u);
+  EXPECT_EQ(mode_of(file), 0640u);
 }
 
 // A process makes a file and a folder, and is killed.
@@ -104,7 +101,7 @@ TEST(Draft, OfADeadProcessIsRemovedAndNoOther) {
   ::kill(child, SIGKILL);
   ASSERT_EQ(::waitpid(child, nullptr, 0), child);
   EXPECT_EQ(remove_dead_drafts(directory.path()).size(), 2u);
-  EXPECT_EQ(names_in(directory.path()).size(), 2u);
+  EXPECT_EQ(files_in(directory), 2);
   EXPECT_TRUE(fs::exists(own.path()));
   ::close(says[0]);
   ::close(says[1]);

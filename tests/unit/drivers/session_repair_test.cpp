@@ -13,11 +13,11 @@ constexpr std::uint64_t frame_count = 6;
 class Repair : public testing::Test {
  protected:
   void SetUp() override {
-    write_content(directory_.path() / "model.glb", "a model");
+    write_content(directory_ / "model.glb", "a model");
     SessionInfo info;
     info.name = "small";
     SessionWriter writer(take_, info);
-    writer.add_asset("model.glb", directory_.path() / "model.glb");
+    writer.add_asset("model.glb", directory_ / "model.glb");
     for (std::uint64_t i = 0; i < frame_count; ++i) {
       writer.write(noise_frame("observer", i, PixelFormat::rgb8, 24, 18));
       writer.write(noise_frame("light", i, PixelFormat::gray16, 16, 16));
@@ -74,7 +74,7 @@ class Repair : public testing::Test {
   }
 
   TemporaryDirectory directory_;
-  const fs::path take_ = directory_.path() / "take", repaired_ = directory_.path() / "repaired";
+  const fs::path take_ = directory_ / "take", repaired_ = directory_ / "repaired";
 };
 
 TEST_F(Repair, KeepsEveryWholeFrameOfAHole) {

@@ -1,6 +1,5 @@
 #include "drivers/plate.hpp"
 #include "drivers/session/crc32.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 
@@ -10,6 +9,14 @@ struct Picture {
   PixelFormat format;
   int width, height;
 };
+
+// A session of these frames and records, written and opened again.
+Session session_of(const TemporaryDirectory& directory, const auto&... what) {
+  SessionWriter writer(directory.path(), {});
+  (writer.write(what), ...);
+  writer.close();
+  return open_session(directory.path());
+}
 
 class RoundTrip : public testing::TestWithParam<std::tuple<Picture, VideoCodec>> {};
 
@@ -37,23 +44,19 @@ TEST_P(RoundTrip, EveryFrameComesBackBitForBit) {
   EXPECT_THROW(stream->read(3), Error);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Formats, RoundTrip,
-    testing::Combine(
-        testing::Values(Picture{PixelFormat::rgb8, 160, 120}, Picture{PixelFormat::rgb16, 160, 120},
-                        Picture{PixelFormat::gray8, 160, 120},
-                        Picture{PixelFormat::gray16, 160, 120},
-                        Picture{PixelFormat::yuv422p8, 160, 120}, Picture{PixelFormat::rgb8, 8, 8},
-                        Picture{PixelFormat::rgb16, 8, 9}, Picture{PixelFormat::gray8, 9, 8},
-                        Picture{PixelFormat::gray16, 8, 8}, Picture{PixelFormat::yuv422p8, 9, 9},
-                        Picture{PixelFormat::yuv422p8, 35, 8}, Picture{PixelFormat::rgb8, 2000, 8},
-                        Picture{PixelFormat::yuv422p8, 8, 2000},
-                        Picture{PixelFormat::rgb16, 8, 2000}, Picture{PixelFormat::gray8, 37, 21},
-                        Picture{PixelFormat::rgb8, 643, 481},
-                        Picture{PixelFormat::gray16, 643, 481}),
-        testing::Values(VideoCodec::ffv1, VideoCodec::raw)));
+std::vector<Picture> pictures() {
+  using enum PixelFormat;
+  return {{rgb8, 160, 120},     {rgb16, 160, 120}, {gray8, 160, 120}, {gray16, 160, 120},
+          {yuv422p8, 160, 120}, {rgb8, 8, 8},      {rgb16, 8, 9},     {gray8, 9, 8},
+          {gray16, 8, 8},       {yuv422p8, 9, 9},  {yuv422p8, 35, 8}, {rgb8, 2000, 8},
+          {yuv422p8, 8, 2000},  {rgb16, 8, 2000},  {gray8, 37, 21},   {rgb8, 643, 481},
+          {gray16, 643, 481}};
+}
 
-// An earlier previzd, which knows FFV1 alone, reads what it can and refuses the rest in words.
+INSTANTIATE_TEST_SUITE_P(Formats, RoundTrip,
+                         testing::Combine(testing::ValuesIn(pictures()),
+                                          testing::Values(VideoCodec::ffv1, VideoCodec::raw)));
+
 // By the check value of the CRC-32 of IEEE 802.3, in one piece and in two.
 TEST(Session, NamesPacketsByTheStandardChecksum) {
   constexpr std::array<std::uint8_t, 9> digits = {'1', '2', '3', '4', '5', '6', '7', '8', '9'};
@@ -62,6 +65,7 @@ TEST(Session, NamesPacketsByTheStandardChecksum) {
   EXPECT_EQ(crc32(all.subspan(4), crc32(all.first(4))), 0xcbf43926u);
 }
 
+// An earlier previzd, which knows FFV1 alone, reads what it can and refuses the rest in words.
 TEST(Session, OnlyATakeWithRawVideoNeedsANewerPrevizd) {
   for (const VideoCodec codec : {VideoCodec::ffv1, VideoCodec::raw}) {
     const TemporaryDirectory directory;
@@ -135,12 +139,7 @@ TEST(Session, WhatWasMovedAndRelitComesBackBitForBit) {
   stick.tags = {7, 11};
   TrackRecord plain;
   plain.frame = 1;
-  {
-    SessionWriter writer(directory.path(), {});
-    writer.write(record);
-    writer.write(plain);
-  }
-  const Session session = open_session(directory.path());
+  const Session session = session_of(directory, record, plain);
   ASSERT_EQ(session.track.size(), 2u);
   EXPECT_EQ(session.track[0].scene, record.scene);
   EXPECT_EQ(session.track[0].carriers, record.carriers);
@@ -153,7 +152,8 @@ TEST(Session, TheTakeIsKnownAndCanBeMarkedAfterwards) {
   const TakeInfo take{7, "12A \"close\"", "14:03:27:12", 23.976, "two\nlines", false};
   {
     SessionInfo info;
-    info.take = TakeInfo{7, "12A \"close\"", "", 23.976, "two\nlines", false};
+    info.take = take;
+    info.take->timecode = "";
     SessionWriter writer(directory.path(), info);
     writer.write(noise_frame("observer", 0, PixelFormat::rgb8, 24, 18));
     writer.set_take(take);
@@ -184,15 +184,9 @@ TEST(Session, TwoStreamsAndTrackInOneSession) {
   TrackRecord lost;
   lost.frame = 1;
   lost.timestamp_ns = std::numeric_limits<std::int64_t>::max();
-  {
-    SessionWriter writer(directory.path(), {});
-    writer.write(noise_frame("light", 0, PixelFormat::gray16, 32, 32));
-    writer.write(noise_frame("observer", 0, PixelFormat::rgb8, 40, 30));
-    writer.write(tracked);
-    writer.write(noise_frame("light", 1, PixelFormat::gray16, 32, 32));
-    writer.write(lost);
-  }
-  Session session = open_session(directory.path());
+  Session session = session_of(directory, noise_frame("light", 0, PixelFormat::gray16, 32, 32),
+                               noise_frame("observer", 0, PixelFormat::rgb8, 40, 30), tracked,
+                               noise_frame("light", 1, PixelFormat::gray16, 32, 32), lost);
   EXPECT_TRUE(session.missing.empty());
   ASSERT_EQ(session.track.size(), 2u);
   EXPECT_EQ(session.track[0].world_from_camera, tracked.world_from_camera);
@@ -209,8 +203,8 @@ TEST(Session, TwoStreamsAndTrackInOneSession) {
 
 TEST(Session, AStreamThatIsNotThereIsNull) {
   const TemporaryDirectory directory;
-  write_small_session(directory.path() / "take", 1);
-  Session session = open_session(directory.path() / "take");
+  write_small_session(directory / "take", 1);
+  Session session = open_session(directory / "take");
   EXPECT_EQ(open_stream(session, "light"), nullptr);
   EXPECT_TRUE(session.missing.empty());
 }
@@ -218,12 +212,9 @@ TEST(Session, AStreamThatIsNotThereIsNull) {
 // Two frames in a millisecond, and a device clock that jumps back: Matroska time must not collide.
 TEST(Session, TimestampsMayBeCloseOrJump) {
   const TemporaryDirectory directory;
-  const std::int64_t times[] = {5'000'000'000,
-                                5'000'000'001,
-                                5'000'000'002,
-                                4'000'000'000,
-                                std::numeric_limits<std::int64_t>::max(),
-                                0};
+  const std::int64_t second = 1'000'000'000;
+  const std::int64_t times[] = {5 * second, 5 * second + 1, 5 * second + 2,
+                                4 * second, INT64_MAX,      0};
   {
     SessionWriter writer(directory.path(), {});
     for (std::size_t i = 0; i < std::size(times); ++i) {
@@ -258,13 +249,13 @@ TEST(Session, WhatWasWrittenIsReadableBeforeClose) {
 
 TEST(Session, AssetsAreKeptByContent) {
   const TemporaryDirectory directory;
-  write_content(directory.path() / "ball.glb", "glTF-like");
-  const std::filesystem::path take = directory.path() / "take";
+  write_content(directory / "ball.glb", "glTF-like");
+  const std::filesystem::path take = directory / "take";
   {
     SessionWriter writer(take, {});
-    writer.add_asset("models/ball.glb", directory.path() / "ball.glb");
-    writer.add_asset("the same \"ball\".glb", directory.path() / "ball.glb");
-    EXPECT_THROW(writer.add_asset("x", directory.path() / "absent.glb"), Error);
+    writer.add_asset("models/ball.glb", directory / "ball.glb");
+    writer.add_asset("the same \"ball\".glb", directory / "ball.glb");
+    EXPECT_THROW(writer.add_asset("x", directory / "absent.glb"), Error);
   }
   const Session session = open_session(take);
   EXPECT_TRUE(session.missing.empty());
@@ -314,10 +305,10 @@ TEST(Session, WhatCannotBeRecordedIsRefused) {
 
 TEST(Session, TheSameFramesMakeTheSameFiles) {
   const TemporaryDirectory directory;
-  write_small_session(directory.path() / "a", 3);
-  write_small_session(directory.path() / "b", 3);
+  write_small_session(directory / "a", 3);
+  write_small_session(directory / "b", 3);
   for (const char* file : {"session.toml", "observer.mkv", "observer.jsonl"})
-    EXPECT_EQ(content_of(directory.path() / "a" / file), content_of(directory.path() / "b" / file));
+    EXPECT_EQ(content_of(directory / "a" / file), content_of(directory / "b" / file));
 }
 
 }  // namespace previz::session::session_round_trip_test

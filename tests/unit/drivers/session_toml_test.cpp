@@ -21,23 +21,17 @@ TEST_P(AnyText, ComesBackVerbatimAsTheSet) {
 }
 
 using namespace std::string_literals;
-INSTANTIATE_TEST_SUITE_P(Texts, AnyText,
-                         testing::Values("", "\n", "\n\n", "a", "[set]\nname = \"x\" # comment\n",
-                                         "no newline at the end", "text = '''\nnested\n'''\n",
-                                         "ends with a quote'", "ends with two''", "'''", "''''''",
-                                         "\"\"\"\n", "\\ back\\slash \\n \\u0041\n",
-                                         "windows\r\nlines\r\n", "old mac\rlines\r",
-                                         "tab\tbell\a escape\x1b del\x7f\n", "nul\0inside"s, "\0"s,
-                                         "h\xc3\xa9llo \xe2\x82\xac "
-                                         "\xf0\x9f\x8e\xac\n",
-                                         "\xef\xbb\xbf"
-                                         "byte order mark\n",
-                                         "a\n\xef\xbb\xbf"
-                                         "b",
-                                         "latin1 \xe9\xff\n", "\xc3", "\xed\xa0\x80 surrogate",
-                                         "\xc0\x80 overlong",
-                                         "\xc2\x85 next line \xe2\x80\xa8 line separator\n",
-                                         std::string(300'000, 'x') + "\n"));
+INSTANTIATE_TEST_SUITE_P(
+    Texts, AnyText,
+    testing::Values("", "\n", "\n\n", "a", "[set]\nname = \"x\" # comment\n",
+                    "no newline at the end", "text = '''\nnested\n'''\n", "ends with a quote'",
+                    "ends with two''", "'''", "''''''", "\"\"\"\n", "\\ back\\slash \\n \\u0041\n",
+                    "windows\r\nlines\r\n", "old mac\rlines\r", "tab\tbell\a escape\x1b del\x7f\n",
+                    "nul\0inside"s, "\0"s, "h\xc3\xa9llo \xe2\x82\xac \xf0\x9f\x8e\xac\n",
+                    "\ufeffbyte order mark\n", "a\n\ufeffb", "latin1 \xe9\xff\n", "\xc3",
+                    "\xed\xa0\x80 surrogate", "\xc0\x80 overlong",
+                    "\xc2\x85 next line \xe2\x80\xa8 line separator\n",
+                    std::string(300'000, 'x') + "\n"));
 
 TEST(SessionToml, RandomBytesComeBackAsTheSet) {
   std::mt19937 random(1);
@@ -67,20 +61,9 @@ TEST(SessionToml, EveryNumberComesBackBitForBit) {
   file.streams["observer"] = {PixelFormat::yuv422p8, 1920, 1080, 1234567};
   file.streams["light"] = {PixelFormat::gray16, 512, 512, {}};
   ObserverCalibration observer;
-  observer.intrinsics = {1920,
-                         1080,
-                         612.1,
-                         613.3,
-                         1.0 / 3.0,
-                         236.4,
-                         -0.118,
-                         0.041,
-                         9e-4,
-                         -7e-4,
-                         std::numeric_limits<double>::denorm_min(),
-                         0.09,
-                         -0.0,
-                         1.0 / 3.0};
+  constexpr double least = std::numeric_limits<double>::denorm_min(), third = 1.0 / 3.0;
+  observer.intrinsics = {1920,  1080, 612.1, 613.3, third, 236.4, -0.118,
+                         0.041, 9e-4, -7e-4, least, 0.09,  -0.0,  third};
   observer.lens = ThinLens{0.0235, 2.0, 0.78};
   observer.response.kind = ResponseCurve::Kind::gamma;
   observer.response.gamma = 1.0 / 0.45;
@@ -98,24 +81,16 @@ TEST(SessionToml, EveryNumberComesBackBitForBit) {
   file.info.assets = {{"a.glb", "assets/1.glb"}, {"dir \"q\"/b.glb", "assets/2.glb"}};
 
   const SessionFile back = through_toml(file);
+  EXPECT_EQ(to_toml(back), to_toml(file));  // CalibrationsAreWrittenAsEver shows what is in it
   EXPECT_EQ(back.info.name, file.info.name);
-  EXPECT_EQ(back.info.clock, "ptp");
-  EXPECT_TRUE(back.closed);
   EXPECT_EQ(back.info.assets, file.info.assets);
-  EXPECT_EQ(back.streams.at("observer").format, PixelFormat::yuv422p8);
-  EXPECT_EQ(back.streams.at("observer").frames, 1234567u);
-  EXPECT_EQ(back.streams.at("light").width, 512);
-  EXPECT_FALSE(back.streams.at("light").frames);
   const PinholeIntrinsics &in = observer.intrinsics, &out = back.info.observer->intrinsics;
   for (const auto member : {&PinholeIntrinsics::fx, &PinholeIntrinsics::fy, &PinholeIntrinsics::cx,
                             &PinholeIntrinsics::cy, &PinholeIntrinsics::k1, &PinholeIntrinsics::k2,
                             &PinholeIntrinsics::p1, &PinholeIntrinsics::p2, &PinholeIntrinsics::k3,
                             &PinholeIntrinsics::k4, &PinholeIntrinsics::k5, &PinholeIntrinsics::k6})
     EXPECT_EQ(std::bit_cast<std::uint64_t>(out.*member), std::bit_cast<std::uint64_t>(in.*member));
-  EXPECT_EQ(out.width, 1920);
-  EXPECT_EQ(back.info.observer->lens->focal_length_m, 0.0235);
-  EXPECT_EQ(back.info.observer->lens->f_number, 2.0);
-  EXPECT_EQ(back.info.observer->lens->focus_distance_m, 0.78);
+  EXPECT_EQ(back.info.observer->lens, observer.lens);
   EXPECT_EQ(back.info.observer->response.gamma, 1.0 / 0.45);
   EXPECT_EQ(back.info.observer->responsivity, 1e11 + 1e-5);
   EXPECT_EQ(back.info.light->intrinsics.k, light.intrinsics.k);
@@ -146,25 +121,27 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
   };
   for (const char* number : {"1.0", "1.2e41", "nan"})
     EXPECT_THAT(with("format_version = 1", std::string("format_version = ") + number),
-                HasSubstr("session.toml:2: format_version must be"))
-        << number;
-  EXPECT_THAT(with("format_version = 1", "format_version = 3"),
-              HasSubstr("session.toml:2: format_version"));
-  EXPECT_THAT(with("format = \"rgb8\"", "format = \"nv12\""), HasSubstr("observer.video.format"));
-  EXPECT_THAT(with("fx = 5.0", "fx = \"wide\""),
-              HasSubstr("observer.calibration.fx: \"wide\" is not"));
-  EXPECT_THAT(with("fx = 5.0\n", ""), HasSubstr("observer.calibration.fx: is missing"));
-  EXPECT_THAT(with("width = 640", "width = -640"), HasSubstr("observer.video.width"));
-  EXPECT_THAT(with("kind = \"srgb\"", "kind = \"log\""),
-              HasSubstr("observer.calibration.response.kind"));
-  EXPECT_THAT(with("vignetting = [0.0, 0.0, 0.0]", "vignetting = [-0.5, 0.0, 0.0]"),
-              HasSubstr("light.calibration.vignetting: passes no"));
-  EXPECT_THAT(with("dark_level = [0.0, 0.0, 0.0]", "dark_level = [0.0, 0.6, 0.0]"),
-              HasSubstr("light.calibration.dark_level: 0.6 is not"));
+                HasSubstr("session.toml:2: format_version must be"));
+  struct Mistake {
+    const char *from, *to, *words;
+  };
+  for (const auto& [from, to, words] : {
+           Mistake{"format_version = 1", "format_version = 3", "session.toml:2: format_version"},
+           Mistake{"format = \"rgb8\"", "format = \"nv12\"", "observer.video.format"},
+           Mistake{"fx = 5.0", "fx = \"wide\"", "observer.calibration.fx: \"wide\" is not"},
+           Mistake{"fx = 5.0\n", "", "observer.calibration.fx: is missing"},
+           Mistake{"width = 640", "width = -640", "observer.video.width"},
+           Mistake{"kind = \"srgb\"", "kind = \"log\"", "observer.calibration.response.kind"},
+           Mistake{"vignetting = [0.0, 0.0, 0.0]", "vignetting = [-0.5, 0.0, 0.0]",
+                   "light.calibration.vignetting: passes no"},
+           Mistake{"dark_level = [0.0, 0.0, 0.0]", "dark_level = [0.0, 0.6, 0.0]",
+                   "light.calibration.dark_level: 0.6 is not"},
+           Mistake{"[set]", "[[set]]", "set must be a table"},
+       })
+    EXPECT_THAT(with(from, to), HasSubstr(words)) << to;
   // Sessions of before these were known.
   EXPECT_EQ(with("vignetting = [0.0, 0.0, 0.0]\n", ""), "");
   EXPECT_EQ(with("dark_level = [0.0, 0.0, 0.0]\n", ""), "");
-  EXPECT_THAT(with("[set]", "[[set]]"), HasSubstr("set must be a table"));
   EXPECT_THAT(error_of("garbage"), HasSubstr("take/session.toml:1:"));
   EXPECT_THAT(error_of(""), HasSubstr("format_version is missing"));
   for (std::size_t length = 0; length + 1 < good.size(); ++length)  // never anything but an Error
@@ -188,8 +165,7 @@ TEST(SessionToml, CalibrationsAreWrittenAsEver) {
   light.dark_level = {0.01, 0.02, 0};
   light.world_from_camera = glm::dmat4(0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0.5, 0, 1.6, 1);
   file.info.light = light;
-  const std::string text = to_toml(file);
-  EXPECT_THAT(text, HasSubstr(R"(
+  EXPECT_THAT(to_toml(file), HasSubstr(R"(
 [observer.calibration]  # pixels; Brown-Conrady in OpenCV's order
 width = 64
 height = 48

@@ -24,6 +24,13 @@ class FramesToRenderTest : public testing::Test {
     return own;
   }
 
+  void release(const std::set<std::uint64_t>& frames) {
+    for (const std::uint64_t frame : frames) {
+      one_.release(frame);
+      two_.release(frame);
+    }
+  }
+
   test::TemporaryDirectory directory_;
   set::Output output_{directory_ / "out", true, true, false};
   RenderDirectory one_{output_, "{}", false}, two_{output_, "{}", false};
@@ -42,10 +49,7 @@ TEST_F(FramesToRenderTest, TwoShareATakeHoweverShortItIs) {
       EXPECT_EQ(written(second, 0, count), frames_from(half, count));
       EXPECT_EQ(written(first, half, count), std::set<std::uint64_t>());
       EXPECT_EQ(first.left(), frames_from(half, count));
-      for (std::uint64_t frame = 0; frame < count; ++frame) {
-        one_.release(frame);
-        two_.release(frame);
-      }
+      release(all);
     }
 }
 
@@ -75,10 +79,7 @@ TEST_F(FramesToRenderTest, AFrameThatCannotBeReadIsNobodys) {
     EXPECT_EQ(written(second, 2, 8), frames_from(4, 8));
     EXPECT_FALSE(second.left().contains(1));
     EXPECT_EQ(one_.claim(1), Claim::mine) << neighbours;
-    for (const std::uint64_t frame : all) {
-      one_.release(frame);
-      two_.release(frame);
-    }
+    release(all);
   }
 }
 

@@ -47,6 +47,13 @@ std::vector<Case> cases() {
   return all;
 }
 
+// What a command says, with the error that it ends with.
+std::string said(const std::function<void(std::ostream&)>& command) {
+  std::ostringstream out;
+  const std::string error = test::error_of([&] { command(out); });
+  return out.str() + error;
+}
+
 class HostileTake : public testing::TestWithParam<Case> {
  protected:
   HostileTake() {
@@ -64,20 +71,7 @@ class HostileTake : public testing::TestWithParam<Case> {
 
   void expect_victim_untouched() {
     EXPECT_EQ(session::read_file(victim_), victims_text);
-    struct stat status {};
-    EXPECT_EQ(::stat(victim_.c_str(), &status), 0);
-    EXPECT_EQ(status.st_mode & 07777, 0600u);
-  }
-
-  // What a command says, or the error that it ends with.
-  static std::string said(const std::function<void(std::ostream&)>& command) {
-    std::ostringstream out;
-    try {
-      command(out);
-    } catch (const Error& error) {
-      out << error.what();
-    }
-    return out.str();
+    EXPECT_EQ(fs::status(victim_).permissions(), fs::perms{0600});
   }
 
   static constexpr const char* victims_text = "as it was";
@@ -131,14 +125,8 @@ std::string said_to_nobody(const std::function<void(std::ostream&)>& action) {
   if (::pipe(says) != 0) throw Error("no pipe");
   const pid_t child = ::fork();
   if (child == 0) {
-    std::ostringstream out;
     if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(1);
-    try {
-      action(out);
-    } catch (const Error& error) {
-      out << error.what();
-    }
-    const std::string text = out.str() + "\n";
+    const std::string text = said(action) + "\n";
     ::_exit(::write(says[1], text.data(), text.size()) > 0 ? 0 : 1);
   }
   ::close(says[1]);

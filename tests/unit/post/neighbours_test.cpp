@@ -8,8 +8,8 @@
 #include "daemon/post/render.hpp"
 #include "daemon/scene/load.hpp"
 #include "drivers/plate.hpp"
+#include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
-#include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::post::neighbours_test {
@@ -22,6 +22,7 @@ using Sums = std::map<std::string, std::string>;  // SHA-256 by the file's name
 
 class RenderNeighbours : public testing::Test {
  protected:
+  RenderNeighbours() { test::write_small_take(directory_.path()); }
   RenderReport render(const std::string& folder, RenderOptions options) {
     options.session = directory_ / "session";
     options.directory = directory_ / folder;
@@ -44,11 +45,7 @@ class RenderNeighbours : public testing::Test {
       for (const auto& [file, mark] : frame.files) sums[file] = mark.sha256;
     return sums;
   }
-  std::string content_of(const std::string& file) const {
-    std::ostringstream text;
-    text << std::ifstream(directory_ / file).rdbuf();
-    return text.str();
-  }
+  std::string content_of(const char* file) const { return session::content_of(directory_ / file); }
 
   test::TemporaryDirectory directory_;
   std::string out_;  // of the first run
@@ -57,7 +54,6 @@ class RenderNeighbours : public testing::Test {
 // One part ends beside the frame without a pose, one has it within its neighbours and the take's
 // end, and one is it.
 TEST_F(RenderNeighbours, EveryPartOfATakeHasTheFilesOfTheWhole) {
-  test::write_small_take(directory_.path());
   const RenderReport whole = render("whole");
   EXPECT_THAT(out_, HasSubstr("denoised, over 2 frames on either side"));
   ASSERT_EQ(whole.frames.size(), std::size_t{small_take_frames});
@@ -73,7 +69,6 @@ TEST_F(RenderNeighbours, EveryPartOfATakeHasTheFilesOfTheWhole) {
 }
 
 TEST_F(RenderNeighbours, WhatPassesThroughUntouchedIsNobodysNeighbour) {
-  test::write_small_take(directory_.path());
   const RenderReport report = render("out");
   for (const FinishedFrame& frame : report.frames) {
     const int index = static_cast<int>(frame.frame);
@@ -88,7 +83,6 @@ TEST_F(RenderNeighbours, WhatPassesThroughUntouchedIsNobodysNeighbour) {
 
 // Frames that are there are not written again, but they are neighbours of those that are not.
 TEST_F(RenderNeighbours, ALaterRunFillsTheGapsWithTheSamePictures) {
-  test::write_small_take(directory_.path());
   const Sums expected = sums_of(render("whole"));
   render("out", FrameRange{2, 2});
   render("out", FrameRange{5, 5});
@@ -98,7 +92,6 @@ TEST_F(RenderNeighbours, ALaterRunFillsTheGapsWithTheSamePictures) {
 }
 
 TEST_F(RenderNeighbours, TwoAtWorkInOneFolderMakeTheSamePictures) {
-  test::write_small_take(directory_.path());
   const Sums expected = sums_of(render("whole"));
   constexpr std::uint64_t last = small_take_frames - 1;
   for (const auto& [one, two] : {std::pair(FrameRange{0, 4}, FrameRange{3, last}),
@@ -119,7 +112,6 @@ TEST_F(RenderNeighbours, TwoAtWorkInOneFolderMakeTheSamePictures) {
 // the frame nor says that it is being rendered.
 TEST_F(RenderNeighbours, AFrameThatCannotBeReadIsNobodys) {
   constexpr std::uint64_t unreadable = 5;
-  test::write_small_take(directory_.path());
   test::make_unreadable(directory_ / "session", unreadable);
   for (const int neighbours : {0, 2}) {
     const std::string folder = "out" + std::to_string(neighbours);
@@ -144,7 +136,6 @@ TEST_F(RenderNeighbours, AFrameThatCannotBeReadIsNobodys) {
 // With none on either side a picture is what the render stage makes of its frame alone, and a
 // folder that knows nothing of neighbours can be gone on with.
 TEST_F(RenderNeighbours, WithoutNeighboursAFrameStandsAlone) {
-  test::write_small_take(directory_.path());
   render("alone", FrameRange{5, 5}, 0);
   EXPECT_THAT(content_of("alone/render.json"), Not(HasSubstr("\"neighbours\"")));
   const pipeline::Take take = pipeline::open_take(directory_ / "session", {});
@@ -166,16 +157,10 @@ TEST_F(RenderNeighbours, WithoutNeighboursAFrameStandsAlone) {
 
 // Otherwise a long render would end in the middle, for want of memory.
 TEST_F(RenderNeighbours, WhatDoesNotFitIntoMemoryIsRefusedBeforeAnyFrameIsRendered) {
-  test::write_small_take(directory_.path());
   RenderOptions options;
   options.free_memory = 1'500'000;  // 48x36 pixels with two on each side take 3.5 MB
-  try {
-    render("out", options);
-    FAIL() << "rendered";
-  } catch (const Error& error) {
-    const std::string words = error.what();
-    EXPECT_THAT(words, HasSubstr("quality.neighbours = 2: to average 5 frames of 48x36"));
-  }
+  EXPECT_THAT(test::error_of([&] { render("out", options); }),
+              HasSubstr("quality.neighbours = 2: to average 5 frames of 48x36"));
   EXPECT_EQ(content_of("out/frames.jsonl"), "");
   options.neighbours = 0;
   EXPECT_EQ(render("alone", options).frames.size(), std::size_t{small_take_frames});
@@ -185,13 +170,9 @@ TEST_F(RenderNeighbours, WhatDoesNotFitIntoMemoryIsRefusedBeforeAnyFrameIsRender
 }
 
 TEST_F(RenderNeighbours, TheSetMayAskForUpToFour) {
+  std::filesystem::remove_all(directory_ / "session");
   test::write_small_take(directory_.path(), true, "neighbours = 5\n");
-  try {
-    render("out");
-    FAIL() << "five neighbours on either side";
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("0 to 4"));
-  }
+  EXPECT_THAT(test::error_of([&] { render("out"); }), HasSubstr("0 to 4"));
 }
 
 }  // namespace previz::post::neighbours_test

@@ -23,11 +23,31 @@ using test::small_take_unlit;
 
 class RenderSession : public testing::Test {
  protected:
+  RenderSession() { test::write_small_take(directory_.path()); }
+  // Another take in the place of the small one.
+  template <class... How>
+  void write_take(const How&... how) {
+    std::filesystem::remove_all(directory_ / "session");
+    test::write_small_take(directory_.path(), how...);
+  }
   RenderReport render(RenderOptions options) {
     options.session = directory_ / "session";
     if (!options.directory) options.directory = directory_ / "out";
     out_.str("");
     return render_session(options, out_);
+  }
+  // Options for a range of frames.
+  static RenderOptions of_frames(std::uint64_t first, std::uint64_t last) {
+    RenderOptions options;
+    options.frames = FrameRange{first, last};
+    return options;
+  }
+  // The layers of one frame.
+  render::Layers layers_of(RenderOptions options) {
+    render::Layers layers;
+    options.on_frame = [&](const pipeline::Shot& shot) { layers = *shot.layers; };
+    EXPECT_EQ(render(options).frames.at(0).status, FrameStatus::rendered);
+    return layers;
   }
   rig::LiveOptions live_options() const {
     rig::LiveOptions options;
@@ -35,16 +55,18 @@ class RenderSession : public testing::Test {
     options.directory = directory_ / "live";
     return options;
   }
-  // Requests the stop when the condition holds, and, with a failure, when it never does. The thread
-  // ends with the scope it is kept in, also where what it waits for never comes.
-  static std::jthread stop_when(const std::string& what, const std::function<bool()>& condition,
-                                const std::stop_source& stop) {
-    return std::jthread([=](const std::stop_token& left) mutable {
-      const auto result =
-          test::wait_until(what, [&] { return left.stop_requested() || condition(); });
-      EXPECT_TRUE(result);
+  // Runs live, over and over the take, until the condition holds, and, with a failure, where it
+  // never does.
+  pipeline::MetricsSnapshot run_until(rig::LiveOptions options, const std::string& what,
+                                      const std::function<bool()>& condition) {
+    std::stop_source stop;
+    options.stop = stop.get_token();
+    options.loop = true;  // would never end by itself
+    const std::jthread stopper([&](const std::stop_token& left) {
+      EXPECT_TRUE(test::wait_until(what, [&] { return left.stop_requested() || condition(); }));
       stop.request_stop();
     });
+    return rig::run_live(options, reports_);
   }
   static bool is_plate(const std::filesystem::path& png, int frame) {
     return output::read_png(png).samples == to_plate(small_take_frame(frame)).samples;
@@ -71,7 +93,6 @@ double row_of_the_card(const render::Layers& layers) {
 // pixels at its border deviates by at most 0.5 / sqrt(2), 6.5 px from its middle, which makes
 // sqrt(52) * 6.5 * 0.35 / 169 = 0.1 px.
 TEST_F(RenderSession, EveryFrameHasItsFilesAndItsRecord) {
-  test::write_small_take(directory_.path());
   const RenderReport report = render({});
   ASSERT_EQ(report.frames.size(), std::size_t{small_take_frames});
   EXPECT_FALSE(report.interrupted);
@@ -101,13 +122,9 @@ TEST_F(RenderSession, EveryFrameHasItsFilesAndItsRecord) {
 
 // 0.3 m at 0.9 m and f = 40 px is 13 px wide: the card covers the middle of the picture.
 TEST_F(RenderSession, TheVirtualCardCoversThePlateAndTheRestShowsIt) {
-  test::write_small_take(directory_.path());
-  RenderOptions options;
-  options.frames = FrameRange{1, 1};
+  RenderOptions options = of_frames(1, 1);
   options.denoise = false;
-  render::Layers seen;
-  options.on_frame = [&](const pipeline::Shot& shot) { seen = *shot.layers; };
-  render(options);
+  const render::Layers seen = layers_of(options);
   const std::size_t middle = 18 * 48 + 24;
   EXPECT_EQ(seen.mask[middle], 1.0f);
   EXPECT_NEAR(seen.depth[middle], 0.9f, 1e-3f);
@@ -117,9 +134,7 @@ TEST_F(RenderSession, TheVirtualCardCoversThePlateAndTheRestShowsIt) {
 }
 
 TEST_F(RenderSession, AnAdaptivePictureSaysSoAndIsNoOther) {
-  test::write_small_take(directory_.path());
-  RenderOptions options;
-  options.frames = FrameRange{1, 1};
+  RenderOptions options = of_frames(1, 1);
   options.samples = 64;
   options.adaptive = true;
   std::vector<pipeline::Shot> shots;
@@ -137,9 +152,7 @@ TEST_F(RenderSession, AnAdaptivePictureSaysSoAndIsNoOther) {
 }
 
 TEST_F(RenderSession, ADenoisedPictureSaysSoAndItsOtherLayersAreAsRendered) {
-  test::write_small_take(directory_.path());
-  RenderOptions options;
-  options.frames = FrameRange{1, 1};
+  RenderOptions options = of_frames(1, 1);
   std::vector<render::Layers> seen;
   options.on_frame = [&](const pipeline::Shot& shot) { seen.push_back(*shot.layers); };
   options.denoise = false;
@@ -161,11 +174,9 @@ TEST_F(RenderSession, ADenoisedPictureSaysSoAndItsOtherLayersAreAsRendered) {
 // ten times the light's red as of the others.
 TEST_F(RenderSession, TheRecordedLightLightsEveryFrame) {
   session::CapturedLight light{{{1, {0, 0, 1}, 0.01, {10, 1, 1}}}, 1, {{0, 0, 0}}};
-  test::write_small_take(directory_.path(), true,
-                         "[lighting]\nmode = \"sources\"\nfrom = \"recording\"\n", light);
+  write_take(true, "[lighting]\nmode = \"sources\"\nfrom = \"recording\"\n", light);
   render::Layers seen;
-  RenderOptions options;
-  options.frames = FrameRange{small_take_unlit, small_take_unlit};
+  RenderOptions options = of_frames(small_take_unlit, small_take_unlit);
   options.on_frame = [&](const pipeline::Shot& shot) { seen = *shot.layers; };
   const RenderReport report = render(options);
   EXPECT_EQ(report.frames.front().status, FrameStatus::rendered);
@@ -224,29 +235,23 @@ TEST_F(RenderSession, ACapturedLampIsDimmedOnVirtualAndRealSurfaces) {
 
 // A take may be lit by what its set says alone, whatever the light camera saw.
 TEST_F(RenderSession, TheSetsOwnLightLightsEveryFrame) {
-  test::write_small_take(directory_.path(), true,
-                         "[lighting]\nfrom = \"set\"\n[[light]]\ntype = \"directional\"\n"
-                         "direction = [0, 0, -1]\nemission = [3, 2, 1]\ngain_real = 1\n");
-  render::Layers seen;
-  RenderOptions options;
-  options.frames = FrameRange{small_take_unlit, small_take_unlit};
-  options.on_frame = [&](const pipeline::Shot& shot) { seen = *shot.layers; };
-  EXPECT_EQ(render(options).frames.front().status, FrameStatus::rendered);
+  write_take(true,
+             "[lighting]\nfrom = \"set\"\n[[light]]\ntype = \"directional\"\n"
+             "direction = [0, 0, -1]\nemission = [3, 2, 1]\ngain_real = 1\n");
+  const render::Layers seen = layers_of(of_frames(small_take_unlit, small_take_unlit));
   const glm::vec3 card = seen.mixed[18 * 48 + 24];
   EXPECT_NEAR(card.r / card.b, 3, 1e-4);
 }
 
 TEST_F(RenderSession, WithNothingVirtualEveryPictureIsThePlateBitForBit) {
-  test::write_small_take(directory_.path(), false);
+  write_take(false);
   render({});
   for (int i = 0; i < small_take_frames; ++i)
     EXPECT_TRUE(is_plate(directory_ / ("out/000" + std::to_string(i) + ".png"), i)) << i;
 }
 
 TEST_F(RenderSession, ASecondRunSkipsWhatIsFinishedAndOtherSamplesAreRefused) {
-  test::write_small_take(directory_.path());
-  RenderOptions options;
-  options.frames = FrameRange{0, 2};
+  RenderOptions options = of_frames(0, 2);
   EXPECT_EQ(render(options).found_finished, 0u);
   int rendered = 0;
   options.frames.reset();
@@ -263,30 +268,22 @@ TEST_F(RenderSession, ASecondRunSkipsWhatIsFinishedAndOtherSamplesAreRefused) {
 
 // 24 x 18 of the 48 x 36 pixels: to look at a take quickly. It is another picture, not the same.
 TEST_F(RenderSession, ASmallerPictureIsAnotherOne) {
-  test::write_small_take(directory_.path());
-  RenderOptions options;
-  options.frames = FrameRange{small_take_lost, small_take_lost + 1};
+  RenderOptions options = of_frames(small_take_lost, small_take_lost + 1);
   options.scale = 0.5;
   const RenderReport report = render(options);
   ASSERT_EQ(report.frames.size(), 2u);
-  for (const char* name : {"0003", "0004"}) {
-    EXPECT_EQ(output::read_png(directory_ / ("out/" + std::string(name) + ".png")).width, 24);
-    const render::Layers layers =
-        output::read_exr(directory_ / ("out/" + std::string(name) + ".exr"));
+  for (const char* name : {"out/0003", "out/0004"}) {
+    EXPECT_EQ(output::read_png(directory_ / (std::string(name) + ".png")).width, 24);
+    const render::Layers layers = output::read_exr(directory_ / (std::string(name) + ".exr"));
     EXPECT_EQ(layers.width, 24);
     EXPECT_EQ(layers.height, 18);
   }
   options.scale = 1;
-  try {
-    render(options);
-    FAIL() << "pictures of two sizes in one folder";
-  } catch (const Error& error) {
-    EXPECT_THAT(error.what(), HasSubstr("scale is 0.5 there and 1.0 now"));
-  }
+  EXPECT_THAT(test::error_of([&] { render(options); }),
+              HasSubstr("scale is 0.5 there and 1.0 now"));
 }
 
 TEST_F(RenderSession, AStopLeavesWholeFramesAndTheNextRunEndsInTheSamePictures) {
-  test::write_small_take(directory_.path());
   RenderOptions whole;
   whole.directory = directory_ / "whole";
   render(whole);
@@ -316,8 +313,7 @@ TEST_F(RenderSession, AStopLeavesWholeFramesAndTheNextRunEndsInTheSamePictures) 
 // The light is averaged over time and filled with what the film camera saw: a render that starts
 // late, or goes on, has the light of one that did not.
 TEST_F(RenderSession, TheLightOfAFrameIsTheSameWhereverTheRenderStarts) {
-  test::write_small_take(directory_.path(), true,
-                         "[lighting]\nunseen = \"observer\"\nsmoothing_s = 5\n");
+  write_take(true, "[lighting]\nunseen = \"observer\"\nsmoothing_s = 5\n");
   std::map<std::uint64_t, std::vector<glm::vec3>> whole, late;
   RenderOptions options;
   options.on_frame = [&](const pipeline::Shot& shot) {
@@ -337,7 +333,6 @@ TEST_F(RenderSession, TheLightOfAFrameIsTheSameWhereverTheRenderStarts) {
 }
 
 TEST_F(RenderSession, AnotherSetFileTakesTheSessionsAssetsWhereItHasNoOwn) {
-  test::write_small_take(directory_.path());
   std::filesystem::create_directory(directory_ / "elsewhere");
   std::filesystem::rename(directory_ / "set.toml", directory_ / "elsewhere/tweaked.toml");
   RenderOptions options;
@@ -349,8 +344,7 @@ TEST_F(RenderSession, AnotherSetFileTakesTheSessionsAssetsWhereItHasNoOwn) {
 // The set of a take from elsewhere does not choose a folder to write into; the crew does.
 TEST_F(RenderSession, ATakesOwnSetWritesNowhereElse) {
   const std::filesystem::path elsewhere = directory_ / "elsewhere";
-  test::write_small_take(directory_.path(), true,
-                         "[output]\ndirectory = \"" + elsewhere.string() + "\"\n");
+  write_take(true, "[output]\ndirectory = \"" + elsewhere.string() + "\"\n");
   RenderOptions options;
   options.session = directory_ / "session";
   options.frames = FrameRange{1, 1};
@@ -361,15 +355,11 @@ TEST_F(RenderSession, ATakesOwnSetWritesNowhereElse) {
 }
 
 TEST_F(RenderSession, ARangeBehindTheEndIsRefused) {
-  test::write_small_take(directory_.path());
-  RenderOptions options;
-  options.frames = FrameRange{80, 90};
-  EXPECT_THROW(render(options), Error);
+  EXPECT_THROW(render(of_frames(80, 90)), Error);
 }
 
 // Live: nothing vanishes. Every frame of the camera was shown or is counted as dropped, with cause.
 TEST_F(RenderSession, LiveAccountsForEveryFrame) {
-  test::write_small_take(directory_.path());
   const pipeline::MetricsSnapshot snapshot = rig::run_live(live_options(), reports_);
   std::uint64_t accounted = snapshot.stages.at("display").frames;
   for (const auto& [name, stage] : snapshot.stages)
@@ -384,12 +374,8 @@ TEST_F(RenderSession, LiveAccountsForEveryFrame) {
 
 // `previzd run --spp N`.
 TEST_F(RenderSession, LiveTakesTheSamplesItIsAskedFor) {
-  test::write_small_take(directory_.path());  // whose set says 2
   rig::LiveOptions options = live_options();
-  options.samples = 3;
-  options.loop = true;
-  std::stop_source stop;
-  options.stop = stop.get_token();
+  options.samples = 3;  // the set says 2
   std::atomic<bool> rendered = false;
   std::set<int> samples;  // of the pictures that were rendered whole
   options.on_shown = [&](const pipeline::Shot& shot, const rig::Look&) {
@@ -397,15 +383,13 @@ TEST_F(RenderSession, LiveTakesTheSamplesItIsAskedFor) {
     samples.insert(shot.samples);
     rendered = true;
   };
-  const auto is_rendered = [&] { return rendered.load(); };
-  const auto stopper = stop_when("a picture is rendered", is_rendered, stop);
-  rig::run_live(options, reports_);
+  run_until(options, "a picture is rendered", [&] { return rendered.load(); });
   EXPECT_EQ(samples, std::set<int>{3});
 }
 
 // quality.scale is of the preview only.
 TEST_F(RenderSession, LiveShowsThePreviewAtTheSetsScaleAndOfflineIsFullSize) {
-  test::write_small_take(directory_.path(), false, "scale = 0.5\n");
+  write_take(false, "scale = 0.5\n");
   rig::run_live(live_options(), reports_);
   const Plate last = to_plate(small_take_frame(small_take_frames - 1));
   const Plate half = pipeline::scaled(last, 0.5, lighting::Response(ResponseCurve{}, 8));
@@ -413,38 +397,27 @@ TEST_F(RenderSession, LiveShowsThePreviewAtTheSetsScaleAndOfflineIsFullSize) {
   EXPECT_EQ(shown.width, 24);
   EXPECT_EQ(shown.samples, half.samples);  // nothing is virtual: the plate, bit for bit
 
-  RenderOptions offline;
-  offline.frames = FrameRange{1, 1};
-  render(offline);
+  render(of_frames(1, 1));
   EXPECT_TRUE(is_plate(directory_ / "out/0001.png", 1));
 }
 
 TEST_F(RenderSession, LiveFillsTheLightFromTheFilmCamera) {
-  test::write_small_take(directory_.path(), true, "[lighting]\nunseen = \"observer\"\n");
-  std::stop_source stop;
+  write_take(true, "[lighting]\nunseen = \"observer\"\n");
   rig::LiveOptions options = live_options();
-  options.loop = true;
-  options.stop = stop.get_token();
   std::atomic<bool> lit = false;
   options.on_shown = [&](const pipeline::Shot& shot, const rig::Look&) {
     if (shot.light) lit = true;
   };
-  const auto is_lit = [&] { return lit.load(); };
-  const auto stopper = stop_when("a picture has light", is_lit, stop);
-  const pipeline::MetricsSnapshot metrics = rig::run_live(options, reports_);
+  const pipeline::MetricsSnapshot metrics =
+      run_until(options, "a picture has light", [&] { return lit.load(); });
   EXPECT_GT(metrics.stages.at("lighting").frames, 0u);
   EXPECT_THAT(out_.str(), HasSubstr("filled by the rule \"observer\""));
 }
 
 TEST_F(RenderSession, LiveStopsWhenAsked) {
-  test::write_small_take(directory_.path());
-  std::stop_source stop;
-  rig::LiveOptions options = live_options();
-  options.loop = true;  // would never end by itself
-  options.stop = stop.get_token();
   const auto is_shown = [this] { return std::filesystem::exists(directory_ / "live/picture.png"); };
-  const auto stopper = stop_when("picture.png is written", is_shown, stop);
-  EXPECT_GT(rig::run_live(options, reports_).stages.at("display").frames, 0u);
+  const auto metrics = run_until(live_options(), "picture.png is written", is_shown);
+  EXPECT_GT(metrics.stages.at("display").frames, 0u);
 }
 
 }  // namespace previz::post::render_test

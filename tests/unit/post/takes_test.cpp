@@ -40,9 +40,30 @@ class Takes : public testing::Test {
     return out.str();
   }
 
-  template <typename Call>
-  static std::string refusal(const Call& call) {
-    return test::error_of([&] { call(); });
+  // What is said to refuse them.
+  std::string refused_mark(const Paths& takes) {
+    return test::error_of([&] { mark_takes(takes, true, out_); });
+  }
+  std::string refused_delete(const Paths& takes, bool also_good = false) {
+    return test::error_of([&] { delete_takes(takes, also_good, out_); });
+  }
+  std::string refused_copy(const Paths& takes, const fs::path& folder) {
+    return test::error_of([&] { copy_takes({takes, folder}, out_, {}); });
+  }
+  std::string refused_repair(const Paths& takes, const fs::path& folder) {
+    return test::error_of([&] { repair_takes({takes, folder}, out_, {}); });
+  }
+
+  // Exit status, and what is said.
+  std::pair<int, std::string> checked(const Paths& takes) {
+    std::ostringstream out;
+    const int status = check_takes(takes, out, {});
+    return {status, out.str()};
+  }
+  static bool fits_its_checksums(const fs::path& copy) {
+    const std::string command =
+        "cd '" + copy.string() + "' && sha256sum --check --status --strict ";
+    return std::system((command + checksums_name).c_str()) == 0;
   }
 
   void replace_in_toml(const std::string& take, const std::string& from, const std::string& to) {
@@ -94,25 +115,18 @@ TEST_F(Takes, AreMarkedAllOrNone) {
   mark_takes({one_}, false, out_);
   EXPECT_FALSE(session::summary_of(one_).info.take->good);
   EXPECT_EQ(session::summary_of(one_).info.take->timecode, "14:03:27:12");
-  EXPECT_THAT(refusal([&] {
-                mark_takes({one_, folder_}, true, out_);
-              }),
+  EXPECT_THAT(refused_mark({one_, folder_}),
               HasSubstr("is a folder of takes; give the takes in it"));
   EXPECT_FALSE(session::summary_of(one_).info.take->good);
-  EXPECT_THAT(refusal([&] { mark_takes({folder_ / "12A_take003"}, true, out_); }),
-              HasSubstr("not found"));
+  EXPECT_THAT(refused_mark({folder_ / "12A_take003"}), HasSubstr("not found"));
 }
 
 TEST_F(Takes, ThatAreRecordedAreLeftAlone) {
   replace_in_toml("12A_take001", "closed = true", "closed = false");
   output::TakeFolders::keep_wish(one_);
   EXPECT_THAT(listed(), HasSubstr("being recorded"));
-  for (const std::string& said : {refusal([&] { mark_takes({one_}, true, out_); }), refusal([&] {
-                                    delete_takes({two_, one_}, true, out_);
-                                  }),
-                                  refusal([&] {
-                                    copy_takes({{one_}, directory_ / "disk"}, out_, {});
-                                  })})
+  for (const std::string& said : {refused_mark({one_}), refused_delete({two_, one_}, true),
+                                  refused_copy({one_}, directory_ / "disk")})
     EXPECT_THAT(said, HasSubstr("12A_take001: is being recorded; end the take first"));
   EXPECT_TRUE(fs::exists(two_ / "session.toml"));
 }
@@ -121,10 +135,9 @@ TEST_F(Takes, DamageIsFoundAndNamed) {
   EXPECT_EQ(check_takes({one_, two_}, out_, {}), 0);
   EXPECT_THAT(out_.str(), HasSubstr("12A_take001: whole, 8 frames"));
   fs::resize_file(one_ / "observer.mkv", fs::file_size(one_ / "observer.mkv") / 2);
-  std::ostringstream out;
-  EXPECT_EQ(check_takes({one_, two_}, out, {}), 1);
-  EXPECT_THAT(out.str(), HasSubstr("12A_take001: observer"));
-  EXPECT_THAT(out.str(), HasSubstr("12A_take002: whole"));
+  const auto [status, said] = checked({one_, two_});
+  EXPECT_EQ(status, 1);
+  EXPECT_THAT(said, AllOf(HasSubstr("12A_take001: observer"), HasSubstr("12A_take002: whole")));
 }
 
 TEST_F(Takes, AreCopiedWithChecksums) {
@@ -136,10 +149,7 @@ TEST_F(Takes, AreCopiedWithChecksums) {
   EXPECT_FALSE(fs::exists(copy / "notes.txt"));
   for (const fs::path& file : session::own_files(one_))
     EXPECT_EQ(session::read_file(copy / file), session::read_file(one_ / file)) << file;
-  EXPECT_EQ(std::system(("cd '" + copy.string() + "' && sha256sum --check --status --strict " +
-                         checksums_name)
-                            .c_str()),
-            0);
+  EXPECT_TRUE(fits_its_checksums(copy));
   EXPECT_EQ(check_takes({copy}, out_, {}), 0);
   // Nothing but the takes is in the folder.
   EXPECT_EQ(std::distance(fs::directory_iterator(disk), {}), 2);
@@ -154,18 +164,15 @@ TEST_F(Takes, AreCopiedWithChecksumsOfNamesThatHaveTheEndOfALine) {
   copy_takes({{one_}, disk}, out_, {});
   EXPECT_EQ(session::read_file(copy / name), "an asset");
   EXPECT_EQ(check_takes({copy}, out_, {}), 0) << out_.str();
-  EXPECT_EQ(std::system(("cd '" + copy.string() + "' && sha256sum --check --status --strict " +
-                         checksums_name)
-                            .c_str()),
-            0);
+  EXPECT_TRUE(fits_its_checksums(copy));
 }
 
 TEST_F(Takes, WhoseChecksumsAreALinkToThemselvesAreNamed) {
   fs::create_symlink(checksums_name, one_ / checksums_name);
-  std::ostringstream out;
-  EXPECT_EQ(check_takes({one_}, out, {}), 1);
-  EXPECT_THAT(out.str(), HasSubstr(std::string(checksums_name) + ": is a link"));
-  EXPECT_THAT(refusal([&] { mark_takes({one_}, true, out_); }), HasSubstr("is a link"));
+  const auto [status, said] = checked({one_});
+  EXPECT_EQ(status, 1);
+  EXPECT_THAT(said, HasSubstr(std::string(checksums_name) + ": is a link"));
+  EXPECT_THAT(refused_mark({one_}), HasSubstr("is a link"));
 }
 
 TEST_F(Takes, AreCopiedOnce) {
@@ -175,14 +182,8 @@ TEST_F(Takes, AreCopiedOnce) {
   EXPECT_THAT(out_.str(), HasSubstr("12A_take001: already copied"));
   // Another take of the name is not replaced, and neither is one that was marked meanwhile.
   mark_takes({two_}, true, out_);
-  EXPECT_THAT(refusal([&] {
-                copy_takes({{two_}, disk}, out_, {});
-              }),
-              HasSubstr("is not a current copy of this take"));
-  EXPECT_THAT(refusal([&] {
-                copy_takes({{one_}, folder_}, out_, {});
-              }),
-              HasSubstr("is inside the take"));
+  EXPECT_THAT(refused_copy({two_}, disk), HasSubstr("is not a current copy of this take"));
+  EXPECT_THAT(refused_copy({one_}, folder_), HasSubstr("is inside the take"));
 }
 
 TEST_F(Takes, AStoppedCopyLeavesNothing) {
@@ -198,9 +199,9 @@ TEST_F(Takes, ADamagedCopyIsFound) {
   copy_takes({{one_}, disk}, out_, {});
   std::ofstream(copy / "events.jsonl", std::ios::app) << "{}\n";
   std::ofstream(copy / "track.jsonl", std::ios::app) << "\n";
-  std::ostringstream out;
-  EXPECT_EQ(check_takes({copy}, out, {}), 1);
-  EXPECT_THAT(out.str(), HasSubstr("track.jsonl: was changed since it was copied; copy the take"));
+  const auto [status, said] = checked({copy});
+  EXPECT_EQ(status, 1);
+  EXPECT_THAT(said, HasSubstr("track.jsonl: was changed since it was copied; copy the take"));
 }
 
 // A frame that was damaged on the rig's disk: the copy is the same, byte for byte, and as damaged.
@@ -230,18 +231,13 @@ TEST_F(Takes, ADamagedTakeIsRepairedIntoANewOne) {
   EXPECT_THAT(out_.str(), HasSubstr("12A_take002: whole, nothing to repair"));
   EXPECT_EQ(session::read_file(film), damaged);
   EXPECT_FALSE(fs::exists(disk / "12A_take002"));
-  std::ostringstream out;
-  EXPECT_EQ(check_takes({disk / "12A_take001"}, out, {}), 1);
-  EXPECT_THAT(out.str(), HasSubstr("repaired from 12A_take001, which was damaged: observer.mkv"));
-  EXPECT_EQ(std::ranges::count(out.str(), '\n'), 1);  // nothing else is wrong with it
-  EXPECT_THAT(refusal([&] {
-                repair_takes({{one_}, disk}, out_, {});
-              }),
+  const auto [status, said] = checked({disk / "12A_take001"});
+  EXPECT_EQ(status, 1);
+  EXPECT_THAT(said, HasSubstr("repaired from 12A_take001, which was damaged: observer.mkv"));
+  EXPECT_EQ(std::ranges::count(said, '\n'), 1);  // nothing else is wrong with it
+  EXPECT_THAT(refused_repair({one_}, disk),
               HasSubstr("12A_take001: already exists; repair into another folder"));
-  EXPECT_THAT(refusal([&] {
-                repair_takes({{one_}, folder_}, out_, {});
-              }),
-              HasSubstr("already exists"));
+  EXPECT_THAT(refused_repair({one_}, folder_), HasSubstr("already exists"));
 
   damaged = before;
   damaged[0] = 0;
@@ -281,10 +277,7 @@ TEST_F(Takes, AreDeletedAndNothingElse) {
 
 TEST_F(Takes, AGoodTakeIsNotDeletedUnasked) {
   mark_takes({two_}, true, out_);
-  EXPECT_THAT(refusal([&] {
-                delete_takes({one_, two_}, false, out_);
-              }),
-              HasSubstr("12A_take002: is marked good; add --good"));
+  EXPECT_THAT(refused_delete({one_, two_}), HasSubstr("12A_take002: is marked good; add --good"));
   EXPECT_TRUE(fs::exists(one_ / "session.toml"));
   delete_takes({two_}, true, out_);
   EXPECT_FALSE(fs::exists(two_));
@@ -292,8 +285,7 @@ TEST_F(Takes, AGoodTakeIsNotDeletedUnasked) {
 
 TEST_F(Takes, ALinkIsNotFollowedToBeDeleted) {
   fs::create_directory_symlink(one_, folder_ / "best");
-  EXPECT_THAT(refusal([&] { delete_takes({folder_ / "best"}, false, out_); }),
-              HasSubstr("is a link to " + one_.string()));
+  EXPECT_THAT(refused_delete({folder_ / "best"}), HasSubstr("is a link to " + one_.string()));
   fs::create_directories(directory_ / "shared");
   std::ofstream(directory_ / "shared/model.glb") << "of others";
   fs::remove_all(one_ / "assets");
@@ -308,17 +300,17 @@ TEST_F(Takes, AFolderOrASetFileNamesThem) {
                          "[recording]\ndirectory = \"" + folder_.string() + "\"\n");
   list_takes({stage / "set.toml"}, out_);
   EXPECT_THAT(out_.str(), HasSubstr("12A_take002"));
-  EXPECT_THAT(refusal([&] { list_takes({directory_ / "nowhere"}, out_); }),
+  EXPECT_THAT(test::error_of([&] { list_takes({directory_ / "nowhere"}, out_); }),
               HasSubstr("not found; give a folder of takes"));
 }
 
 TEST_F(Takes, NoTakeOfThatKindIsSaid) {
   RenderOptions options;
   options.session = folder_;
-  EXPECT_THAT(refusal([&] { render_takes(options, WhichTakes::good, out_); }),
+  EXPECT_THAT(test::error_of([&] { render_takes(options, WhichTakes::good, out_); }),
               HasSubstr("no take in it is marked good; `previzd takes mark TAKE`"));
   options.session = directory_ / "nowhere";
-  EXPECT_THAT(refusal([&] { render_takes(options, WhichTakes::all, out_); }),
+  EXPECT_THAT(test::error_of([&] { render_takes(options, WhichTakes::all, out_); }),
               HasSubstr("contains no takes"));
 }
 

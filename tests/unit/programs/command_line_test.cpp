@@ -7,12 +7,20 @@
 
 namespace previz::command_line_test {
 
-post::RenderOptions render_options(const std::string& arguments) {
+CommandLine parsed(const std::string& arguments) {
   CLI::App app;
   CommandLine said;
   add_commands(app, said);
-  app.parse("render session " + arguments, false);
-  return said.render;
+  app.parse(arguments, false);
+  return said;
+}
+
+post::RenderOptions render_options(const std::string& arguments) {
+  return parsed("render session " + arguments).render;
+}
+
+rig::LiveOptions live_options(const std::string& arguments) {
+  return parsed("run set.toml " + arguments).run;
 }
 
 TEST(CommandLine, LeavesToTheSetWhatItDoesNotSay) {
@@ -26,14 +34,6 @@ TEST(CommandLine, LeavesToTheSetWhatItDoesNotSay) {
   EXPECT_FALSE(options.seed);
   EXPECT_FALSE(options.estimator);
   EXPECT_FALSE(options.directory);
-}
-
-rig::LiveOptions live_options(const std::string& arguments) {
-  CLI::App app;
-  CommandLine said;
-  add_commands(app, said);
-  app.parse("run set.toml " + arguments, false);
-  return said.run;
 }
 
 TEST(CommandLine, ARunTakesItsSamplesFromTheSetOrAsItIsAsked) {
@@ -61,14 +61,6 @@ TEST(CommandLine, APictureHasUpToFourNeighboursOnEitherSide) {
   EXPECT_EQ(render_options("--neighbours 4").neighbours, 4);
   EXPECT_THROW(render_options("--neighbours 5"), CLI::ParseError);
   EXPECT_THROW(render_options("--neighbours -1"), CLI::ParseError);
-}
-
-CommandLine parsed(const std::string& arguments) {
-  CLI::App app;
-  CommandLine said;
-  add_commands(app, said);
-  app.parse(arguments, false);
-  return said;
 }
 
 TEST(CommandLine, RendersGoodTakesOrAllButNotBoth) {

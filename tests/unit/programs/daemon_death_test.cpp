@@ -6,7 +6,6 @@
 #include <csignal>
 #include <nlohmann/json.hpp>
 
-#include "drivers/session/session.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"

@@ -49,14 +49,13 @@ TEST(Log, TheJournalGetsThePriorityOfTheSeverity) {
   log({Severity::error, "recorder", "take ended, the disk is full"});
   log({Severity::warning, "light", "{} is left out"});
   log({Severity::info, "", "live on a GPU"});
-  ASSERT_EQ(journal.size(), 3u);
-  EXPECT_EQ(journal[0]["PRIORITY"], "3");
-  EXPECT_EQ(journal[0]["MESSAGE"], "recorder: take ended, the disk is full");
-  EXPECT_EQ(journal[0]["SYSLOG_IDENTIFIER"], "previzd");
-  EXPECT_EQ(journal[1]["PRIORITY"], "4");
-  EXPECT_EQ(journal[1]["MESSAGE"], "light: {} is left out");
-  EXPECT_EQ(journal[2]["PRIORITY"], "6");
-  EXPECT_EQ(journal[2]["MESSAGE"], "live on a GPU");
+  const auto entry = [](const char* priority, const char* message) {
+    return std::map<std::string, std::string>{
+        {"PRIORITY", priority}, {"MESSAGE", message}, {"SYSLOG_IDENTIFIER", "previzd"}};
+  };
+  EXPECT_THAT(journal,
+              ElementsAre(entry("3", "recorder: take ended, the disk is full"),
+                          entry("4", "light: {} is left out"), entry("6", "live on a GPU")));
 }
 
 // previzd --log-level
@@ -104,19 +103,14 @@ TEST(Reports, AnEventIsLoggedEachTimeWithItsNumber) {
   for (int i = 1; i <= 23; ++i)
     reports(counted({Severity::error, "observer", "ended by signal " + std::to_string(4 + i % 2)}));
   reports(counted({Severity::error, "light camera", "ended by signal 5"}));
-  std::vector<std::string> lines;
-  std::istringstream in(out.str());
-  for (std::string line; std::getline(in, line);) lines.push_back(line);
-  ASSERT_EQ(lines.size(), 24u);
-  EXPECT_EQ(lines[0], "observer: ended by signal 5");
-  EXPECT_EQ(lines[1], "observer: ended by signal 4, the 2nd time in this run");
-  EXPECT_EQ(lines[2], "observer: ended by signal 5, the 3rd time in this run");
-  EXPECT_EQ(lines[3], "observer: ended by signal 4, the 4th time in this run");
-  EXPECT_EQ(lines[10], "observer: ended by signal 5, the 11th time in this run");
-  EXPECT_EQ(lines[12], "observer: ended by signal 5, the 13th time in this run");
-  EXPECT_EQ(lines[20], "observer: ended by signal 5, the 21st time in this run");
-  EXPECT_EQ(lines[22], "observer: ended by signal 5, the 23rd time in this run");
-  EXPECT_EQ(lines[23], "light camera: ended by signal 5");
+  const std::string lines = out.str();
+  EXPECT_EQ(std::ranges::count(lines, '\n'), 24);
+  EXPECT_THAT(lines, StartsWith("observer: ended by signal 5\n"));
+  for (const char* time : {"4, the 2nd", "5, the 3rd", "4, the 4th", "5, the 11th", "5, the 13th",
+                           "5, the 21st", "5, the 23rd"})
+    EXPECT_THAT(lines, HasSubstr("\nobserver: ended by signal " + std::string(time) +
+                                 " time in this run\n"));
+  EXPECT_THAT(lines, testing::EndsWith("\nlight camera: ended by signal 5\n"));
 }
 
 TEST(Reports, AStateIsLoggedFirstAndThenAtTheTenthHundredthAndThousandthTime) {

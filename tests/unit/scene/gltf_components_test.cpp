@@ -15,8 +15,7 @@ class GltfComponents : public GltfTest {
     gltf = {};
     gltf.root("a", gltf.triangle_mesh());
     const int view = gltf.view(GltfWriter::bytes_of(values), 4 * sizeof(T));
-    gltf.json["meshes"][0]["primitives"][0]["attributes"][attribute] =
-        gltf.accessor(view, type, shape, 3, normalized);
+    first_primitive()["attributes"][attribute] = gltf.accessor(view, type, shape, 3, normalized);
   }
 };
 
@@ -52,45 +51,35 @@ TEST_F(GltfComponents, OfTextureCoordinates) {
 
 TEST_F(GltfComponents, OfAnimationsAreFloatsOrNormalized) {
   gltf.root("a", gltf.triangle_mesh());
-  const int times = gltf.values<float>(5126, "SCALAR", {0, 1});
   const std::vector<std::int16_t> turns = {0, 0, 0, 32767, 0, 0, 32767, 0};
-  const auto play = [&](int type, bool normalized, const char* path) {
-    const int output =
-        gltf.accessor(gltf.view(GltfWriter::bytes_of(turns)), type, "VEC4", 2, normalized);
-    gltf.json["animations"] = {
-        {{"name", "turn"},
-         {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", path}}}}}},
-         {"samplers", {{{"input", times}, {"output", output}}}}}};
+  const auto error_of = [&](bool normalized) {
+    const int view = gltf.view(GltfWriter::bytes_of(turns));
+    animate(0, "rotation", {0, 1}, gltf.accessor(view, short_, "VEC4", 2, normalized));
+    return error();
   };
-  object.animation = "turn";
-  play(short_, true, "rotation");
-  EXPECT_EQ(error(), "");
-  play(short_, false, "rotation");
-  EXPECT_THAT(error(), HasSubstr("output: its numbers are shorts; they must be floats or "
-                                 "normalized integers of 1 or 2 bytes"));
+  EXPECT_EQ(error_of(true), "");
+  EXPECT_THAT(error_of(false), HasSubstr("output: its numbers are shorts; they must be floats or "
+                                         "normalized integers of 1 or 2 bytes"));
 }
 
-class VertexColors : public ::testing::Test {
- protected:
-  // The colours that an accessor of these bytes stands for.
-  std::vector<glm::vec4> read(const std::vector<unsigned char>& bytes, int component_type, int type,
-                              bool normalized) {
-    tinygltf::Model model;
-    model.buffers.emplace_back().data = bytes;
-    tinygltf::BufferView& view = model.bufferViews.emplace_back();
-    view.buffer = 0;
-    view.byteLength = bytes.size();
-    tinygltf::Accessor& accessor = model.accessors.emplace_back();
-    accessor.bufferView = 0;
-    accessor.componentType = component_type;
-    accessor.type = type;
-    accessor.normalized = normalized;
-    accessor.count = 1;
-    return scene::read_colors(model, 0, "colours");
-  }
-};
+// The colours that an accessor of these bytes stands for.
+std::vector<glm::vec4> read(const std::vector<unsigned char>& bytes, int component_type, int type,
+                            bool normalized) {
+  tinygltf::Model model;
+  model.buffers.emplace_back().data = bytes;
+  tinygltf::BufferView& view = model.bufferViews.emplace_back();
+  view.buffer = 0;
+  view.byteLength = bytes.size();
+  tinygltf::Accessor& accessor = model.accessors.emplace_back();
+  accessor.bufferView = 0;
+  accessor.componentType = component_type;
+  accessor.type = type;
+  accessor.normalized = normalized;
+  accessor.count = 1;
+  return scene::read_colors(model, 0, "colours");
+}
 
-TEST_F(VertexColors, AreReadOfEveryTypeThatGltfHasForThem) {
+TEST(VertexColors, AreReadOfEveryTypeThatGltfHasForThem) {
   const auto floats = GltfWriter::bytes_of(std::vector<float>{0.25f, 2, 0.5f});
   EXPECT_THAT(read(floats, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3, false),
               ElementsAre(glm::vec4(0.25f, 2, 0.5f, 1)));

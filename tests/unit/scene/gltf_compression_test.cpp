@@ -7,7 +7,6 @@
 namespace previz::test::gltf_compression_test {
 
 using ::testing::SizeIs;
-using Json = GltfWriter::Json;
 
 using Corners = std::array<std::uint32_t, 3>;
 
@@ -34,15 +33,6 @@ std::vector<Corners> triangles_of(const Grid& grid) {
 class GltfCompression : public GltfTest {
  protected:
   scene::Mesh mesh(const char* name = "test.gltf") { return load(name).meshes.at(0); }
-  Json& meshopt(int view) {
-    return gltf.json["bufferViews"][view]["extensions"]["EXT_meshopt_compression"];
-  }
-  // The message for a change of the meshopt extension of view 0, the positions'.
-  std::string message_of(const char* key, const Json& value) {
-    gltf = meshopt_grid();
-    meshopt(0)[key] = value;
-    return error();
-  }
 };
 
 TEST_F(GltfCompression, OfMeshoptIsWithoutLoss) {
@@ -67,8 +57,7 @@ TEST_F(GltfCompression, OfIndicesInAnyOrder) {
   bytes.resize(meshopt_encodeIndexSequence(bytes.data(), bytes.size(), given.indices.data(),
                                            given.indices.size()));
   const int view = meshopt_view(gltf, bytes, "INDICES", given.indices.size(), 2);
-  gltf.json["meshes"][0]["primitives"][0]["indices"] =
-      gltf.accessor(view, 5123, "SCALAR", given.indices.size());
+  first_primitive()["indices"] = gltf.accessor(view, 5123, "SCALAR", given.indices.size());
   EXPECT_EQ(triangles_of(mesh()), triangles_of(given));
 }
 
@@ -85,8 +74,7 @@ TEST_F(GltfCompression, OfFilteredNormals) {
   meshopt_encodeFilterOct(filtered.data(), count, 4, 8, &normals[0].x);
   const int view = meshopt_view(gltf, meshopt_vertices(filtered.data(), count, 4), "ATTRIBUTES",
                                 count, 4, "OCTAHEDRAL");
-  gltf.json["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] =
-      gltf.accessor(view, 5120, "VEC3", count, true);
+  first_primitive()["attributes"]["NORMAL"] = gltf.accessor(view, 5120, "VEC3", count, true);
   const scene::Mesh decoded = mesh();
   for (std::size_t i = 0; i < count; ++i)
     EXPECT_LT(glm::distance(decoded.normals[i], given.normals[i]), 0.0235f) << i;
@@ -102,8 +90,7 @@ TEST_F(GltfCompression, OfFilteredPositions) {
   meshopt_encodeFilterExp(filtered.data(), count, 12, 15, &given.positions[0].x);
   const int view = meshopt_view(gltf, meshopt_vertices(filtered.data(), count, 12), "ATTRIBUTES",
                                 count, 12, "EXPONENTIAL");
-  gltf.json["meshes"][0]["primitives"][0]["attributes"]["POSITION"] =
-      gltf.accessor(view, 5126, "VEC3", count);
+  first_primitive()["attributes"]["POSITION"] = gltf.accessor(view, 5126, "VEC3", count);
   const scene::Mesh decoded = mesh();
   for (std::size_t i = 0; i < count; ++i)
     for (int k = 0; k < 3; ++k)
@@ -164,28 +151,31 @@ TEST_F(GltfCompression, OfDracoIsWithinItsSteps) {
 TEST_F(GltfCompression, DoesNotMatterWhereThereIsUncompressedDataToo) {
   gltf = plain_grid();
   const scene::Mesh plain = mesh();
-  gltf.json["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"] = {
+  first_primitive()["extensions"]["KHR_draco_mesh_compression"] = {
       {"bufferView", 0}, {"attributes", {{"POSITION", 0}}}};
   gltf.json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"] = {{"buffer", 0}};
   gltf.json["extensionsUsed"] = {"EXT_meshopt_compression", "KHR_draco_mesh_compression"};
-  gltf.json["meshes"][0]["primitives"][0].erase("indices");
-  gltf.json["meshes"][0]["primitives"][0]["indices"] = 3;
+  first_primitive().erase("indices");
+  first_primitive()["indices"] = 3;
   EXPECT_EQ(mesh().positions, plain.positions);
 }
 
 TEST_F(GltfCompression, OfMeshoptIsRefusedWhereItMakesNoSense) {
-  const char* view = "test.gltf: buffer view 0, EXT_meshopt_compression";
-  EXPECT_THAT(message_of("mode", "POINTS"), HasSubstr("its mode \"POINTS\" is not ATTRIBUTES"));
-  EXPECT_THAT(message_of("filter", "COLOR"),
-              AllOf(HasSubstr(view), HasSubstr("its filter \"COLOR\" is not supported")));
-  EXPECT_THAT(message_of("byteStride", 0), HasSubstr("a stride of 0 bytes and a count of 81"));
-  EXPECT_THAT(message_of("byteStride", 10), HasSubstr("are not possible in mode ATTRIBUTES"));
-  EXPECT_THAT(message_of("count", 1ull << 53), HasSubstr("bytes cannot hold its 9"));
-  EXPECT_THAT(message_of("buffer", 7), HasSubstr("no such buffer"));
-  EXPECT_THAT(message_of("byteLength", 1 << 20), HasSubstr("reaches outside its buffer"));
-  EXPECT_THAT(message_of("byteLength", 60), HasSubstr("cannot be decoded; the file is damaged"));
-  EXPECT_THAT(message_of("byteOffset", 4), HasSubstr("does not begin as compressed ATTRIBUTES do"));
   gltf = meshopt_grid();
+  const std::string view = "test.gltf: buffer view 0, EXT_meshopt_compression";
+  const std::string meshopt = "/bufferViews/0/extensions/EXT_meshopt_compression/";
+  EXPECT_THAT(error_with(meshopt + "filter", "COLOR"), HasSubstr(view));
+  expect_refused({
+      {meshopt + "mode", "POINTS", "its mode \"POINTS\" is not ATTRIBUTES"},
+      {meshopt + "filter", "COLOR", "its filter \"COLOR\" is not supported"},
+      {meshopt + "byteStride", 0, "a stride of 0 bytes and a count of 81"},
+      {meshopt + "byteStride", 10, "are not possible in mode ATTRIBUTES"},
+      {meshopt + "count", 1ull << 53, "bytes cannot hold its 9"},
+      {meshopt + "buffer", 7, "no such buffer"},
+      {meshopt + "byteLength", 1 << 20, "reaches outside its buffer"},
+      {meshopt + "byteLength", 60, "cannot be decoded; the file is damaged"},
+      {meshopt + "byteOffset", 4, "does not begin as compressed ATTRIBUTES do"},
+  });
   gltf.json["bufferViews"][0].erase("extensions");
   EXPECT_THAT(error(), HasSubstr("buffer view 0: its buffer 1 has no data; it stands in for"));
 }
@@ -211,32 +201,25 @@ TEST_F(GltfCompression, DecodesNothingTwice) {
 }
 
 TEST_F(GltfCompression, OfDracoIsRefusedWhereItDoesNotFitTheFile) {
-  const char* primitive = "test.gltf: mesh 0, primitive 0, KHR_draco_mesh_compression";
-  const auto message_of = [&](const char* pointer, const Json& value) {
-    gltf = draco_grid();
-    gltf.json[Json::json_pointer(pointer)] = value;
-    return error();
-  };
-  const std::string extension = "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression/";
-  EXPECT_THAT(message_of("/accessors/3/count", 9),
-              AllOf(HasSubstr(primitive),
-                    HasSubstr("has 128 compressed triangles where its indices are 9")));
-  EXPECT_THAT(message_of("/accessors/0/count", 80),
-              HasSubstr("has 81 compressed vertices where its accessor has 80"));
-  EXPECT_THAT(message_of("/accessors/0/type", "VEC2"), HasSubstr("has 3 compressed components"));
-  EXPECT_THAT(message_of((extension + "attributes/POSITION").c_str(), 9),
-              HasSubstr("POSITION: its Draco data has no such attribute"));
-  EXPECT_THAT(message_of((extension + "attributes").c_str(), nullptr),
-              HasSubstr("lists no attributes"));
-  EXPECT_THAT(message_of((extension + "bufferView").c_str(), 5), HasSubstr("no buffer view 5"));
-  EXPECT_THAT(message_of("/meshes/0/primitives/0/mode", 5), HasSubstr("only lists of triangles"));
-  EXPECT_THAT(message_of("/bufferViews/0/byteOffset", 1), HasSubstr("reaches outside its buffer"));
-  EXPECT_THAT(message_of("/bufferViews/0/byteLength", 100),
-              AllOf(HasSubstr(primitive), HasSubstr("cannot be decoded: ")));
   gltf = draco_grid();
-  gltf.json["bufferViews"][0] = {
+  const std::string primitive = "test.gltf: mesh 0, primitive 0, KHR_draco_mesh_compression";
+  EXPECT_THAT(error_with("/accessors/3/count", 9), HasSubstr(primitive));
+  EXPECT_THAT(error_with("/bufferViews/0/byteLength", 100), HasSubstr(primitive));
+  const std::string draco = "/meshes/0/primitives/0/extensions/KHR_draco_mesh_compression/";
+  const Json no_draco = {
       {"buffer", 0}, {"byteLength", 48}, {"byteOffset", gltf.json["bufferViews"].size()}};
-  EXPECT_THAT(error(), HasSubstr("is not Draco data"));
+  expect_refused({
+      {"/accessors/3/count", 9, "has 128 compressed triangles where its indices are 9"},
+      {"/accessors/0/count", 80, "has 81 compressed vertices where its accessor has 80"},
+      {"/accessors/0/type", "VEC2", "has 3 compressed components"},
+      {draco + "attributes/POSITION", 9, "POSITION: its Draco data has no such attribute"},
+      {draco + "attributes", nullptr, "lists no attributes"},
+      {draco + "bufferView", 5, "no buffer view 5"},
+      {"/meshes/0/primitives/0/mode", 5, "only lists of triangles"},
+      {"/bufferViews/0/byteOffset", 1, "reaches outside its buffer"},
+      {"/bufferViews/0/byteLength", 100, "cannot be decoded: "},
+      {"/bufferViews/0", no_draco, "is not Draco data"},
+  });
 }
 
 // The head of the data says 2^30 triangles.
@@ -247,10 +230,9 @@ TEST_F(GltfCompression, OfDracoCannotAskForMuch) {
     bytes.insert(bytes.end(), {0x80, 0x80, 0x80, 0x80, 0x04});
   bytes.resize(100);
   const int view = gltf.view(bytes);
-  gltf.root("a", gltf.mesh({{"attributes", {{"POSITION", gltf.accessor(-1, 5126, "VEC3", 3)}}},
-                            {"extensions",
-                             {{"KHR_draco_mesh_compression",
-                               {{"bufferView", view}, {"attributes", {{"POSITION", 0}}}}}}}}));
+  const Json compressed = {{"bufferView", view}, {"attributes", {{"POSITION", 0}}}};
+  add_mesh({{"POSITION", gltf.accessor(-1, 5126, "VEC3", 3)}},
+           {{"extensions", {{"KHR_draco_mesh_compression", compressed}}}});
   EXPECT_THAT(error(), HasSubstr("100 bytes cannot hold 1073741824 triangles"));
 }
 

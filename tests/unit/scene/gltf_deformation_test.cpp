@@ -9,7 +9,6 @@
 
 namespace previz::test::gltf_deformation_test {
 
-using Json = GltfWriter::Json;
 using namespace scene;
 
 constexpr int floats = 5126, bytes = 5121;
@@ -19,39 +18,30 @@ const std::vector<glm::vec3> corners = {{0, 0, 0}, {1, 0, 0}, {0, 2, 0}};
 
 class GltfDeformations : public GltfTest {
  protected:
-  int vec4s(const std::vector<glm::vec4>& values) {
-    return gltf.accessor(gltf.view(GltfWriter::bytes_of(values)), floats, "VEC4", values.size());
-  }
-  int matrices(const std::vector<glm::mat4>& values) {
-    return gltf.accessor(gltf.view(GltfWriter::bytes_of(values)), floats, "MAT4", values.size());
-  }
+  int vec4s(const std::vector<glm::vec4>& values) { return gltf.values(floats, "VEC4", values); }
 
   // Node 0 has the mesh and stands at x = 7, where a skin must not care; node 1 is the foot's joint
   // and node 2, 2 m above it, the tip's.
-  void skinned(const Json& more_attributes = Json::object()) {
+  void skinned() {
     const std::vector<unsigned char> joints = {0, 9, 9, 9, 0, 9, 9, 9, 0, 1, 9, 9};
-    Json attributes = {{"POSITION", gltf.positions(corners)},
-                       {"NORMAL", gltf.normals({{0, 0, 1}, {0, 0, 1}, {0, 0, 1}})},
-                       {"JOINTS_0", gltf.accessor(gltf.view(joints), bytes, "VEC4", 3)},
-                       {"WEIGHTS_0", vec4s({{1, 0, 0, 0}, {2, 0, 0, 0}, {0.25f, 0.75f, 0, 0}})}};
-    attributes.merge_patch(more_attributes);
-    const int inverse = matrices({glm::mat4(1), glm::translate(glm::mat4(1), glm::vec3(0, -2, 0))});
-    gltf.root("figure", gltf.mesh({{"attributes", attributes}}), {{"translation", {7, 0, 0}}});
-    gltf.json["nodes"][0]["skin"] = 0;
+    const Json given = {{"POSITION", gltf.positions(corners)},
+                        {"NORMAL", gltf.normals({{0, 0, 1}, {0, 0, 1}, {0, 0, 1}})},
+                        {"JOINTS_0", gltf.accessor(gltf.view(joints), bytes, "VEC4", 3)},
+                        {"WEIGHTS_0", vec4s({{1, 0, 0, 0}, {2, 0, 0, 0}, {0.25f, 0.75f, 0, 0}})}};
+    const int inverse = gltf.values<glm::mat4>(
+        floats, "MAT4", {glm::mat4(1), glm::translate(glm::mat4(1), glm::vec3(0, -2, 0))});
+    gltf.root("figure", gltf.mesh({{"attributes", given}}),
+              {{"translation", {7, 0, 0}}, {"skin", 0}});
     gltf.root("foot", -1, {{"children", {2}}});
     gltf.add("nodes", {{"name", "tip"}, {"translation", {0, 2, 0}}});
     gltf.json["skins"] = {{{"joints", {1, 2}}, {"inverseBindMatrices", inverse}}};
   }
 
-  // "bow" moves the tip by 4 m along glTF's X within 2 s.
+  Json& attributes() { return first_primitive()["attributes"]; }
+
+  // Moves the tip by 4 m along glTF's X within 2 s.
   void bow() {
-    const int times = gltf.values<float>(floats, "SCALAR", {0, 2});
-    const int places = gltf.positions({{0, 2, 0}, {4, 2, 0}});
-    gltf.json["animations"] = {
-        {{"name", "bow"},
-         {"channels", {{{"sampler", 0}, {"target", {{"node", 2}, {"path", "translation"}}}}}},
-         {"samplers", {{{"input", times}, {"output", places}}}}}};
-    object.animation = "bow";
+    animate(2, "translation", {0, 2}, gltf.positions({{0, 2, 0}, {4, 2, 0}}));
     object.loops = false;
   }
 
@@ -63,21 +53,15 @@ class GltfDeformations : public GltfTest {
                                  {"targets", {{{"POSITION", lift}}, {{"POSITION", shift}}}}}));
   }
   void smile() {
-    const int times = gltf.values<float>(floats, "SCALAR", {0, 1});
-    const int weights = gltf.values<float>(floats, "SCALAR", {0, 0, 1, 0.5f});
-    gltf.json["animations"] = {
-        {{"name", "smile"},
-         {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "weights"}}}}}},
-         {"samplers", {{{"input", times}, {"output", weights}}}}}};
-    object.animation = "smile";
+    animate(0, "weights", {0, 1}, gltf.values<float>(floats, "SCALAR", {0, 0, 1, 0.5f}));
     object.loops = false;
   }
 
   // The only deforming mesh's vertices in the set's world at a time of the animation.
-  static std::vector<glm::dvec3> played(const Scene& scene, const set::Set& set, double time_s) {
-    session::SceneState state;
-    state.animation_s = time_s;
-    const Placement placement = place(scene, set, state);
+  std::vector<glm::dvec3> played(const Scene& scene, double time_s) {
+    set::Set set;
+    set.objects = {object};
+    const Placement placement = place(scene, set, state_at(time_s));
     const Mesh& mesh = scene.meshes.at(scene.deformations.at(0).mesh);
     std::vector<glm::dvec3> result;
     for (const glm::vec3& p : deformed(mesh.undeformed, placement.shapes.at(0)).positions)
@@ -95,15 +79,12 @@ TEST_F(GltfDeformations, ASkinIgnoresItsNodeAndFollowsItsJoints) {
   const Scene scene = load();
   EXPECT_THAT(scene.notes, IsEmpty());
   ASSERT_EQ(scene.deformations.size(), 1u);
-  ASSERT_EQ(scene.animations.size(), 1u);
-  EXPECT_THAT(scene.animations[0].instances, IsEmpty());
+  EXPECT_THAT(scene.animations.at(0).instances, IsEmpty());
   EXPECT_EQ(scene.meshes[0].positions, corners);  // at rest, in the file's space
-  set::Set set;
-  set.objects = {object};
-  std::vector<glm::dvec3> at = played(scene, set, 0);
+  std::vector<glm::dvec3> at = played(scene, 0);
   EXPECT_EQ(at[1], glm::dvec3(1, 3, 0));  // weights are made a sum of 1
   EXPECT_EQ(at[2], glm::dvec3(0, 3, 2));
-  at = played(scene, set, 1);  // three quarters of 2 m
+  at = played(scene, 1);  // three quarters of 2 m
   EXPECT_NEAR(glm::distance(at[2], glm::dvec3(1.5, 3, 2)), 0, 1e-6);
   EXPECT_EQ(at[0], glm::dvec3(0, 3, 0));
 }
@@ -126,10 +107,8 @@ TEST_F(GltfDeformations, MorphTargetsAreAddedByTheirWeights) {
   ASSERT_EQ(scene.deformations.size(), 1u);
   EXPECT_EQ(scene.meshes[0].positions[2], glm::vec3(0, 2.5f, 0));
   EXPECT_TRUE(scene.meshes[0].undeformed.flat);
-  set::Set set;
-  set.objects = {object};
-  EXPECT_NEAR(glm::distance(played(scene, set, 0.5)[2], glm::dvec3(0.25, 0, 2.5)), 0, 1e-6);
-  EXPECT_NEAR(glm::distance(played(scene, set, 9)[0], glm::dvec3(0.5, 0, 0)), 0, 1e-6);
+  EXPECT_NEAR(glm::distance(played(scene, 0.5)[2], glm::dvec3(0.25, 0, 2.5)), 0, 1e-6);
+  EXPECT_NEAR(glm::distance(played(scene, 9)[0], glm::dvec3(0.5, 0, 0)), 0, 1e-6);
 }
 
 // A target of no weight that nothing animates costs nothing; the node's weights stand before the
@@ -176,8 +155,7 @@ TEST_F(GltfDeformations, AShapeThatCannotBeShownIsNotSeen) {
   gltf.json["skins"][0]["joints"].push_back(1);
   gltf.json["skins"][0].erase("inverseBindMatrices");
   const Scene sound = load();
-  session::SceneState state;
-  state.animation_s = 1;
+  const session::SceneState state = state_at(1);
   EXPECT_EQ(place(sound, {}, state).instances[0].presence, sound.instances[0].presence);
   EXPECT_THAT(place(sound, {}, state).unknown, IsEmpty());
   for (const double far : {HUGE_VAL, 1e300, 1e18}) {
@@ -197,8 +175,7 @@ TEST_F(GltfDeformations, AShapeThatReachesTooFarIsNotSeen) {
   bow();
   Scene scene = load();
   scene.deformations[0].joints[1].joint_from_mesh[1].y = 9e14;
-  session::SceneState state;
-  state.animation_s = 1;
+  const session::SceneState state = state_at(1);
   const Placement placement = place(scene, {}, state);
   EXPECT_EQ(placement.instances[0].presence, 0u);
   EXPECT_THAT(placement.unknown, Contains(HasSubstr("\"figure\" cannot be shown")));
@@ -212,39 +189,34 @@ TEST_F(GltfDeformations, ABoundPastAllNumbersIsRefusedAtRest) {
   gltf.json["nodes"][1]["translation"] = {1e20, 0, 0};
   gltf.json["nodes"][2]["translation"] = {-1e20, 2, 0};
   const std::vector<unsigned char> both = {0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0};
-  Json& attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"];
-  attributes["JOINTS_0"] = gltf.accessor(gltf.view(both), bytes, "VEC4", 3);
-  attributes["WEIGHTS_0"] = vec4s({{1e-12f, 1, 0, 0}, {1e-12f, 1, 0, 0}, {1e-12f, 1, 0, 0}});
+  attributes()["JOINTS_0"] = gltf.accessor(gltf.view(both), bytes, "VEC4", 3);
+  attributes()["WEIGHTS_0"] = vec4s({{1e-12f, 1, 0, 0}, {1e-12f, 1, 0, 0}, {1e-12f, 1, 0, 0}});
   EXPECT_THAT(error(), HasSubstr("beyond 1e15 at rest"));
 }
 
 // A few bytes can ask for as many vertices as an accessor without data may have, times as many
 // targets or sets of joints as one likes.
 TEST_F(GltfDeformations, TargetsAndSetsAreCountedBeforeTheyAreRead) {
+  const char* words = "more than 67108864 vertices of morph targets and sets of joints";
   const std::size_t vertices = 1u << 22;
-  const int zeros =
-      gltf.add("accessors", {{"componentType", floats}, {"type", "VEC3"}, {"count", vertices}});
-  const int zeros4 =
-      gltf.add("accessors", {{"componentType", floats}, {"type", "VEC4"}, {"count", vertices}});
+  const int zeros = gltf.accessor(-1, floats, "VEC3", vertices);
+  const int zeros4 = gltf.accessor(-1, floats, "VEC4", vertices);
   Json primitive = {{"attributes", {{"POSITION", zeros}, {"NORMAL", zeros}}},
                     {"indices", gltf.indices({0, 1, 2})}};
   for (int target = 0; target < 17; ++target) primitive["targets"].push_back({{"POSITION", 99}});
   gltf.root("face", gltf.mesh(primitive));
   gltf.json["meshes"][0]["weights"] = std::vector<double>(17, 1);
-  EXPECT_THAT(error(),
-              HasSubstr("more than 67108864 vertices of morph targets and sets of joints"));
+  EXPECT_THAT(error(), HasSubstr(words));
 
   gltf.json["meshes"][0].erase("weights");
-  gltf.json["meshes"][0]["primitives"][0].erase("targets");
+  first_primitive().erase("targets");
   for (int set = 0; set < 17; ++set) {
-    Json& attributes = gltf.json["meshes"][0]["primitives"][0]["attributes"];
-    attributes["JOINTS_" + std::to_string(set)] = zeros4;
-    attributes["WEIGHTS_" + std::to_string(set)] = 99;
+    attributes()["JOINTS_" + std::to_string(set)] = zeros4;
+    attributes()["WEIGHTS_" + std::to_string(set)] = 99;
   }
   gltf.json["skins"] = {{{"joints", {0}}}};
   gltf.json["nodes"][0]["skin"] = 0;
-  EXPECT_THAT(error(),
-              HasSubstr("more than 67108864 vertices of morph targets and sets of joints"));
+  EXPECT_THAT(error(), HasSubstr(words));
 }
 
 TEST_F(GltfDeformations, JointsAreCountedForEveryNodeThatHasThem) {
@@ -268,34 +240,25 @@ TEST_F(GltfDeformations, OfASkinsCopiesOneIsKept) {
 
 TEST_F(GltfDeformations, AreRefusedWhereTheyMakeNoSense) {
   skinned();
-  const Json sound = gltf.json;
-  const auto refusal = [&](const char* pointer, const Json& value) {
-    gltf.json = sound;
-    gltf.json[Json::json_pointer(pointer)] = value;
-    return error();
-  };
-  EXPECT_THAT(refusal("/nodes/0/skin", 4), HasSubstr("no skin 4"));
-  EXPECT_THAT(refusal("/skins/0/joints", {1}), HasSubstr("follows joint 1, but there are 1"));
-  EXPECT_THAT(refusal("/skins/0/joints", {1, 9}), HasSubstr("no node 9"));
-  EXPECT_THAT(refusal("/skins/0/joints", {1, 2, 1}), HasSubstr("fewer inverse bind matrices"));
-  EXPECT_THAT(refusal("/skins/0/inverseBindMatrices", 0), HasSubstr("4 by 4 floats"));
-  gltf.json = sound;
-  gltf.json["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = vec4s({{1, 0, 0, 0}});
-  EXPECT_THAT(error(), HasSubstr("different numbers of elements"));
-  gltf.json = sound;
-  gltf.json["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] =
-      vec4s({{1, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}});
+  const int one_weight = vec4s({{1, 0, 0, 0}});
+  const int weights = vec4s({{1, 0, 0, 0}, {0, 0, 0, 0}, {1, 0, 0, 0}});
+  const std::string of_skin = "/skins/0/", primitive = "/meshes/0/primitives/0/";
+  expect_refused({{"/nodes/0/skin", 4, "no skin 4"},
+                  {of_skin + "joints", {1}, "follows joint 1, but there are 1"},
+                  {of_skin + "joints", {1, 9}, "no node 9"},
+                  {of_skin + "joints", {1, 2, 1}, "fewer inverse bind matrices"},
+                  {of_skin + "inverseBindMatrices", 0, "4 by 4 floats"},
+                  {primitive + "attributes/WEIGHTS_0", one_weight, "numbers of elements"}});
+  attributes()["WEIGHTS_0"] = weights;
   EXPECT_THAT(load().notes, Contains(HasSubstr("1 vertices follow no joint")));
 
   gltf = {};
   morphed();
   smile();
-  const Json face = gltf.json;
-  gltf.json["meshes"][0]["weights"] = {1};
-  EXPECT_THAT(error(), HasSubstr("1 weights for 2 morph targets"));
-  gltf.json = face;
-  gltf.json["meshes"][0]["primitives"][0]["targets"].erase(1);
-  EXPECT_THAT(error(), HasSubstr("4 numbers for 2 times and 1 morph targets"));
+  const Json first_target = first_primitive()["targets"][0];
+  expect_refused({{"/meshes/0/weights", {1}, "1 weights for 2 morph targets"},
+                  {primitive + "targets", Json::array({first_target}),
+                   "4 numbers for 2 times and 1 morph targets"}});
 }
 
 // The primitive of a hit has 24 bits.

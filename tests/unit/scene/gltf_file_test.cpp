@@ -1,28 +1,23 @@
-#include "daemon/scene/load.hpp"
 #include "tests/support/gltf_test.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz::test::gltf_file_test {
 
-using Json = GltfWriter::Json;
-
 class GltfFiles : public GltfTest {
  protected:
-  std::string error_of(const std::string& bytes) {
-    std::ofstream(directory / "raw", std::ios::binary) << bytes;
+  static std::string error_of_file(const std::filesystem::path& file) {
     set::Set set;
     set.objects.resize(1);
-    set.objects[0].file = directory / "raw";
-    try {
-      scene::load_scene(set);
-    } catch (const Error& thrown) {
-      return thrown.what();
-    }
-    return "";
+    set.objects[0].file = file;
+    return test::error_of([&] { scene::load_scene(set); });
+  }
+  std::string error_of(const std::string& bytes) {
+    session::write_content(directory / "raw", bytes);
+    return error_of_file(directory / "raw");
   }
   std::string saved(const char* name) {
     gltf.save(directory / name);
-    std::ifstream stream(directory / name, std::ios::binary);
-    return {std::istreambuf_iterator<char>(stream), {}};
+    return session::content_of(directory / name);
   }
 };
 
@@ -99,12 +94,7 @@ TEST_F(GltfFiles, RefusesNumbersThatAreNotWholeByTheirPlace) {
   gltf.add("materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}},
                          {"extras", {{"someTexture", {{"index", -1}}}}}});
   ASSERT_EQ(error(), "");
-  struct Wrong {
-    const char* at;
-    Json value;
-    const char* message;
-  };
-  const Wrong wrongs[] = {
+  expect_refused({
       {"/accessors/0/byteOffset", -4, "accessors[0].byteOffset is -4; it must be a whole number"},
       {"/accessors/0/byteOffset", 1e300, "accessors[0].byteOffset is 1e+300;"},
       {"/accessors/0/count", 2.5, "accessors[0].count is 2.5;"},
@@ -117,13 +107,8 @@ TEST_F(GltfFiles, RefusesNumbersThatAreNotWholeByTheirPlace) {
       {"/nodes/0/mesh", 0.5, "nodes[0].mesh is 0.5;"},
       {"/scenes/0/nodes/0", nullptr, "scenes[0].nodes[0] is null;"},
       {"/materials/0/pbrMetallicRoughness/baseColorTexture/index", -1,
-       "materials[0].pbrMetallicRoughness.baseColorTexture.index is -1;"}};
-  const Json sound = gltf.json;
-  for (const Wrong& wrong : wrongs) {
-    gltf.json[Json::json_pointer(wrong.at)] = wrong.value;
-    EXPECT_THAT(error(), HasSubstr(wrong.message));
-    gltf.json = sound;
-  }
+       "materials[0].pbrMetallicRoughness.baseColorTexture.index is -1;"},
+  });
 }
 
 // tinygltf 2.7 takes 3.0 for a missing number.
@@ -136,49 +121,33 @@ TEST_F(GltfFiles, TakeWholeNumbersWithAPoint) {
 
 TEST_F(GltfFiles, NotesWhatIsNotShown) {
   gltf.root("a", gltf.triangle_mesh());
-  gltf.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = 0;
+  first_primitive()["attributes"]["COLOR_0"] = 0;
   gltf.json["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 1}}}}};
-  gltf.json["animations"] = {
-      {{"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
-       {"samplers", {{{"input", 0}, {"output", 0}}}}}};
+  gltf.json["animations"] = Json::array({gltf.animation(0, "translation", {0}, 0)});
   EXPECT_THAT(load().notes, ElementsAre(HasSubstr("has 1 cameras; ignored"),
                                         HasSubstr("none of its 1 animations")));
 }
 
 TEST_F(GltfFiles, ReadsBuffersBeside) {
   gltf.root("a", gltf.triangle_mesh());
-  std::string text = saved("test.gltf");
-  Json json = Json::parse(text);
+  Json json = Json::parse(saved("test.gltf"));
   const std::vector<glm::vec3> positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   const auto bytes = GltfWriter::bytes_of(positions);
-  std::ofstream(directory / "data.bin", std::ios::binary)
-      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<long>(bytes.size()));
-  json["buffers"][0]["uri"] = "data.bin";
-  EXPECT_EQ(error_of(json.dump()), "");
-  json["buffers"][0]["uri"] = "lost.bin";
-  EXPECT_THAT(error_of(json.dump()), HasSubstr("lost.bin"));
-  json["buffers"][0]["uri"] = "/dev/zero";
-  EXPECT_THAT(error_of(json.dump()), HasSubstr("is not a valid glTF file"));
+  session::write_content(directory / "data.bin", {bytes.begin(), bytes.end()});
+  const auto error_from = [&](const char* uri) {
+    json["buffers"][0]["uri"] = uri;
+    return error_of(json.dump());
+  };
+  EXPECT_EQ(error_from("data.bin"), "");
+  EXPECT_THAT(error_from("lost.bin"), HasSubstr("lost.bin"));
+  EXPECT_THAT(error_from("/dev/zero"), HasSubstr("is not a valid glTF file"));
 }
 
 TEST_F(GltfFiles, NamesFilesThatAreNoGltf) {
   const std::string file = (directory / "raw").string();
-  object.file = directory / "missing.glb";
-  set::Set set;
-  set.objects = {object};
-  EXPECT_THROW(
-      try { scene::load_scene(set); } catch (const Error& thrown) {
-        EXPECT_THAT(thrown.what(), HasSubstr("missing.glb: cannot be opened: file not found"));
-        throw;
-      },
-      Error);
-  set.objects[0].file = directory.path();
-  EXPECT_THROW(
-      try { scene::load_scene(set); } catch (const Error& thrown) {
-        EXPECT_THAT(thrown.what(), HasSubstr("it is not a regular file"));
-        throw;
-      },
-      Error);
+  EXPECT_THAT(error_of_file(directory / "missing.glb"),
+              HasSubstr("missing.glb: cannot be opened: file not found"));
+  EXPECT_THAT(error_of_file(directory.path()), HasSubstr("it is not a regular file"));
   EXPECT_THAT(error_of(""), HasSubstr(file + ": is not a valid glTF file"));
   EXPECT_THAT(error_of("hello there"), HasSubstr(file + ": is not a valid glTF file"));
   EXPECT_THAT(error_of(R"({"asset": {"version": "1.0"}})"), HasSubstr("is glTF 1.0"));

@@ -1,9 +1,8 @@
 #include "daemon/scene/load_log.hpp"
 #include "tests/support/gltf_test.hpp"
+#include "tests/support/session_fixture.hpp"
 
 namespace previz::test::gltf_material_test {
-
-using Json = GltfWriter::Json;
 
 class GltfMaterials : public GltfTest {
  protected:
@@ -13,7 +12,22 @@ class GltfMaterials : public GltfTest {
     const Json attributes = {{"POSITION", gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}})},
                              {"TEXCOORD_0", gltf.uvs({{0, 0}, {1, 0}, {0, 1}})},
                              {"TEXCOORD_1", gltf.uvs({{0.5f, 0.5f}, {0.75f, 0}, {0, 0.75f}})}};
-    gltf.root("a", gltf.mesh({{"attributes", attributes}, {"material", index}}));
+    add_mesh(attributes, {{"material", index}});
+  }
+  // The same with an image as its base colour.
+  void use_image(Json image) {
+    const int source = gltf.add("images", std::move(image));
+    use(colored({{"index", gltf.add("textures", {{"source", source}})}}));
+  }
+  static Json colored(Json texture) {
+    return {{"pbrMetallicRoughness", {{"baseColorTexture", std::move(texture)}}}};
+  }
+  // A material of one extension, whose name it has.
+  static Json with(const char* extension, Json what) {
+    return {{"name", extension}, {"extensions", {{extension, std::move(what)}}}};
+  }
+  static Json image_of(const std::vector<unsigned char>& bytes) {
+    return {{"uri", "data:image/png;base64," + base64(bytes)}};
   }
   scene::Material loaded(Json material) {
     use(std::move(material));
@@ -44,24 +58,20 @@ TEST_F(GltfMaterials, DefaultsAreGltfs) {
 }
 
 TEST_F(GltfMaterials, ReadsEveryFactor) {
-  const scene::Material m =
-      loaded({{"name", "all"},
-              {"pbrMetallicRoughness",
-               {{"baseColorFactor", {0.1, 0.2, 0.3, 0.4}},
-                {"metallicFactor", 0.5},
-                {"roughnessFactor", 0.6}}},
-              {"emissiveFactor", {0.25, 0.5, 1}},
-              {"alphaMode", "MASK"},
-              {"alphaCutoff", 0.3},
-              {"extensions",
-               {{"KHR_materials_emissive_strength", {{"emissiveStrength", 8}}},
-                {"KHR_materials_transmission", {{"transmissionFactor", 0.9}}},
-                {"KHR_materials_ior", {{"ior", 1.33}}},
-                {"KHR_materials_specular", {{"specularFactor", 0.7}}},
-                {"KHR_materials_volume",
-                 {{"thicknessFactor", 0.01},
-                  {"attenuationColor", {0.8, 0.9, 1}},
-                  {"attenuationDistance", 0.5}}}}}});
+  const scene::Material m = loaded(R"({
+    "name": "all",
+    "pbrMetallicRoughness": {"baseColorFactor": [0.1, 0.2, 0.3, 0.4],
+                             "metallicFactor": 0.5, "roughnessFactor": 0.6},
+    "emissiveFactor": [0.25, 0.5, 1],
+    "alphaMode": "MASK",
+    "alphaCutoff": 0.3,
+    "extensions": {
+      "KHR_materials_emissive_strength": {"emissiveStrength": 8},
+      "KHR_materials_transmission": {"transmissionFactor": 0.9},
+      "KHR_materials_ior": {"ior": 1.33},
+      "KHR_materials_specular": {"specularFactor": 0.7},
+      "KHR_materials_volume": {"thicknessFactor": 0.01, "attenuationColor": [0.8, 0.9, 1],
+                               "attenuationDistance": 0.5}}})"_json);
   EXPECT_EQ(m.name, "all");
   EXPECT_EQ(m.base_color, glm::vec3(0.1f, 0.2f, 0.3f));
   EXPECT_EQ(m.alpha, 0.4f);
@@ -109,13 +119,12 @@ TEST_F(GltfMaterials, OpaqueMeansAlphaOneAndThicknessZeroMeansThin) {
 
 // White light that went this far inside has the attenuation colour: exp(-sigma d) = colour.
 TEST_F(GltfMaterials, ColourInsideOfGlassIsPerMetre) {
-  const scene::Material m = loaded({{"extensions",
-                                     {{"KHR_materials_transmission", {{"transmissionFactor", 1}}},
-                                      {"KHR_materials_volume",
-                                       {{"thicknessFactor", 0.01},
-                                        {"attenuationColor", {0.1, 1, 0}},
-                                        {"attenuationDistance", 0.5}}}}},
-                                    {"pbrMetallicRoughness", {{"metallicFactor", 0}}}});
+  const scene::Material m = loaded(R"({
+    "pbrMetallicRoughness": {"metallicFactor": 0},
+    "extensions": {
+      "KHR_materials_transmission": {"transmissionFactor": 1},
+      "KHR_materials_volume": {"thicknessFactor": 0.01, "attenuationColor": [0.1, 1, 0],
+                               "attenuationDistance": 0.5}}})"_json);
   EXPECT_TRUE(scene::attenuates(m));
   const glm::vec3 sigma = scene::attenuation_per_m(m);
   EXPECT_FLOAT_EQ(sigma.r, -std::log(0.1f) / 0.5f);
@@ -124,16 +133,14 @@ TEST_F(GltfMaterials, ColourInsideOfGlassIsPerMetre) {
 }
 
 TEST_F(GltfMaterials, ReadsLacquer) {
-  const Json lacquer = {{"clearcoatFactor", 0.5}, {"clearcoatRoughnessFactor", 0.25}};
-  const scene::Material m = loaded({{"extensions", {{"KHR_materials_clearcoat", lacquer}}}});
+  const scene::Material m = loaded(with(
+      "KHR_materials_clearcoat", {{"clearcoatFactor", 0.5}, {"clearcoatRoughnessFactor", 0.25}}));
   EXPECT_EQ(m.clearcoat, 0.5f);
   EXPECT_EQ(m.clearcoat_roughness, 0.25f);
 }
 
 TEST_F(GltfMaterials, ReadsSheen) {
-  const auto sheen_of = [](Json sheen) {
-    return Json{{"name", "velvet"}, {"extensions", {{"KHR_materials_sheen", std::move(sheen)}}}};
-  };
+  const auto sheen_of = [](Json sheen) { return with("KHR_materials_sheen", std::move(sheen)); };
   const scene::Material m =
       loaded(sheen_of({{"sheenColorFactor", {0.25, 0.5, 1}}, {"sheenRoughnessFactor", 0.375}}));
   EXPECT_EQ(m.sheen_color, glm::vec3(0.25f, 0.5f, 1));
@@ -144,14 +151,13 @@ TEST_F(GltfMaterials, ReadsSheen) {
   EXPECT_THAT(load().notes, IsEmpty());
   use(sheen_of({{"sheenColorFactor", {0, 2, 0}}}));
   EXPECT_THAT(load().notes,
-              ElementsAre(HasSubstr("\"velvet\": sheenColorFactor is out of range"),
-                          HasSubstr("\"velvet\": its sheenRoughnessFactor is raised to 0.07")));
+              ElementsAre(HasSubstr("sheen\": sheenColorFactor is out of range"),
+                          HasSubstr("sheen\": its sheenRoughnessFactor is raised to 0.07")));
 }
 
 TEST_F(GltfMaterials, ReadsAnisotropy) {
   const auto anisotropy_of = [](Json anisotropy) {
-    return Json{{"name", "pan"},
-                {"extensions", {{"KHR_materials_anisotropy", std::move(anisotropy)}}}};
+    return with("KHR_materials_anisotropy", std::move(anisotropy));
   };
   const scene::Material m =
       loaded(anisotropy_of({{"anisotropyStrength", 0.5}, {"anisotropyRotation", -1.25}}));
@@ -168,20 +174,16 @@ TEST_F(GltfMaterials, ReadsAnisotropy) {
   gltf.root("plain", gltf.triangle_mesh(pan));
   const scene::Scene scene = load();
   EXPECT_FALSE(scene::is_anisotropic(scene.materials.at(1)));
-  EXPECT_THAT(scene.notes,
-              ElementsAre(HasSubstr("\"pan\": it transmits light, so its anisotropy is ignored"),
-                          HasSubstr("has no TEXCOORD_0 for its anisotropy direction")));
+  EXPECT_THAT(
+      scene.notes,
+      ElementsAre(HasSubstr("anisotropy\": it transmits light, so its anisotropy is ignored"),
+                  HasSubstr("has no TEXCOORD_0 for its anisotropy direction")));
 }
 
 TEST_F(GltfMaterials, ReadsTheColourOfGloss) {
-  const auto gloss_of = [](Json specular) {
-    return Json{{"name", "lipstick"},
-                {"extensions", {{"KHR_materials_specular", std::move(specular)}}}};
-  };
-  EXPECT_EQ(loaded(gloss_of({{"specularColorFactor", {4, 0.5, 0}}})).specular_color,
-            glm::vec3(4, 0.5f, 0));
+  Json glass = with("KHR_materials_specular", {{"specularColorFactor", {4, 0.5, 0}}});
+  EXPECT_EQ(loaded(glass).specular_color, glm::vec3(4, 0.5f, 0));
   EXPECT_THAT(load().notes, IsEmpty());
-  Json glass = gloss_of({{"specularColorFactor", {1, 0, 0}}});
   glass["extensions"]["KHR_materials_transmission"] = {{"transmissionFactor", 1}};
   use(glass);
   EXPECT_THAT(
@@ -190,10 +192,11 @@ TEST_F(GltfMaterials, ReadsTheColourOfGloss) {
 }
 
 TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
-  use({{"name", "odd"},
-       {"pbrMetallicRoughness",
-        {{"baseColorFactor", {2, 0.5, -1, 1}}, {"metallicFactor", 7}, {"roughnessFactor", -1}}},
-       {"extensions", {{"KHR_materials_ior", {{"ior", 0}}}}}});
+  use(R"({
+    "name": "odd",
+    "pbrMetallicRoughness": {"baseColorFactor": [2, 0.5, -1, 1], "metallicFactor": 7,
+                             "roughnessFactor": -1},
+    "extensions": {"KHR_materials_ior": {"ior": 0}}})"_json);
   const scene::Scene scene = load();
   const scene::Material& m = scene.materials.at(0);
   EXPECT_EQ(m.base_color, glm::vec3(1, 0.5f, 0));
@@ -207,12 +210,12 @@ TEST_F(GltfMaterials, BringsNumbersIntoRangeWithANote) {
 }
 
 TEST_F(GltfMaterials, DecodesColoursBySrgbAndDataAsTheyAre) {
-  const int texture = gltf.texture(2, 1, two_texels);
-  use({{"pbrMetallicRoughness",
-        {{"baseColorTexture", {{"index", texture}}},
-         {"metallicRoughnessTexture", {{"index", texture}}}}},
-       {"emissiveTexture", {{"index", texture}}},
-       {"normalTexture", {{"index", texture}, {"scale", 0.5}}}});
+  ASSERT_EQ(gltf.texture(2, 1, two_texels), 0);
+  use(R"({
+    "pbrMetallicRoughness": {"baseColorTexture": {"index": 0},
+                             "metallicRoughnessTexture": {"index": 0}},
+    "emissiveTexture": {"index": 0},
+    "normalTexture": {"index": 0, "scale": 0.5}})"_json);
   const scene::Scene scene = load();
   const scene::Material& m = scene.materials.at(0);
   ASSERT_EQ(scene.textures.size(), 2u);  // one image, as colour and as data
@@ -234,8 +237,7 @@ TEST_F(GltfMaterials, DecodesColoursBySrgbAndDataAsTheyAre) {
 
 TEST_F(GltfMaterials, ReadsSamplers) {
   const auto sampled = [&](const Json& sampler) {
-    const int texture = gltf.texture(2, 1, two_texels, sampler);
-    return Json{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}};
+    return colored({{"index", gltf.texture(2, 1, two_texels, sampler)}});
   };
   use(sampled(Json::object()));
   use(sampled({{"magFilter", 9728}, {"wrapS", 33071}, {"wrapT", 33648}}));
@@ -251,19 +253,15 @@ TEST_F(GltfMaterials, ReadsSamplers) {
 
 TEST_F(GltfMaterials, MakesTextureCoordinatesOfTheSetAndTransformAsked) {
   const int texture = gltf.texture(2, 1, two_texels);
-  const auto colored = [&](Json more) {
-    more["index"] = texture;
-    return Json{{"pbrMetallicRoughness", {{"baseColorTexture", more}}}};
+  const auto use_transformed = [&](Json transform) {
+    use(colored(
+        {{"index", texture}, {"extensions", {{"KHR_texture_transform", std::move(transform)}}}}));
   };
-  const auto transformed = [](Json transform) {
-    return Json{{"extensions", {{"KHR_texture_transform", std::move(transform)}}}};
-  };
-  use(colored({{"texCoord", 1}}));
-  use(colored(transformed({{"offset", {0.5, 0.25}}, {"scale", {2, 3}}})));
+  use(colored({{"index", texture}, {"texCoord", 1}}));
+  use_transformed({{"offset", {0.5, 0.25}}, {"scale", {2, 3}}});
   // The extension's own example: the lower left quadrant, turned.
-  use(colored(transformed(
-      {{"offset", {0, 1}}, {"rotation", std::numbers::pi / 2}, {"scale", {0.5, 0.5}}})));
-  use(colored(transformed({{"texCoord", 1}})));
+  use_transformed({{"offset", {0, 1}}, {"rotation", std::numbers::pi / 2}, {"scale", {0.5, 0.5}}});
+  use_transformed({{"texCoord", 1}});
   const scene::Scene scene = load();
   ASSERT_EQ(scene.meshes.size(), 4u);
   EXPECT_THAT(scene.meshes[0].uvs,
@@ -283,18 +281,18 @@ TEST_F(GltfMaterials, MakesTextureCoordinatesOfTheSetAndTransformAsked) {
 
 // A mesh has the coordinates of every mapping once, and the textures say which they are read by.
 TEST_F(GltfMaterials, ReadsEveryTextureByItsOwnMapping) {
-  const int texture = gltf.texture(2, 1, two_texels);
-  const Json scaled = {{"KHR_texture_transform", {{"scale", {2, 3}}}}};
-  use({{"name", "three"},
-       {"pbrMetallicRoughness",
-        {{"baseColorTexture", {{"index", texture}, {"texCoord", 1}}},
-         {"metallicRoughnessTexture", {{"index", texture}}}}},
-       {"emissiveTexture", {{"index", texture}, {"extensions", scaled}}},
-       {"normalTexture", {{"index", texture}, {"texCoord", 1}}},
-       {"extensions",
-        {{"KHR_materials_clearcoat",
-          {{"clearcoatFactor", 1},
-           {"clearcoatTexture", {{"index", texture}, {"extensions", scaled}}}}}}}});
+  ASSERT_EQ(gltf.texture(2, 1, two_texels), 0);
+  use(R"({
+    "name": "three",
+    "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1},
+                             "metallicRoughnessTexture": {"index": 0}},
+    "emissiveTexture": {"index": 0,
+                        "extensions": {"KHR_texture_transform": {"scale": [2, 3]}}},
+    "normalTexture": {"index": 0, "texCoord": 1},
+    "extensions": {"KHR_materials_clearcoat": {
+      "clearcoatFactor": 1,
+      "clearcoatTexture": {"index": 0,
+                           "extensions": {"KHR_texture_transform": {"scale": [2, 3]}}}}}})"_json);
   const scene::Scene scene = load();
   const scene::Material& m = scene.materials.at(0);
   const auto mapping = [&](std::uint32_t scene::Material::*of) { return scene::mapping_of(m, of); };
@@ -315,25 +313,21 @@ TEST_F(GltfMaterials, ReadsEveryTextureByItsOwnMapping) {
 // The files of KHR_materials_*: which texture, and in which encoding. An alpha is the same in
 // either.
 TEST_F(GltfMaterials, ReadsTheTexturesOfExtensions) {
-  const Json texture = {{"index", gltf.texture(2, 1, two_texels)}};
-  use({{"extensions",
-        {{"KHR_materials_transmission",
-          {{"transmissionFactor", 1}, {"transmissionTexture", texture}}},
-         {"KHR_materials_clearcoat",
-          {{"clearcoatFactor", 1},
-           {"clearcoatTexture", texture},
-           {"clearcoatRoughnessTexture", texture},
-           {"clearcoatNormalTexture", {{"index", texture["index"]}, {"scale", 0.5}}}}},
-         {"KHR_materials_sheen",
-          {{"sheenColorFactor", {1, 1, 1}},
-           {"sheenRoughnessFactor", 1},
-           {"sheenColorTexture", texture},
-           {"sheenRoughnessTexture", texture}}},
-         {"KHR_materials_specular",
-          {{"specularTexture", texture}, {"specularColorTexture", texture}}}}}});
-  use({{"extensions",
-        {{"KHR_materials_anisotropy",
-          {{"anisotropyStrength", 1}, {"anisotropyTexture", texture}}}}}});
+  ASSERT_EQ(gltf.texture(2, 1, two_texels), 0);
+  use(R"({"extensions": {
+    "KHR_materials_transmission": {"transmissionFactor": 1, "transmissionTexture": {"index": 0}},
+    "KHR_materials_clearcoat": {
+      "clearcoatFactor": 1,
+      "clearcoatTexture": {"index": 0},
+      "clearcoatRoughnessTexture": {"index": 0},
+      "clearcoatNormalTexture": {"index": 0, "scale": 0.5}},
+    "KHR_materials_sheen": {
+      "sheenColorFactor": [1, 1, 1], "sheenColorTexture": {"index": 0},
+      "sheenRoughnessFactor": 1, "sheenRoughnessTexture": {"index": 0}},
+    "KHR_materials_specular": {"specularTexture": {"index": 0},
+                               "specularColorTexture": {"index": 0}}}})"_json);
+  use(with("KHR_materials_anisotropy",
+           {{"anisotropyStrength", 1}, {"anisotropyTexture", {{"index", 0}}}}));
   const scene::Scene scene = load();
   ASSERT_EQ(scene.textures.size(), 2u);  // one image, as colour and as data
   const scene::Material& m = scene.materials.at(0);
@@ -356,9 +350,6 @@ TEST_F(GltfMaterials, LeavesOutExtensionsWhoseTextureCannotBeRead) {
   gltf.json["extensionsUsed"] = {"KHR_texture_basisu"};
   const Json lost = {
       {"index", gltf.add("textures", {{"extensions", {{"KHR_texture_basisu", {{"source", 0}}}}}})}};
-  const auto with = [](const char* extension, Json what) {
-    return Json{{"name", extension}, {"extensions", {{extension, std::move(what)}}}};
-  };
   use(with("KHR_materials_transmission",
            {{"transmissionFactor", 1}, {"transmissionTexture", lost}}));
   use(with("KHR_materials_clearcoat",
@@ -377,19 +368,16 @@ TEST_F(GltfMaterials, LeavesOutExtensionsWhoseTextureCannotBeRead) {
   EXPECT_EQ(scene.materials.at(3).specular, 1);
   EXPECT_EQ(scene.materials.at(3).specular_color, glm::vec3(1));
   EXPECT_EQ(scene.materials.at(4).anisotropy, 0);
-  for (int i = 0; i < 5; ++i) {
-    const std::string name = gltf.json["materials"][static_cast<std::size_t>(i)]["name"];
-    EXPECT_THAT(scene.notes, Contains(HasSubstr("\"" + name + "\": " + name +
-                                                " is ignored, because "
-                                                "its texture cannot be read")));
+  for (const Json& material : gltf.json["materials"]) {
+    const std::string name = material["name"];
+    EXPECT_THAT(scene.notes, Contains(HasSubstr("\"" + name + "\": " + name + " is ignored, " +
+                                                "because its texture cannot be read")));
   }
 }
 
 TEST_F(GltfMaterials, NotesTexturedMeshesWithoutCoordinates) {
-  const int texture = gltf.texture(2, 1, two_texels);
-  const int material = gltf.add(
-      "materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}});
-  gltf.root("a", gltf.triangle_mesh(material));
+  const Json textured = colored({{"index", gltf.texture(2, 1, two_texels)}});
+  gltf.root("a", gltf.triangle_mesh(gltf.add("materials", textured)));
   const scene::Scene scene = load();
   EXPECT_THAT(scene.meshes.at(0).uvs, IsEmpty());
   EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("has no TEXCOORD_0 for its textures")));
@@ -397,13 +385,9 @@ TEST_F(GltfMaterials, NotesTexturedMeshesWithoutCoordinates) {
 
 TEST_F(GltfMaterials, ReadsImagesOfDataUrisAndOfFilesBeside) {
   const std::vector<unsigned char> bytes = png(2, 1, two_texels);
-  std::ofstream(directory / "my wood.png", std::ios::binary)
-      .write(reinterpret_cast<const char*>(bytes.data()), static_cast<long>(bytes.size()));
-  gltf.add("images", {{"uri", "data:image/png;base64," + base64(bytes)}});
-  gltf.add("images", {{"uri", "my%20wood.png"}});
-  for (int i = 0; i < 2; ++i)
-    use({{"pbrMetallicRoughness",
-          {{"baseColorTexture", {{"index", gltf.add("textures", {{"source", i}})}}}}}});
+  session::write_content(directory / "my wood.png", {bytes.begin(), bytes.end()});
+  use_image(image_of(bytes));
+  use_image({{"uri", "my%20wood.png"}});
   const scene::Scene scene = load();
   ASSERT_EQ(scene.textures.size(), 2u);
   EXPECT_EQ(scene.textures[0].texels, scene.textures[1].texels);
@@ -423,44 +407,29 @@ TEST_F(GltfMaterials, Reads16BitPng) {
 }
 
 TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
-  const int image = gltf.add("images", {{"uri", "lost.png"}});
-  use({{"pbrMetallicRoughness",
-        {{"baseColorTexture", {{"index", gltf.add("textures", {{"source", image}})}}}}}});
+  use_image({{"uri", "lost.png"}});
   const std::string file = (directory / "test.gltf").string();
-  const auto message_of = [&](const Json& given) {
-    gltf.json["images"][0] = given;
-    return error();
-  };
-  EXPECT_EQ(message_of({{"uri", "lost.png"}}),
-            file + ": image 0 \"lost.png\": not found, or empty");
-  EXPECT_EQ(message_of({{"name", "text"},
-                        {"uri", "data:text/plain;base64," + base64({'n', 'o', '!', '!'})}}),
+  EXPECT_EQ(error(), file + ": image 0 \"lost.png\": not found, or empty");
+  EXPECT_EQ(error_with("/images/0", {{"name", "text"}, {"uri", "data:text/plain;base64,bm8hIQ=="}}),
             file + ": image 0 \"text\": is neither PNG nor JPEG");
   std::vector<unsigned char> broken = png(2, 1, two_texels);
   broken.at(42) ^= 0xff;  // the header of the compressed texels
-  EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(broken)}}),
-              HasSubstr("image 0: cannot be decoded"));
   // Width in the PNG's header, big-endian at byte 16: larger than allowed, and more than its bytes.
-  std::vector<unsigned char> huge = png(2, 1, two_texels);
+  std::vector<unsigned char> huge = png(2, 1, two_texels), large = huge;
   huge[16] = 0x01;
-  EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(huge)}}), HasSubstr("image 0"));
-  huge[16] = 0x00;
-  huge[18] = 0x20;
-  huge[22] = 0x20;
-  EXPECT_THAT(message_of({{"uri", "data:image/png;base64," + base64(huge)}}),
-              HasSubstr("is cut short"));
-  EXPECT_THAT(message_of({{"bufferView", 99}, {"mimeType", "image/png"}}), HasSubstr("image[0]"));
+  large[18] = large[22] = 0x20;
+  expect_refused({{"/images/0", image_of(broken), "image 0: cannot be decoded"},
+                  {"/images/0", image_of(huge), "image 0"},
+                  {"/images/0", image_of(large), "is cut short"},
+                  {"/images/0", {{"bufferView", 99}, {"mimeType", "image/png"}}, "image[0]"}});
 }
 
 // A PNG is a signature of 8 bytes and chunks of length, name, data and checksum, up to IEND. The
 // decoder asks for as many bytes as a chunk claims before it looks whether the file has them.
 TEST_F(GltfMaterials, RefusesPngsWhoseChunksGoOnAfterTheFile) {
-  const int image = gltf.add("images", Json::object());
-  use({{"pbrMetallicRoughness",
-        {{"baseColorTexture", {{"index", gltf.add("textures", {{"source", image}})}}}}}});
+  use_image(Json::object());
   const auto message_of = [&](const std::vector<unsigned char>& bytes) {
-    gltf.json["images"][0] = {{"uri", "data:image/png;base64," + base64(bytes)}};
-    return error();
+    return error_with("/images/0", image_of(bytes));
   };
   const std::vector<unsigned char> whole = png(2, 1, two_texels);
   const auto said = HasSubstr("image 0: is cut short: its chunk ");
@@ -470,22 +439,20 @@ TEST_F(GltfMaterials, RefusesPngsWhoseChunksGoOnAfterTheFile) {
         << size;
   for (const std::size_t length_at : {std::size_t{8}, std::size_t{33}}) {  // IHDR, IDAT
     std::vector<unsigned char> lying = whole;
-    lying.at(length_at) = 0x58;  // 1.5 GB
-    EXPECT_THAT(message_of(lying), said);
-    lying.at(length_at) = 0xff;
-    EXPECT_THAT(message_of(lying), said);
+    for (const unsigned char length : {0x58, 0xff}) {  // 1.5 GB, and beyond what a PNG may have
+      lying.at(length_at) = length;
+      EXPECT_THAT(message_of(lying), said);
+    }
   }
   // The one checksum that no decoder needs.
-  gltf.json["images"][0] = {
-      {"uri", "data:image/png;base64," + base64({whole.begin(), whole.end() - 4})}};
+  gltf.json["images"][0] = image_of({whole.begin(), whole.end() - 4});
   EXPECT_EQ(load().textures.at(0).width, 2);
 }
 
 TEST_F(GltfMaterials, LeavesOutTexturesInFormatsOfExtensions) {
   gltf.json["extensionsUsed"] = {"EXT_texture_webp"};
-  const int texture =
-      gltf.add("textures", {{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}});
-  use({{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}});
+  const Json webp = {{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}};
+  use(colored({{"index", gltf.add("textures", webp)}}));
   const scene::Scene scene = load();
   EXPECT_EQ(scene.materials.at(0).base_color_texture, scene::no_texture);
   EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("\"EXT_texture_webp\" is not supported; ignored"),

@@ -2,8 +2,6 @@
 
 namespace previz::test::gltf_mesh_test {
 
-using Json = GltfWriter::Json;
-
 using GltfMesh = GltfTest;
 
 const std::vector<glm::vec3> square = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
@@ -15,9 +13,8 @@ TEST_F(GltfMesh, ReadsIndicesOfEveryComponentTypeAndNone) {
   const int u8 = gltf.values<std::uint8_t>(5121, "SCALAR", {0, 1, 2, 0, 2, 3});
   const int u16 = gltf.values<std::uint16_t>(5123, "SCALAR", {0, 1, 2, 0, 2, 3});
   const int u32 = gltf.values<std::uint32_t>(5125, "SCALAR", {0, 1, 2, 0, 2, 3});
-  for (const int indices : {u8, u16, u32})
-    gltf.root("a", gltf.mesh({{"attributes", attributes}, {"indices", indices}}));
-  gltf.root("b", gltf.mesh({{"attributes", {{"POSITION", unindexed}}}}));
+  for (const int indices : {u8, u16, u32}) add_mesh(attributes, {{"indices", indices}});
+  add_mesh({{"POSITION", unindexed}});
   for (const char* name : {"test.gltf", "test.glb"}) {
     const scene::Scene scene = load(name);
     ASSERT_EQ(scene.meshes.size(), 4u);
@@ -34,12 +31,8 @@ TEST_F(GltfMesh, TurnsStripsAndFansIntoTriangles) {
   const std::vector<glm::vec3> zigzag = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {2, 0, 0}};
   const std::vector<glm::vec3> wheel = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {-1, 1, 0}};
   const int normals = gltf.normals({5, {0, 0, 1}}), down = gltf.normals({5, {0, 0, -1}});
-  gltf.root("strip",
-            gltf.mesh({{"attributes", {{"POSITION", gltf.positions(zigzag)}, {"NORMAL", down}}},
-                       {"mode", 5}}));
-  gltf.root("fan",
-            gltf.mesh({{"attributes", {{"POSITION", gltf.positions(wheel)}, {"NORMAL", normals}}},
-                       {"mode", 6}}));
+  add_mesh({{"POSITION", gltf.positions(zigzag)}, {"NORMAL", down}}, {{"mode", 5}});
+  add_mesh({{"POSITION", gltf.positions(wheel)}, {"NORMAL", normals}}, {{"mode", 6}});
   const scene::Scene scene = load();
   ASSERT_EQ(scene.meshes.size(), 2u);
   EXPECT_THAT(scene.meshes[0].triangles,
@@ -50,9 +43,8 @@ TEST_F(GltfMesh, TurnsStripsAndFansIntoTriangles) {
 }
 
 TEST_F(GltfMesh, SkipsPointsAndLinesWithANote) {
-  const Json attributes = {{"POSITION", gltf.positions(square)}};
-  for (int mode = 0; mode < 4; ++mode)
-    gltf.root("n", gltf.mesh({{"attributes", attributes}, {"mode", mode}}));
+  const int positions = gltf.positions(square);
+  for (int mode = 0; mode < 4; ++mode) add_mesh({{"POSITION", positions}}, {{"mode", mode}});
   gltf.root("t", gltf.triangle_mesh());
   const scene::Scene scene = load();
   EXPECT_EQ(scene.instances.size(), 1u);
@@ -62,11 +54,9 @@ TEST_F(GltfMesh, SkipsPointsAndLinesWithANote) {
 
 TEST_F(GltfMesh, MakesFlatNormalsWhereThereAreNone) {
   // Two faces of a roof that share an edge: the shared vertices are split.
-  gltf.root("roof",
-            gltf.mesh({{"attributes",
-                        {{"POSITION", gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}})},
-                         {"TEXCOORD_0", gltf.uvs({{0, 0}, {1, 0}, {0, 1}, {1, 1}})}}},
-                       {"indices", gltf.indices({0, 1, 2, 0, 2, 3})}}));
+  add_mesh({{"POSITION", gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}})},
+            {"TEXCOORD_0", gltf.uvs({{0, 0}, {1, 0}, {0, 1}, {1, 1}})}},
+           {{"indices", gltf.indices({0, 1, 2, 0, 2, 3})}});
   const scene::Scene scene = load();
   const scene::Mesh& mesh = scene.meshes.at(0);
   const glm::vec3 z(0, 0, 1), x(1, 0, 0);
@@ -88,10 +78,8 @@ TEST_F(GltfMesh, AppliesSparseReplacements) {
   // The same over zeros: no buffer view at all.
   const int over_zeros = gltf.accessor(-1, 5126, "VEC3", 4);
   gltf.json["accessors"][over_zeros]["sparse"] = sparse;
-  gltf.root("a", gltf.mesh({{"attributes", {{"POSITION", base}}},
-                            {"indices", gltf.indices({0, 1, 2, 0, 2, 3})}}));
-  gltf.root("b", gltf.mesh({{"attributes", {{"POSITION", over_zeros}}},
-                            {"indices", gltf.indices({0, 1, 2})}}));
+  add_mesh({{"POSITION", base}}, {{"indices", gltf.indices({0, 1, 2, 0, 2, 3})}});
+  add_mesh({{"POSITION", over_zeros}}, {{"indices", gltf.indices({0, 1, 2})}});
   const scene::Scene scene = load();
   EXPECT_EQ(scene.meshes.at(0).positions[1], glm::vec3(2, 0, 0));
   EXPECT_EQ(scene.meshes.at(0).positions[2], glm::vec3(2, 2, 0));
@@ -116,7 +104,7 @@ TEST_F(GltfMesh, ReadsQuantisedAttributesAndStrides) {
       {"TEXCOORD_0",
        gltf.values<std::uint16_t>(5123, "VEC2", {0, 65535, 32768, 0, 65535, 65535}, true)}};
   gltf.json["accessors"][2]["count"] = 3;  // six numbers, three pairs
-  gltf.root("a", gltf.mesh({{"attributes", attributes}}));
+  add_mesh(attributes);
   gltf.json["extensionsRequired"] = {"KHR_mesh_quantization"};
   const scene::Scene scene = load();
   const scene::Mesh& mesh = scene.meshes.at(0);
@@ -134,15 +122,14 @@ TEST_F(GltfMesh, DropsAndCountsWhatCannotBeTraced) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<glm::vec3> positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0},    {nan, 0, 0},
                                             {2, 0, 0}, {9, 9, 9}, {1e20f, 0, 0}};
-  gltf.root("a", gltf.mesh({{"attributes",
-                             {{"POSITION", gltf.positions(positions)},
-                              {"NORMAL", gltf.normals({7, {0, 0, 1}})}}},
-                            {"indices", gltf.indices({0, 1, 3,     // NaN
-                                                      0, 1, 4,     // collinear
-                                                      0, 2, 6,     // beyond any stage
-                                                      1, 1, 2,     // a point twice
-                                                      0, 1, 2,     // good
-                                                      0, 1})}}));  // incomplete
+  const int indices = gltf.indices({0, 1, 3,  // NaN
+                                    0, 1, 4,  // collinear
+                                    0, 2, 6,  // beyond any stage
+                                    1, 1, 2,  // a point twice
+                                    0, 1, 2,  // good
+                                    0, 1});   // incomplete
+  add_mesh({{"POSITION", gltf.positions(positions)}, {"NORMAL", gltf.normals({7, {0, 0, 1}})}},
+           {{"indices", indices}});
   const scene::Scene scene = load();
   EXPECT_THAT(scene.meshes.at(0).triangles, ElementsAre(glm::uvec3(0, 1, 2)));
   EXPECT_EQ(scene.meshes[0].positions.size(), 3u);  // unused vertices are gone
@@ -154,12 +141,9 @@ TEST_F(GltfMesh, DropsAndCountsWhatCannotBeTraced) {
 
 TEST_F(GltfMesh, MakesNormalsUnitAndReplacesThoseThatAreNone) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
-  gltf.root(
-      "a",
-      gltf.mesh({{"attributes",
-                  {{"POSITION", gltf.positions(square)},
-                   {"NORMAL", gltf.normals({{0, 0, 0.5f}, {0, 0, 0}, {nan, 0, 1}, {0, 3, 4}})}}},
-                 {"indices", gltf.indices({0, 1, 2, 0, 2, 3})}}));
+  add_mesh({{"POSITION", gltf.positions(square)},
+            {"NORMAL", gltf.normals({{0, 0, 0.5f}, {0, 0, 0}, {nan, 0, 1}, {0, 3, 4}})}},
+           {{"indices", gltf.indices({0, 1, 2, 0, 2, 3})}});
   const scene::Scene scene = load();
   const glm::vec3 z(0, 0, 1);
   EXPECT_THAT(scene.meshes.at(0).normals, ElementsAre(z, z, z, glm::vec3(0, 0.6f, 0.8f)));
@@ -168,8 +152,8 @@ TEST_F(GltfMesh, MakesNormalsUnitAndReplacesThoseThatAreNone) {
 
 TEST_F(GltfMesh, NotesEmptyMeshesAndSkipsThem) {
   gltf.root("none", gltf.add("meshes", {{"name", "none"}, {"primitives", Json::array()}}));
-  gltf.root("flat", gltf.mesh({{"attributes", {{"POSITION", gltf.positions({3, {1, 1, 1}})}}}}));
-  gltf.root("nowhere", gltf.mesh({{"attributes", {{"NORMAL", gltf.normals({3, {0, 0, 1}})}}}}));
+  add_mesh({{"POSITION", gltf.positions({3, {1, 1, 1}})}});
+  add_mesh({{"NORMAL", gltf.normals({3, {0, 0, 1}})}});
   const scene::Scene scene = load();
   EXPECT_THAT(scene.instances, IsEmpty());
   EXPECT_THAT(scene.meshes, IsEmpty());
@@ -209,12 +193,9 @@ TEST_F(GltfMesh, SharesGeometryBetweenNodesAndMaterials) {
 }
 
 TEST_F(GltfMesh, NamesFileMeshAndPrimitiveOfBadIndicesAndAccessors) {
+  gltf.root("a", gltf.mesh(Json::object(), "statue"));
   const auto message_of = [&](const Json& primitive) {
-    gltf.json.erase("meshes");
-    gltf.json.erase("nodes");
-    gltf.json.erase("scenes");
-    gltf.root("a", gltf.mesh(primitive, "statue"));
-    return error();
+    return error_with("/meshes/0/primitives/0", primitive);
   };
   const int positions = gltf.positions(square);
   const std::string at = (directory / "test.gltf").string() + ": mesh 0 \"statue\", primitive 0";
@@ -236,38 +217,29 @@ TEST_F(GltfMesh, NamesFileMeshAndPrimitiveOfBadIndicesAndAccessors) {
 
 TEST_F(GltfMesh, RefusesAbsurdSizesBeforeAllocating) {
   const int positions = gltf.positions(square);
-  gltf.root("a", gltf.mesh({{"attributes", {{"POSITION", positions}}}}));
-  const auto message_of = [&](const char* key, const Json& value) {
-    const Json before = gltf.json;
-    gltf.json["accessors"][positions][key] = value;
-    std::string message = error();
-    gltf.json = before;
-    return message;
-  };
-  EXPECT_THAT(message_of("count", 5), HasSubstr("5 elements do not fit into a view of 48 bytes"));
-  EXPECT_THAT(message_of("count", 4000000000u),
-              HasSubstr("4000000000 elements are more than its data can hold"));
-  EXPECT_THAT(message_of("byteOffset", 1ull << 53), HasSubstr("do not fit into a view"));
-  EXPECT_THAT(message_of("byteOffset", 1), HasSubstr("do not fit into a view"));
+  add_mesh({{"POSITION", positions}});
+  const std::string accessor = "/accessors/" + std::to_string(positions);
+  expect_refused({
+      {accessor + "/count", 5, "5 elements do not fit into a view of 48 bytes"},
+      {accessor + "/count", 4000000000u, "4000000000 elements are more than its data can hold"},
+      {accessor + "/byteOffset", 1ull << 53, "do not fit into a view"},
+      {accessor + "/byteOffset", 1, "do not fit into a view"},
+  });
   gltf.json["accessors"][positions].erase("bufferView");
-  EXPECT_THAT(message_of("count", 1u << 30), HasSubstr("more than its data can hold"));
+  expect_refused({{accessor + "/count", 1u << 30, "more than its data can hold"}});
 }
 
 // glTF 2.0, 3.7.2.1: factors of the base colour, linear, brought into 0 to 1.
 TEST_F(GltfMesh, ReadsVertexColours) {
   const int positions = gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}});
   const auto colored = [&](int colors) {
-    gltf.root("a", gltf.mesh({{"attributes", {{"POSITION", positions}, {"COLOR_0", colors}}}}));
+    add_mesh({{"POSITION", positions}, {"COLOR_0", colors}});
   };
   colored(gltf.values<glm::vec3>(5126, "VEC3", {{0, 0.25f, 0.5f}, {1, 1, 1}, {0, 0, 0}}));
   colored(gltf.accessor(gltf.view({255, 51, 0, 102, 0, 0, 0, 255, 255, 255, 255, 255}, 4), 5121,
                         "VEC4", 3, true));
-  colored(gltf.accessor(
-      gltf.view(GltfWriter::bytes_of(std::vector<std::uint16_t>{65535, 0, 13107, 0,  //
-                                                                0, 65535, 0, 0,      //
-                                                                0, 0, 0, 0}),
-                8),
-      5123, "VEC3", 3, true));
+  const std::vector<std::uint16_t> words = {65535, 0, 13107, 0, 0, 65535, 0, 0, 0, 0, 0, 0};
+  colored(gltf.accessor(gltf.view(GltfWriter::bytes_of(words), 8), 5123, "VEC3", 3, true));
   colored(gltf.values<glm::vec3>(5126, "VEC3", {{2, -1, std::nanf("")}, {1, 1, 1}, {0, 0, 0}}));
   colored(gltf.values<glm::vec3>(5126, "VEC3", {{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}));
   const scene::Scene scene = load();
@@ -277,8 +249,7 @@ TEST_F(GltfMesh, ReadsVertexColours) {
   EXPECT_EQ(scene.meshes[2].colors[0], glm::vec4(1, 0, 0.2f, 1));
   EXPECT_EQ(scene.meshes[3].colors[0], glm::vec4(1, 0, 1, 1));
   EXPECT_TRUE(scene.meshes[4].colors.empty());  // white changes nothing
-  EXPECT_THAT(scene.notes,
-              ::testing::ElementsAre(HasSubstr("1 vertex colour is outside of 0 to 1")));
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("1 vertex colour is outside of 0 to 1")));
 }
 
 }  // namespace previz::test::gltf_mesh_test

@@ -2,18 +2,14 @@
 // refused with a previz::Error; what loads keeps scene.hpp's promises, and neither costs much.
 #include <sys/resource.h>
 
-#include <ctime>
-
 #include "daemon/render/feature.hpp"
 #include "daemon/scene/bvh_refit.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/placement.hpp"
-#include "daemon/scene/scene.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/gltf_sample.hpp"
 #include "tests/support/session_fixture.hpp"
-#include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::test::gltf_mutation_test {

@@ -3,8 +3,6 @@
 
 namespace previz::test::gltf_node_test {
 
-using Json = GltfWriter::Json;
-
 using GltfNodes = GltfTest;
 
 // Products of a few doubles of size 10: 1e-14 is some 5 roundings.
@@ -16,6 +14,12 @@ void expect_near(const glm::dmat4& given, const glm::dmat4& expected) {
 
 glm::dvec3 world(const scene::Instance& instance, const glm::dvec3& point) {
   return glm::dvec3(instance.world_from_object * glm::dvec4(point, 1));
+}
+
+std::vector<std::string> names_in(const scene::Scene& scene) {
+  std::vector<std::string> names;
+  for (const scene::Instance& instance : scene.instances) names.push_back(instance.name);
+  return names;
 }
 
 TEST_F(GltfNodes, TurnsYUpIntoZUp) {
@@ -39,8 +43,7 @@ TEST_F(GltfNodes, MultipliesTheHierarchyAsComputedByHand) {
       {{"matrix", {0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 10, 0, 0, 1}}, {"children", {child}}});
   object.world_from_file[3] = {0, 0, 5, 1};
   const scene::Scene scene = load();
-  ASSERT_EQ(scene.instances.size(), 1u);
-  EXPECT_EQ(scene.instances[0].name, "child");
+  ASSERT_THAT(names_in(scene), ElementsAre("child"));
   // x: (1,0,0) -> 2 (0,0,-1) -> (0,0,-2); y -> (0,2,0) -> (-2,0,0); z -> (2,0,0) -> (0,2,0);
   // origin (0,0,1) -> (10,0,1). Then (x, y, z) -> (x, -z, y), then up by 5.
   expect_near(scene.instances[0].world_from_object,
@@ -51,26 +54,15 @@ TEST_F(GltfNodes, MultipliesTheHierarchyAsComputedByHand) {
 // move.
 TEST_F(GltfNodes, PlacesTheCopiesOfANode) {
   const double half = std::sqrt(0.5);
-  const std::vector<glm::vec4> turns = {{0, 0, 0, 1}, {0, 0, float(half), float(half)}};
   const int translations = gltf.positions({{1, 0, 0}, {0, 3, 0}});
   const int scales = gltf.positions({{2, 2, 2}, {1, 1, 1}});
   const int rotations =
-      gltf.accessor(gltf.view(GltfWriter::bytes_of(turns)), 5126, "VEC4", turns.size());
-  gltf.root(
-      "trees", gltf.triangle_mesh(),
-      {{"translation", {0, 0, 5}},
-       {"extensions",
-        {{"EXT_mesh_gpu_instancing",
-          {{"attributes",
-            {{"TRANSLATION", translations}, {"ROTATION", rotations}, {"SCALE", scales}}}}}}}});
+      gltf.values<glm::vec4>(5126, "VEC4", {{0, 0, 0, 1}, {0, 0, float(half), float(half)}});
+  gltf.root("trees", gltf.triangle_mesh(), {{"translation", {0, 0, 5}}});
+  Json& copies = gltf.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"];
+  copies = {{"TRANSLATION", translations}, {"ROTATION", rotations}, {"SCALE", scales}};
   gltf.json["extensionsRequired"] = {"EXT_mesh_gpu_instancing"};
-  const int times = gltf.values<float>(5126, "SCALAR", {0, 1});
-  const int places = gltf.positions({{0, 0, 5}, {0, 0, 7}});
-  gltf.json["animations"] = {
-      {{"name", "go"},
-       {"channels", {{{"sampler", 0}, {"target", {{"node", 0}, {"path", "translation"}}}}}},
-       {"samplers", {{{"input", times}, {"output", places}}}}}};
-  object.animation = "go";
+  animate(0, "translation", {0, 1}, gltf.positions({{0, 0, 5}, {0, 0, 7}}));
   object.loops = false;
   scene::Scene scene = load();
   EXPECT_THAT(scene.notes, IsEmpty());
@@ -79,13 +71,10 @@ TEST_F(GltfNodes, PlacesTheCopiesOfANode) {
   // glTF's (x, y, z) is the world's (x, -z, y).
   EXPECT_EQ(world(scene.instances[0], {1, 0, 0}), glm::dvec3(3, -5, 0));
   EXPECT_NEAR(glm::distance(world(scene.instances[1], {1, 0, 0}), {0, -5, 4}), 0, 1e-6);
-  session::SceneState state;
-  state.animation_s = 1;
-  scene.instances = scene::place(scene, {}, state).instances;
+  scene.instances = scene::place(scene, {}, state_at(1)).instances;
   EXPECT_EQ(world(scene.instances[0], {1, 0, 0}), glm::dvec3(3, -7, 0));
   EXPECT_NEAR(glm::distance(world(scene.instances[1], {1, 0, 0}), {0, -7, 4}), 0, 1e-6);
-  gltf.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"]["SCALE"] =
-      gltf.positions({{1, 1, 1}});
+  copies["SCALE"] = gltf.positions({{1, 1, 1}});
   EXPECT_THAT(error(), HasSubstr("its copies: their attributes have different numbers"));
 }
 
@@ -116,12 +105,7 @@ TEST_F(GltfNodes, TakesTheDefaultSceneElseTheFirstElseAllRoots) {
   const int child = gltf.add("nodes", {{"name", "child"}, {"mesh", mesh}});
   const int a = gltf.add("nodes", {{"name", "a"}, {"mesh", mesh}, {"children", {child}}});
   const int b = gltf.add("nodes", {{"name", "b"}, {"mesh", mesh}});
-  const auto names = [&] {
-    std::vector<std::string> found;
-    const scene::Scene scene = load();
-    for (const scene::Instance& instance : scene.instances) found.push_back(instance.name);
-    return found;
-  };
+  const auto names = [&] { return names_in(load()); };
   EXPECT_THAT(names(), ElementsAre("a", "child", "b"));
   gltf.json["scenes"] = {{{"nodes", {b}}}, {{"nodes", {a}}}};
   EXPECT_THAT(names(), ElementsAre("b"));
@@ -142,10 +126,7 @@ TEST_F(GltfNodes, FiltersByNameWithWhatHangsBelow) {
   gltf.root("other", mesh);
   object.nodes = {"inner", "other"};
   const scene::Scene scene = load();
-  ASSERT_EQ(scene.instances.size(), 3u);
-  EXPECT_EQ(scene.instances[0].name, "inner");
-  EXPECT_EQ(scene.instances[1].name, "leaf");
-  EXPECT_EQ(scene.instances[2].name, "other");
+  ASSERT_THAT(names_in(scene), ElementsAre("inner", "leaf", "other"));
   EXPECT_EQ(world(scene.instances[1], {0, 0, 0}), glm::dvec3(1, -1, 0));  // outer's too
   object.nodes = {"iner"};
   EXPECT_EQ(error(),
@@ -158,13 +139,9 @@ TEST_F(GltfNodes, RefusesWhatIsNoTree) {
   gltf.root("b", mesh);
   EXPECT_THAT(error(), HasSubstr("node 1 \"b\" has two parents or is its own ancestor"));
   gltf.json["scenes"][0]["nodes"] = {0};
-  gltf.json["nodes"][1]["children"] = {0};
-  EXPECT_THAT(error(), HasSubstr("has two parents or is its own ancestor"));
-  gltf.json["nodes"][1]["children"] = {7};
-  EXPECT_THAT(error(), HasSubstr("no node 7"));
-  gltf.json["nodes"][1].erase("children");
-  gltf.json["nodes"][1]["matrix"] = {1, 2, 3};
-  EXPECT_THAT(error(), HasSubstr("node 1 \"b\": its transform has 3 numbers"));
+  expect_refused({{"/nodes/1/children", {0}, "has two parents or is its own ancestor"},
+                  {"/nodes/1/children", {7}, "no node 7"},
+                  {"/nodes/1/matrix", {1, 2, 3}, "node 1 \"b\": its transform has 3 numbers"}});
 }
 
 TEST_F(GltfNodes, SkipsSingularTransformsWithANote) {
@@ -172,8 +149,7 @@ TEST_F(GltfNodes, SkipsSingularTransformsWithANote) {
   gltf.root("flat", mesh, {{"scale", {1, 0, 1}}});
   gltf.root("tiny", mesh, {{"scale", {1e-6, 1e-6, 1e-6}}});  // small, but not singular
   const scene::Scene scene = load();
-  ASSERT_EQ(scene.instances.size(), 1u);
-  EXPECT_EQ(scene.instances[0].name, "tiny");
+  EXPECT_THAT(names_in(scene), ElementsAre("tiny"));
   EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("\"flat\": its transform is singular")));
 }
 
@@ -193,25 +169,18 @@ TEST_F(GltfNodes, LoadsADeepChainOfNodes) {
 TEST_F(GltfNodes, PutsLightsIntoTheWorld) {
   const double half = std::sqrt(0.5);
   gltf.json["extensionsUsed"] = {"KHR_lights_punctual"};
-  gltf.json["extensions"]["KHR_lights_punctual"]["lights"] = {
-      {{"type", "point"}, {"color", {1, 0.5, 0.25}}, {"intensity", 8}},
-      {{"type", "directional"}, {"name", "sun"}},
-      {{"type", "spot"},
-       {"range", 3},
-       {"spot", {{"innerConeAngle", 0.2}, {"outerConeAngle", 0.5}}}},
-      {{"type", "torch"}}};
-  const auto light = [](int index) {
-    return Json{{"extensions", {{"KHR_lights_punctual", {{"light", index}}}}}};
-  };
-  Json at = light(0);
-  at["translation"] = {1, 2, 3};
-  gltf.root("lamp", -1, at);
-  Json down = light(1);  // -90 degrees about X turns -Z to -Y: straight down
-  down["rotation"] = {-half, 0, 0, half};
-  down["scale"] = {3, 3, 3};
-  gltf.root("sun node", -1, down);
-  gltf.root("spot", -1, light(2));
-  gltf.root("torch", -1, light(3));
+  gltf.json["extensions"]["KHR_lights_punctual"]["lights"] = R"([
+    {"type": "point", "color": [1, 0.5, 0.25], "intensity": 8},
+    {"type": "directional", "name": "sun"},
+    {"type": "spot", "range": 3, "spot": {"innerConeAngle": 0.2, "outerConeAngle": 0.5}},
+    {"type": "torch"}])"_json;
+  gltf.root("lamp", -1, {{"translation", {1, 2, 3}}});
+  // -90 degrees about X turns -Z to -Y: straight down.
+  gltf.root("sun node", -1, {{"rotation", {-half, 0, 0, half}}, {"scale", {3, 3, 3}}});
+  gltf.root("spot");
+  gltf.root("torch");
+  for (int i = 0; i < 4; ++i)
+    gltf.json["nodes"][i]["extensions"]["KHR_lights_punctual"]["light"] = i;
   set::Light of_set;
   of_set.name = "of the set";
   a_set.lights = {of_set};

@@ -5,15 +5,14 @@
 namespace previz::test::gltf_variants_test {
 
 using ::testing::AnyOf;
-using Json = GltfWriter::Json;
 
 class GltfVariants : public GltfTest {
  protected:
   GltfVariants() {
     object.name = "vase";
     gltf.json["extensionsUsed"] = {"KHR_materials_variants"};
-    gltf.json["extensions"]["KHR_materials_variants"]["variants"] = {{{"name", "red"}},
-                                                                     {{"name", "blue"}}};
+    gltf.json["extensions"]["KHR_materials_variants"]["variants"] =
+        R"([{"name": "red"}, {"name": "blue"}])"_json;
     for (const char* name : {"plain", "red paint", "blue paint"})
       gltf.add("materials", {{"name", name}});
   }
@@ -21,10 +20,10 @@ class GltfVariants : public GltfTest {
   void add_triangle(Json mappings, bool has_uvs = false) {
     Json attributes = {{"POSITION", gltf.positions({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}})}};
     if (has_uvs) attributes["TEXCOORD_0"] = gltf.uvs({{0, 0}, {1, 0}, {0, 1}});
-    Json primitive = {{"attributes", attributes}, {"material", 0}};
+    Json primitive = {{"material", 0}};
     if (!mappings.empty())
       primitive["extensions"]["KHR_materials_variants"]["mappings"] = std::move(mappings);
-    gltf.root("part", gltf.mesh(std::move(primitive)));
+    add_mesh(attributes, primitive);
   }
   static Json painted() {
     return {{{"material", 1}, {"variants", {0}}}, {{"material", 2}, {"variants", {1}}}};
@@ -62,9 +61,8 @@ TEST_F(GltfVariants, TheSetChoosesOneByName) {
   object.variant = "red";
   const scene::Scene scene = load();
   EXPECT_EQ(name_of(scene, scene.instances[0]), "red paint");
-  ASSERT_EQ(scene.variants.size(), 1u);
   std::vector<scene::Instance> shown = scene.instances;
-  EXPECT_TRUE(scene::show_variant(scene.variants[0], "", shown));
+  EXPECT_TRUE(scene::show_variant(scene.variants.at(0), "", shown));
   EXPECT_EQ(name_of(scene, shown[0]), "plain");
 }
 
@@ -74,7 +72,7 @@ TEST_F(GltfVariants, OneThatIsNotThereIsRefusedWithThoseThatAre) {
   EXPECT_THAT(error(), AllOf(HasSubstr("test.gltf: no variant \"green\""),
                              HasSubstr("it has \"red\", \"blue\"")));
   gltf.json["extensions"].erase("KHR_materials_variants");
-  gltf.json["meshes"][0]["primitives"][0].erase("extensions");
+  first_primitive().erase("extensions");
   EXPECT_THAT(error(), HasSubstr("no variant \"green\"; it has none"));
 }
 
@@ -97,8 +95,7 @@ TEST_F(GltfVariants, OneMayLookAsTheFileDoesWithoutIt) {
 
 // A mesh has one set of texture coordinates; the trees of both are built once, at the start.
 TEST_F(GltfVariants, TexturesThatAreMappedOtherwiseTakeACopyOfTheMesh) {
-  const std::vector<unsigned char> texel = {255, 255, 255, 255};
-  const int texture = gltf.texture(1, 1, texel);
+  const int texture = gltf.texture(1, 1, {255, 255, 255, 255});
   gltf.json["materials"][1]["pbrMetallicRoughness"]["baseColorTexture"] = {
       {"index", texture}, {"extensions", {{"KHR_texture_transform", {{"scale", {3, 3}}}}}}};
   add_triangle(painted(), true);
@@ -125,18 +122,16 @@ TEST_F(GltfVariants, NamesThatAreMissingOrRepeatedBecomeNumbers) {
 }
 
 TEST_F(GltfVariants, DamagedOnesAreRefused) {
-  for (const Json& mappings :
-       {Json{{{"material", 1}, {"variants", {2}}}}, Json{{{"material", 1}, {"variants", {-1}}}},
-        Json{{{"material", 3}, {"variants", {0}}}}, Json{{{"variants", {0}}}},
-        Json{{{"material", 1}, {"variants", {"red"}}}}}) {
-    gltf.json.erase("meshes");
-    gltf.json.erase("nodes");
-    gltf.json.erase("scenes");
-    add_triangle(mappings);
-    EXPECT_THAT(error(), AnyOf(HasSubstr("which does not exist"), HasSubstr("a missing variant"),
-                               HasSubstr("it must be a whole number")))
-        << mappings;
-  }
+  add_triangle(painted());
+  const char* mappings = "/meshes/0/primitives/0/extensions/KHR_materials_variants/mappings";
+  for (const char* damaged :
+       {R"([{"material": 1, "variants": [2]}])", R"([{"material": 1, "variants": [-1]}])",
+        R"([{"material": 3, "variants": [0]}])", R"([{"variants": [0]}])",
+        R"([{"material": 1, "variants": ["red"]}])"})
+    EXPECT_THAT(error_with(mappings, Json::parse(damaged)),
+                AnyOf(HasSubstr("which does not exist"), HasSubstr("a missing variant"),
+                      HasSubstr("it must be a whole number")))
+        << damaged;
 }
 
 }  // namespace previz::test::gltf_variants_test

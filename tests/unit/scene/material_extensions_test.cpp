@@ -7,7 +7,6 @@
 
 namespace previz::test::material_extensions_test {
 
-using Json = GltfWriter::Json;
 using scene::Material;
 
 // The keys of factors and textures in the extensions' schemas (glTF repository of Khronos,
@@ -114,9 +113,8 @@ TEST(MaterialExtensions, BringTheirFeatures) {
   for (const render::Feature& feature : render::features()) names.emplace_back(feature.name);
   const auto gloss = std::ranges::find(names, "gloss");
   ASSERT_GE(names.end() - gloss, 6);
-  EXPECT_EQ(std::vector<std::string>(gloss, gloss + 6),
-            (std::vector<std::string>{"gloss", "coloured gloss", "brushed metal", "cloth",
-                                      "lacquer", "metal"}));
+  EXPECT_THAT(std::vector<std::string>(gloss, gloss + 6),
+              ElementsAre("gloss", "coloured gloss", "brushed metal", "cloth", "lacquer", "metal"));
 }
 
 class ReadMaterialExtensions : public GltfTest {

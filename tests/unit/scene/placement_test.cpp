@@ -11,6 +11,8 @@ namespace previz::scene::placement_test {
 struct Stage {
   set::Set set;
   Scene scene;
+  session::SceneState state;
+  Placement placed() const { return place(scene, set, state); }
   Stage() {
     set.objects.resize(2);
     set.objects[0].name = "vase";
@@ -35,22 +37,21 @@ struct Stage {
 };
 
 TEST(Placement, OfNothingIsTheSceneItself) {
-  const Stage stage;
-  const Placement placement = place(stage.scene, stage.set, {});
+  Stage stage;
+  const Placement placement = stage.placed();
   for (std::size_t i = 0; i < 3; ++i)
     EXPECT_EQ(placement.instances[i].world_from_object, stage.scene.instances[i].world_from_object);
   EXPECT_EQ(placement.lights.size(), 2u);
-  EXPECT_TRUE(placement.unknown.empty());
+  EXPECT_THAT(placement.unknown, IsEmpty());
 }
 
 // A quarter turn about Z through the world's origin, then 1 m up.
 TEST(Placement, AnObjectTakesItsLampsAlongAndLeavesTheOthers) {
-  const Stage stage;
-  session::SceneState state;
+  Stage stage;
   const glm::dmat4 moved = glm::translate(glm::dmat4(1), {0, 0, 1}) *
                            glm::rotate(glm::dmat4(1), glm::radians(90.0), {0, 0, 1});
-  state.objects["torch"] = moved * stage.set.objects[1].world_from_file;
-  const Placement placement = place(stage.scene, stage.set, state);
+  stage.state.objects["torch"] = moved * stage.set.objects[1].world_from_file;
+  const Placement placement = stage.placed();
   EXPECT_EQ(placement.instances[0].world_from_object, stage.scene.instances[0].world_from_object);
   for (std::size_t i = 1; i < 3; ++i) {
     const glm::dvec3 was = stage.scene.instances[i].world_from_object[3];
@@ -62,20 +63,18 @@ TEST(Placement, AnObjectTakesItsLampsAlongAndLeavesTheOthers) {
 }
 
 TEST(Placement, AnObjectWhereTheSetHasItIsBitForBitWhereItWas) {
-  const Stage stage;
-  session::SceneState state;
-  state.objects["torch"] = stage.set.objects[1].world_from_file;
-  const Placement placement = place(stage.scene, stage.set, state);
+  Stage stage;
+  stage.state.objects["torch"] = stage.set.objects[1].world_from_file;
+  const Placement placement = stage.placed();
   EXPECT_EQ(placement.instances[1].world_from_object, stage.scene.instances[1].world_from_object);
 }
 
 // Of a carrier that was not found yet: back at once when it is.
 TEST(Placement, WhatIsNowhereIsInNeitherWorld) {
-  const Stage stage;
-  session::SceneState state;
-  state.objects["torch"] = std::nullopt;
-  state.lights["key"] = std::nullopt;
-  const Placement placement = place(stage.scene, stage.set, state);
+  Stage stage;
+  stage.state.objects["torch"] = std::nullopt;
+  stage.state.lights["key"] = std::nullopt;
+  const Placement placement = stage.placed();
   ASSERT_EQ(placement.instances.size(), 3u);
   EXPECT_EQ(placement.instances[0].presence, world_both);
   EXPECT_EQ(placement.instances[1].presence, 0u);
@@ -100,29 +99,27 @@ TEST(Placement, AnimatesBeforeItMoves) {
   animation.instances = {{2, 0}};
   animation.lights = {{0, 0}};
   stage.scene.animations = {animation};
-  session::SceneState state;
-  state.animation_s = 0.5;
-  state.objects["torch"] =
+  stage.state.animation_s = 0.5;
+  stage.state.objects["torch"] =
       glm::translate(glm::dmat4(1), {0, 0, 3}) * stage.set.objects[1].world_from_file;
-  Placement placement = place(stage.scene, stage.set, state);
+  Placement placement = stage.placed();
   EXPECT_EQ(placement.instances[2].world_from_object[3], glm::dvec4(1, 0, 3, 1));
   EXPECT_EQ(placement.instances[2].world_from_object[0], glm::dvec4(0.5, 0, 0, 0));
   // The lamp was at (1, 0, 0.5) of the node at rest.
   EXPECT_EQ(placement.lights[0].position, glm::dvec3(1.5, 0, 3.25));
   EXPECT_EQ(placement.instances[0].world_from_object, stage.scene.instances[0].world_from_object);
 
-  state.animation_s = 3;  // 1 s into its second time
-  placement = place(stage.scene, stage.set, state);
+  stage.state.animation_s = 3;  // 1 s into its second time
+  placement = stage.placed();
   EXPECT_EQ(placement.instances[2].presence, 0u);
   EXPECT_EQ(placement.lights[0].gain_mixed, 0);
 }
 
 TEST(Placement, DimmingIsOfTheMixedWorldOnly) {
-  const Stage stage;
-  session::SceneState state;
-  state.lights["key"] = state_of(stage.set.lights[0]);
-  state.lights["key"]->gain_mixed = 0.25;
-  const Placement placement = place(stage.scene, stage.set, state);
+  Stage stage;
+  stage.state.lights["key"] = state_of(stage.set.lights[0]);
+  stage.state.lights["key"]->gain_mixed = 0.25;
+  const Placement placement = stage.placed();
   ASSERT_EQ(placement.lights.size(), 2u);
   EXPECT_EQ(placement.lights[1].gain_mixed, 0.25);
   EXPECT_EQ(placement.lights[1].gain_real, 1);
@@ -131,11 +128,10 @@ TEST(Placement, DimmingIsOfTheMixedWorldOnly) {
 
 // Two lamps, one of each world, would share no sample, and their difference would be all noise.
 TEST(Placement, ATintedRealLampStaysOneLamp) {
-  const Stage stage;
-  session::SceneState state;
-  state.lights["key"] = state_of(stage.set.lights[0]);
-  state.lights["key"]->tint = {2, 1, 0.5};
-  const Placement placement = place(stage.scene, stage.set, state);
+  Stage stage;
+  stage.state.lights["key"] = state_of(stage.set.lights[0]);
+  stage.state.lights["key"]->tint = {2, 1, 0.5};
+  const Placement placement = stage.placed();
   ASSERT_EQ(placement.lights.size(), 2u);
   EXPECT_EQ(placement.lights[1].gain_mixed, 1);
   EXPECT_EQ(placement.lights[1].tint, glm::dvec3(2, 1, 0.5));
@@ -146,12 +142,11 @@ TEST(Placement, ATintedRealLampStaysOneLamp) {
 TEST(Placement, ALampThatTheSetTintsKeepsItsTintUnlessTheStateSaysOtherwise) {
   Stage stage;
   stage.set.lights[0].tint = stage.scene.lights[1].tint = {1, 0.5, 0.25};
-  session::SceneState state;
-  EXPECT_EQ(place(stage.scene, stage.set, state).lights[1].tint, glm::dvec3(1, 0.5, 0.25));
-  state.lights["key"] = state_of(stage.set.lights[0]);
-  EXPECT_EQ(place(stage.scene, stage.set, state).lights[1].tint, glm::dvec3(1, 0.5, 0.25));
-  state.lights["key"]->tint = {1, 1, 1};
-  EXPECT_EQ(place(stage.scene, stage.set, state).lights[1].tint, glm::dvec3(1));
+  EXPECT_EQ(stage.placed().lights[1].tint, glm::dvec3(1, 0.5, 0.25));
+  stage.state.lights["key"] = state_of(stage.set.lights[0]);
+  EXPECT_EQ(stage.placed().lights[1].tint, glm::dvec3(1, 0.5, 0.25));
+  stage.state.lights["key"]->tint = {1, 1, 1};
+  EXPECT_EQ(stage.placed().lights[1].tint, glm::dvec3(1));
 }
 
 // Of the torch's two instances one is lacquered in the variant.
@@ -159,19 +154,18 @@ TEST(Placement, AVariantIsOfTheMaterialsOfItsObjectAlone) {
   Stage stage;
   stage.scene.variants = {{1, {"lacquered"}, "", {{2, {{0, 4}, {3, 5}}}}}};
   stage.scene.instances[2].material = 4;
-  session::SceneState state;
-  state.variants["torch"] = "lacquered";
-  Placement placement = place(stage.scene, stage.set, state);
-  EXPECT_TRUE(placement.unknown.empty());
+  stage.state.variants["torch"] = "lacquered";
+  Placement placement = stage.placed();
+  EXPECT_THAT(placement.unknown, IsEmpty());
   EXPECT_EQ(placement.instances[2].material, 5u);
   EXPECT_EQ(placement.instances[2].mesh, 3u);
   EXPECT_EQ(placement.instances[1].material, 0u);
   EXPECT_EQ(placement.instances[2].world_from_object, stage.scene.instances[2].world_from_object);
-  state.variants["torch"] = "";
-  EXPECT_EQ(place(stage.scene, stage.set, state).instances[2].material, 4u);
-  state.variants["torch"] = "gilded";
-  state.variants["vase"] = "gilded";
-  placement = place(stage.scene, stage.set, state);
+  stage.state.variants["torch"] = "";
+  EXPECT_EQ(stage.placed().instances[2].material, 4u);
+  stage.state.variants["torch"] = "gilded";
+  stage.state.variants["vase"] = "gilded";
+  placement = stage.placed();
   EXPECT_EQ(placement.instances[2].material, 4u);
   ASSERT_EQ(placement.unknown.size(), 2u);
   EXPECT_EQ(placement.unknown[0],
@@ -179,14 +173,11 @@ TEST(Placement, AVariantIsOfTheMaterialsOfItsObjectAlone) {
 }
 
 TEST(Placement, NamesTheSetHasNotAreTold) {
-  const Stage stage;
-  session::SceneState state;
-  state.objects["ghost"] = glm::dmat4(1);
-  state.lights["moon"] = {};
-  const Placement placement = place(stage.scene, stage.set, state);
-  ASSERT_EQ(placement.unknown.size(), 2u);
-  EXPECT_THAT(placement.unknown[0], HasSubstr("\"ghost\""));
-  EXPECT_THAT(placement.unknown[1], HasSubstr("\"moon\""));
+  Stage stage;
+  stage.state.objects["ghost"] = glm::dmat4(1);
+  stage.state.lights["moon"] = {};
+  const Placement placement = stage.placed();
+  EXPECT_THAT(placement.unknown, ElementsAre(HasSubstr("\"ghost\""), HasSubstr("\"moon\"")));
 }
 
 }  // namespace previz::scene::placement_test

@@ -9,12 +9,8 @@ namespace previz::set::problems_test {
 
 std::vector<std::string> problems_of(const std::string& text, const std::filesystem::path& file) {
   std::vector<std::string> lines;
-  try {
-    parse_set(text, file);
-  } catch (const Error& error) {
-    std::istringstream all(error.what());
-    for (std::string line; std::getline(all, line);) lines.push_back(line);
-  }
+  std::istringstream all(test::error_of([&] { parse_set(text, file); }));
+  for (std::string line; std::getline(all, line);) lines.push_back(line);
   return lines;
 }
 
@@ -32,8 +28,8 @@ class SetMistake : public testing::TestWithParam<Mistake> {};
 
 TEST_P(SetMistake, IsToldOnceWithLineAndKey) {
   test::TemporaryDirectory directory;
-  std::ofstream(directory.path() / "vase.glb") << "glTF";
-  const auto file = directory.path() / "stage.toml";
+  std::ofstream(directory / "vase.glb") << "glTF";
+  const auto file = directory / "stage.toml";
   const auto problems = problems_of(GetParam().text, file);
   ASSERT_EQ(problems.size(), 1u) << testing::PrintToString(problems);
   EXPECT_TRUE(problems[0].starts_with(file.string() + ':' + GetParam().start)) << problems[0];
@@ -46,6 +42,10 @@ TEST_P(SetMistake, IsToldOnceWithLineAndKey) {
 #define POSE "[light_camera.pose]\nposition_m=[0,0,0]\n"
 #define SQUARE "[[0,0,0],[1,0,0],[1,1,0],[0,1,0]]"
 #define IDENTITY "[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"
+#define TAG "[[tag]]\nid=1\nsize_m=0.1\n"
+#define POINT "[[light]]\ntype='point'\nposition_m=[0,0,1]\n"
+#define OPTICS "[observer.intrinsics]\n" PINHOLE
+#define LENS "[observer.lens]\nfocal_length_mm=35\n"
 #define VASE "[[object]]\nname='v'\nfile='vase.glb'\npresence='virtual'\n"
 
 const Mistake syntax[] = {
@@ -95,13 +95,11 @@ const Mistake types[] = {
     {"[observer]\ndriver = \"gopro\"\n", "2:10: observer.driver: \"gopro\"", " | \"none\""},
     {"[tracking]\nfamily = \"tag36h12\"\n", "2:10: tracking.family: \"tag36h12\"",
      "\"tag36h11\" | "},
-    {"[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,0]\n", "4:12: tag.position_m: a list of 2 entries",
-     "3 numbers"},
-    {"[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,0,\n  \"up\"]\n", "5:3: tag.position_m: \"up\"",
-     "number in m"},
-    {"[[tag]]\nid=1\nsize_m=0.1\nworld_from_tag=[[1,0,0,0],[0,1,0,0],[0,0,1,0]]\n",
+    {TAG "position_m=[0,0]\n", "4:12: tag.position_m: a list of 2 entries", "3 numbers"},
+    {TAG "position_m=[0,0,\n  \"up\"]\n", "5:3: tag.position_m: \"up\"", "number in m"},
+    {TAG "world_from_tag=[[1,0,0,0],[0,1,0,0],[0,0,1,0]]\n",
      "4:16: tag.world_from_tag: a list of 3 entries", "4 rows of 4 numbers"},
-    {"[[tag]]\nid=1\nsize_m=0.1\nworld_from_tag=[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,1,1]]\n",
+    {TAG "world_from_tag=[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,1,1]]\n",
      "4:16: tag.world_from_tag: the last row", "0 0 0 1"},
     {"[[tag]]\nid=1\ncorners_m=[[0,0,0],[1,0,0],[1,1,0]]\n", "3:11: tag.corners_m: a list of 3",
      "4 points of 3 numbers"},
@@ -136,11 +134,10 @@ const Mistake ranges[] = {
      "2:28: lighting.environment_rotation_deg: -inf", "finite"},
     {"[lighting]\nresolution = 100\n", "2:1: lighting.resolution: 100", "power of two"},
     {"[lighting]\nresolution = 8192\n", "2:14: lighting.resolution: 8192", "0 to 4096"},
-    {"[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,nan,0]\n", "4:15: tag.position_m: nan", "finite"},
+    {TAG "position_m=[0,nan,0]\n", "4:15: tag.position_m: nan", "finite"},
     {"[[tag]]\nid=1\nsize_m=-0.1\nposition_m=[0,0,0]\n", "3:8: tag.size_m: -0.1", "0.0001 to 100"},
     {"[[tag]]\nid=-1\nsize_m=0.1\nposition_m=[0,0,0]\n", "2:4: tag.id: -1", "0 to 65535"},
-    {"[[light]]\ntype='point'\nposition_m=[0,0,1]\nemission=[1,-1,1]\n", "4:13: light.emission: -1",
-     "0 to 1e+12"},
+    {POINT "emission=[1,-1,1]\n", "4:13: light.emission: -1", "0 to 1e+12"},
     {"[recording]\ndirectory='/proc/takes'\n",
      "2:1: recording.directory: /proc/takes holds no files of anybody", "a folder on a disk"},
     {"[recording]\nsecond_directory='/a/../sys'\n", "2:1: recording.second_directory: /sys holds",
@@ -163,7 +160,7 @@ const Mistake missing[] = {
     {"\n[[tag]]\nsize_m=0.1\nposition_m=[0,0,0]\n", "2:1: tag.id: is missing", ""},
     {"\n[[tag]]\nid=1\nposition_m=[0,0,0]\n", "2:1: tag.size_m: is missing", "corners_m"},
     {"\n[[tag]]\nid=1\nsize_m=0.1\n", "2:1: tag.position_m: is missing", "world_from_tag"},
-    {"[[tag]]\nid=1\nsize_m=0.1\nrotation_deg=[0,0,0]\n", "1:1: tag.position_m: is missing", ""},
+    {TAG "rotation_deg=[0,0,0]\n", "1:1: tag.position_m: is missing", ""},
     {"[[object]]\nfile='vase.glb'\npresence='virtual'\n", "1:1: object.name: is missing",
      "\"vase\""},
     {"[[surface]]\nmaterial='a'\nalbedo=[0.5,0.5,1.5]\n", "3:17: surface.albedo: 1.5", "0 to 1"},
@@ -177,16 +174,15 @@ const Mistake missing[] = {
     {"[[light]]\ntype='sphere'\nposition_m=[0,0,1]\nemission=[1,1,1]\n",
      "1:1: light.radius_m: is missing", "a sphere light needs it"},
     {"[[light]]\ntype='directional'\nemission=[1,1,1]\n", "1:1: light.direction: is missing", ""},
-    {"[[light]]\ntype='point'\nposition_m=[0,0,1]\n", "1:1: light.emission: is missing",
-     "3 numbers"},
+    {POINT "", "1:1: light.emission: is missing", "3 numbers"},
     {"[[captured_light]]\nname='a'\ncone_deg=5\n", "1:1: captured_light.direction: is missing",
      "position_m"},
     {"[[captured_light]]\nname='a'\ndirection=[0,0,1]\n",
      "1:1: captured_light.cone_deg: is missing", "60"},
     {"[lighting]\nunseen='constant'\n", "1:1: lighting.unseen_radiance: is missing", "3 numbers"},
     {"[lighting.room]\nposition_m=[0,0,1]\n", "1:1: lighting.room.size_m: is missing", "a file"},
-    {"[observer.intrinsics]\n" PINHOLE "[observer.response]\nkind='table'\n",
-     "8:1: observer.response.table: is missing", "strictly increasing"},
+    {OPTICS "[observer.response]\nkind='table'\n", "8:1: observer.response.table: is missing",
+     "strictly increasing"},
 };
 INSTANTIATE_TEST_SUITE_P(Missing, SetMistake, testing::ValuesIn(missing));
 
@@ -209,19 +205,19 @@ const Mistake contradictions[] = {
     {"[[button]]\nname='gpio:pads:1'\naction='record'\n[[gpio]]\nname='gpio:pads'\n[[gpio]]\n"
      "name='gpio:pads'\n",
      "7:1: gpio.name: \"gpio:pads\" is already on line 5", "each name once"},
-    {"[[tag]]\nid=1\nsize_m=0.1\ncarrier='stick'\n" VASE "carrier='stik'\n",
+    {TAG "carrier='stick'\n" VASE "carrier='stik'\n",
      "9:1: object.carrier: no tag is on a carrier \"stik\"", "did you mean \"stick\"?"},
-    {"[[light]]\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\ncarrier='x'\n",
-     "5:1: light.carrier: no tag is on a carrier \"x\"", "the carrier of a [[tag]]"},
-    {"[[tag]]\nid=1\nsize_m=0.1\ncarrier='a'\n[[tag]]\nid=2\nsize_m=0.1\ncarrier='a'\n",
+    {POINT "emission=[1,1,1]\ncarrier='x'\n", "5:1: light.carrier: no tag is on a carrier \"x\"",
+     "the carrier of a [[tag]]"},
+    {TAG "carrier='a'\n[[tag]]\nid=2\nsize_m=0.1\ncarrier='a'\n",
      "8:1: tag.carrier: another tag of \"a\" already defines its frame", "position_m"},
-    {"[[tag]]\nid=1\nsize_m=0.1\ncarrier='a'\n[[tag]]\nid=1\nsize_m=0.1\ncarrier='b'\n",
+    {TAG "carrier='a'\n[[tag]]\nid=1\nsize_m=0.1\ncarrier='b'\n",
      "6:1: tag.id: tag 1 is already on line 2", "each id once"},
     {"[[light]]\nname='key'\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\n"
      "[[light]]\nname='key'\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\n",
      "7:1: light.name: \"key\" is already on line 2", "each name once"},
     {VASE VASE, "6:1: object.name: \"v\" is already on line 2", "each name once"},
-    {"[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,0,0]\nworld_from_tag=" IDENTITY,
+    {TAG "position_m=[0,0,0]\nworld_from_tag=" IDENTITY,
      "4:1: tag.position_m: conflicts with world_from_tag", "one of the two"},
     {"[[tag]]\nid=1\nrotation_deg=[0,0,0]\ncorners_m=" SQUARE,
      "3:1: tag.rotation_deg: conflicts with corners_m", ""},
@@ -252,16 +248,15 @@ const Mistake contradictions[] = {
     {"[display]\nmode='640x480'\n", "2:1: display.mode: driver \"none\" has no mode", ""},
     {"[lighting]\nunseen_radiance=[0,0,0]\n", "2:1: lighting.unseen_radiance: needs unseen",
      "constant"},
-    {"[observer.intrinsics]\n" PINHOLE "[observer.response]\ngamma=2.0\n",
+    {OPTICS "[observer.response]\ngamma=2.0\n",
      "9:1: observer.response.gamma: conflicts with kind \"srgb\"", "\"gamma\""},
     {"[lighting.room]\nfile='vase.glb'\nsize_m=[3,4,2]\n",
      "3:1: lighting.room.size_m: conflicts with file", "one of the two"},
     {"[lighting]\nenvironment='vase.glb'\n[lighting.room]\nsize_m=[3,4,2]\n",
      "3:1: lighting.room: conflicts with lighting.environment", "from infinity"},
-    {"[[light]]\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\ncaptured=true\n",
-     "5:1: light.captured: is for real lamps", "gain_real above 0"},
-    {"[[light]]\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\ncone_deg=5\n",
-     "5:1: light.cone_deg: needs captured = true", ""},
+    {POINT "emission=[1,1,1]\ncaptured=true\n", "5:1: light.captured: is for real lamps",
+     "gain_real above 0"},
+    {POINT "emission=[1,1,1]\ncone_deg=5\n", "5:1: light.cone_deg: needs captured = true", ""},
     {"[[captured_light]]\nname='a'\ncone_deg=5\ndirection=[0,0,1]\nposition_m=[0,0,1]\n",
      "4:1: captured_light.direction: conflicts with position_m", ""},
     {"[lighting]\nfrom='set'\n[[captured_light]]\nname='a'\ncone_deg=5\ndirection=[0,0,1]\n",
@@ -269,8 +264,8 @@ const Mistake contradictions[] = {
     {"[[light]]\nname='a'\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\n"
      "[[captured_light]]\nname='a'\ncone_deg=5\ndirection=[0,0,1]\n",
      "7:1: captured_light.name: \"a\" is also a [[light]]", "each name once"},
-    {"[[light]]\ntype='point'\nposition_m=[0,0,1]\nemission=[1,1,1]\nwidth_m=1\n",
-     "5:1: light.width_m: a point light does not have this", ""},
+    {POINT "emission=[1,1,1]\nwidth_m=1\n", "5:1: light.width_m: a point light does not have this",
+     ""},
     {"[[light]]\ntype='spot'\nposition_m=[0,0,1]\ndirection=[0,0,-1]\nemission=[1,1,1]\n"
      "inner_cone_deg=50\n",
      "6:1: light.inner_cone_deg: is wider", "45.0"},
@@ -281,9 +276,9 @@ const Mistake geometry[] = {
     {"[light_camera.intrinsics]\n" FISHEYE
      "max_angle_deg=90\nvignetting=[-0.5,0,0]\n[light_camera.pose]\nposition_m=[0,0,0]\n",
      "9:1: light_camera.intrinsics.vignetting: passes no light", "at least 0.01"},
-    {"[[tag]]\nid=1\nsize_m=0.1\nworld_from_tag=[[1,0,0,0],[0,1.1,0,0],[0,0,1,0],[0,0,0,1]]\n",
+    {TAG "world_from_tag=[[1,0,0,0],[0,1.1,0,0],[0,0,1,0],[0,0,0,1]]\n",
      "4:1: tag.world_from_tag: is not rigid", "0.21"},
-    {"[[tag]]\nid=1\nsize_m=0.1\nworld_from_tag=[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]\n",
+    {TAG "world_from_tag=[[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]\n",
      "4:1: tag.world_from_tag: mirrors or is singular", "rotation"},
     {"[light_camera.intrinsics]\nmax_angle_deg=90\n" FISHEYE
      "[light_camera.pose]\nworld_from_camera=[[1,0.001,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]\n",
@@ -305,24 +300,19 @@ const Mistake geometry[] = {
 INSTANTIATE_TEST_SUITE_P(Geometry, SetMistake, testing::ValuesIn(geometry));
 
 const Mistake optics[] = {
-    {"[observer.intrinsics]\n" PINHOLE
-     "[observer.lens]\nfocal_length_mm=35\nf_number=0\nfocus_distance_m=1\n",
-     "10:10: observer.lens.f_number: 0 is not", "0.5 to"},
-    {"[observer.intrinsics]\n" PINHOLE
-     "[observer.lens]\nfocal_length_mm=35\nf_number=-2.8\nfocus_distance_m=1\n",
-     "10:10: observer.lens.f_number: -2.8", ""},
-    {"[observer.intrinsics]\n" PINHOLE
-     "[observer.lens]\nfocal_length_mm=35\nf_number=2.8\nfocus_distance_m=0.03\n",
+    {OPTICS LENS "f_number=0\nfocus_distance_m=1\n", "10:10: observer.lens.f_number: 0 is not",
+     "0.5 to"},
+    {OPTICS LENS "f_number=-2.8\nfocus_distance_m=1\n", "10:10: observer.lens.f_number: -2.8", ""},
+    {OPTICS LENS "f_number=2.8\nfocus_distance_m=0.03\n",
      "11:1: observer.lens.focus_distance_m: must exceed", "0.035 m"},
-    {"[observer.intrinsics]\n" PINHOLE
-     "[observer.response]\nkind='table'\ntable=[0.0, 0.5, 0.5, 1.0]\n",
+    {OPTICS "[observer.response]\nkind='table'\ntable=[0.0, 0.5, 0.5, 1.0]\n",
      "10:1: observer.response.table: number 3", "strictly increasing"},
-    {"[observer.intrinsics]\n" PINHOLE "[observer.response]\nkind='table'\ntable=[0.1, 0.5, 1.0]\n",
+    {OPTICS "[observer.response]\nkind='table'\ntable=[0.1, 0.5, 1.0]\n",
      "10:1: observer.response.table: does not run from 0 to 1", ""},
-    {"[observer.intrinsics]\n" PINHOLE "[observer.response]\nkind='table'\ntable=[]\n",
+    {OPTICS "[observer.response]\nkind='table'\ntable=[]\n",
      "10:1: observer.response.table: does not run", "at least 2"},
-    {"[observer.intrinsics]\n" PINHOLE "[observer.response]\nkind='gamma'\ngamma=0\n",
-     "10:7: observer.response.gamma: 0", "0.1 to 10"},
+    {OPTICS "[observer.response]\nkind='gamma'\ngamma=0\n", "10:7: observer.response.gamma: 0",
+     "0.1 to 10"},
     // r = t - 0.2 t^3 stops growing at t = sqrt(1 / 0.6) = 73.97 degrees.
     {"[light_camera.intrinsics]\nmax_angle_deg=90\nk=[-0.2,0,0,0]\n" FISHEYE POSE,
      "3:1: light_camera.intrinsics.k: the lens model folds back at 73.9 degrees", "max_angle_deg"},
@@ -340,53 +330,44 @@ const Mistake files[] = {
 INSTANTIATE_TEST_SUITE_P(Files, SetMistake, testing::ValuesIn(files));
 
 TEST(SetProblems, AreToldTogetherInTheOrderOfTheirLines) {
-  const auto problems = problems_of(
-      "[quality]\n"
-      "samples = -3\n"
-      "sclae = 1.0\n"
-      "[[light]]\n"
-      "type = 'spot'\n"
-      "[observer]\n"
-      "driver = 'gopro'\n"
-      "[[tag]]\n",
-      "stage.toml");
-  const std::vector<std::string> starts = {
-      "stage.toml:2:11: quality.samples: ", "stage.toml:3:1: quality.sclae: ",
-      "stage.toml:4:1: light.emission: ",   "stage.toml:4:1: light.position_m: ",
-      "stage.toml:4:1: light.direction: ",  "stage.toml:7:10: observer.driver: ",
-      "stage.toml:8:1: tag.id: ",           "stage.toml:8:1: tag.size_m: ",
-      "stage.toml:8:1: tag.position_m: "};
-  ASSERT_EQ(problems.size(), starts.size()) << testing::PrintToString(problems);
-  for (std::size_t i = 0; i < starts.size(); ++i)
-    EXPECT_TRUE(problems[i].starts_with(starts[i])) << problems[i];
+  const char* set = R"([quality]
+samples = -3
+sclae = 1.0
+[[light]]
+type = 'spot'
+[observer]
+driver = 'gopro'
+[[tag]]
+)";
+  EXPECT_THAT(
+      problems_of(set, "set"),
+      ElementsAre(StartsWith("set:2:11: quality.samples: "), StartsWith("set:3:1: quality.sclae: "),
+                  StartsWith("set:4:1: light.emission: "),
+                  StartsWith("set:4:1: light.position_m: "),
+                  StartsWith("set:4:1: light.direction: "),
+                  StartsWith("set:7:10: observer.driver: "), StartsWith("set:8:1: tag.id: "),
+                  StartsWith("set:8:1: tag.size_m: "), StartsWith("set:8:1: tag.position_m: ")));
 }
 
 TEST(SetProblems, OfAnOverlayNameItsFileAndItsLines) {
-  const auto problems = [](const std::string& own, const std::string& overlay) -> std::string {
-    try {
+  const auto problems = [](const std::string& own, const std::string& overlay) {
+    return test::error_of([&] {
       parse_set(own, "stage.toml", {}, Origin::crew, Overlay{"live.toml", overlay});
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "none";
+    });
   };
-  EXPECT_EQ(problems("[quality]\nsamples = 4", "[quality]\nsamples = 5\n"), "none");
-  const std::string two = problems("[quality]\nsamples = 0\n", "\n[quality]\nfps = -1\n");
-  EXPECT_TRUE(two.starts_with("stage.toml:2:11: quality.samples: 0 is not")) << two;
-  EXPECT_THAT(two, HasSubstr("\nlive.toml:3:7: quality.fps: -1 is not"));
-  EXPECT_TRUE(problems("", "[quality]\nfsp = 1\n").starts_with("live.toml:2:1: quality.fsp: "));
-  EXPECT_TRUE(problems("", "[quality\n").starts_with("live.toml:1:9: not valid TOML"));
-  const std::string other = problems("", "[[tag]]\nid = 1\n");
-  EXPECT_TRUE(other.starts_with("live.toml:1:3: tag: belongs in the set file")) << other;
+  EXPECT_EQ(problems("[quality]\nsamples = 4", "[quality]\nsamples = 5\n"), "");
+  EXPECT_THAT(problems("[quality]\nsamples = 0\n", "\n[quality]\nfps = -1\n"),
+              AllOf(StartsWith("stage.toml:2:11: quality.samples: 0 is not"),
+                    HasSubstr("\nlive.toml:3:7: quality.fps: -1 is not")));
+  EXPECT_THAT(problems("", "[quality]\nfsp = 1\n"), StartsWith("live.toml:2:1: quality.fsp: "));
+  EXPECT_THAT(problems("", "[quality\n"), StartsWith("live.toml:1:9: not valid TOML"));
+  EXPECT_THAT(problems("", "[[tag]]\nid = 1\n"),
+              StartsWith("live.toml:1:3: tag: belongs in the set file"));
 }
 
 TEST(SetProblems, NameAFileThatCannotBeRead) {
-  try {
-    load_set("no/such/stage.toml");
-    FAIL();
-  } catch (const Error& error) {
-    EXPECT_TRUE(std::string(error.what()).starts_with("no/such/stage.toml: ")) << error.what();
-  }
+  EXPECT_THAT(test::error_of([] { load_set("no/such/stage.toml"); }),
+              StartsWith("no/such/stage.toml: "));
 }
 
 }  // namespace previz::set::problems_test

@@ -3,20 +3,17 @@
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/set/table.hpp"
+#include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::set::reference_test {
 
 const std::filesystem::path config = std::filesystem::path(PREVIZ_SOURCE_DIR) / "config";
 
-std::string contents(const std::filesystem::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
+using session::content_of;
 
 TEST(SetReference, IsTheCommittedFile) {
-  EXPECT_EQ(contents(config / "reference.toml"), reference_toml())
+  EXPECT_EQ(content_of(config / "reference.toml"), reference_toml())
       << "config/reference.toml is stale: write it again with `ninja reference`";
 }
 
@@ -106,17 +103,10 @@ TEST(SetReference, ExamplesAreOfTheRightKind) {
   std::string text;
   for (std::string line; std::getline(lines, line); text += line + '\n')
     if (line.size() > 1 && line[0] == '#' && line[1] != ' ') line.erase(0, 1);
-  try {
-    parse_set(text, "reference.toml");
-    FAIL() << "contradicting forms were taken";
-  } catch (const Error& error) {
-    std::istringstream problems(error.what());
-    for (std::string line; std::getline(problems, line);) {
-      EXPECT_THAT(line, Not(HasSubstr("is not allowed")));
-      EXPECT_THAT(line, Not(HasSubstr("unknown")));
-      EXPECT_THAT(line, Not(HasSubstr("not valid TOML")));
-    }
-  }
+  const std::string problems = test::error_of([&] { parse_set(text, "reference.toml"); });
+  EXPECT_NE(problems, "") << "contradicting forms were taken";
+  for (const char* words : {"is not allowed", "unknown", "not valid TOML"})
+    EXPECT_THAT(problems, Not(HasSubstr(words)));
 }
 
 const auto example_file = config / "set.example.toml";
@@ -129,7 +119,7 @@ Set example(const std::string& text) {
 }
 
 TEST(SetExample, Parses) {
-  const Set set = example(contents(example_file));
+  const Set set = example(content_of(example_file));
   EXPECT_EQ(set.tracking.tags.size(), 3u);
   EXPECT_EQ(set.objects.size(), 3u);
   ASSERT_EQ(set.lights.size(), 3u);
@@ -143,7 +133,7 @@ TEST(SetExample, Parses) {
 
 // A crew that copies it has cameras, a screen, buttons, and a picture that keeps up with them.
 TEST(SetExample, IsALiveSet) {
-  const Set set = example(contents(example_file));
+  const Set set = example(content_of(example_file));
   EXPECT_NE(set.observer.driver, replay_driver);
   EXPECT_NE(set.light_camera.driver, replay_driver);
   EXPECT_GT(set.light_camera.camera.bracket_s.size(), 1u);
@@ -156,7 +146,7 @@ TEST(SetExample, IsALiveSet) {
 
 // Its commented alternative: a recorded take in the cameras' place.
 TEST(SetExample, CanReplayATake) {
-  std::string text = contents(example_file);
+  std::string text = content_of(example_file);
   ASSERT_THAT(text, HasSubstr("# driver = \"replay\"\n# device = \"takes/12A_take003\"\n"));
   const auto replayed = [&](const char* first, const char* behind) {
     const std::size_t begin = text.find(first), end = text.find(behind);

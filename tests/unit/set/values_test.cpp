@@ -18,6 +18,11 @@ Set parse(const std::string& text) {
   return parse_set(text, "folder/stage.toml");
 }
 
+// The only tag of a set, with these keys.
+Tag tag_of(const std::string& keys) {
+  return parse("[[tag]]\nid = 1\n" + keys).tracking.tags.at(0);
+}
+
 TEST(SetValues, EmptyFileIsTheDefaults) {
   const auto set = parse("");
   EXPECT_EQ(set.name, "stage");
@@ -36,28 +41,16 @@ TEST(SetValues, AFolderIsTheSameWithASlashAtItsEnd) {
 }
 
 TEST(SetValues, StepsOfThePreviewStayInTheirOrder) {
-  const auto set = parse(R"(
-[quality]
-fps = 25
-[[quality.preview]]
-samples = 4
-denoise = false
-[[quality.preview]]
-scale = 0.5
-)");
+  const auto set =
+      parse("quality = {fps = 25, preview = [{samples = 4, denoise = false}, {scale = 0.5}]}");
   EXPECT_EQ(set.quality.fps, 25);
   EXPECT_EQ(set.quality.steps, (std::vector<PreviewStep>{{4, 1, false}, {1, 0.5, {}}}));
 }
 
 TEST(SetValues, AnOverlayReplacesKeysAndAllStepsTogether) {
   const char* own = R"(
-[quality]
-fps = 25
-samples = 8
-[[quality.preview]]
-samples = 4
-[estimator]
-max_depth = 5
+quality = {fps = 25, samples = 8, preview = [{samples = 4}]}
+estimator = {max_depth = 5}
 )";
   const Overlay with{"live.toml",
                      "[quality]\nfps = 50\n[[quality.preview]]\nscale = 0.5\n"
@@ -75,22 +68,9 @@ TEST(SetValues, AreInUnitsOfTheStructs) {
   const auto set = parse(R"(
 [observer]
 exposure = 2
-[observer.intrinsics]
-width = 640
-height = 480
-fx = 612
-fy = 613.5
-cx = 319.5
-cy = 239.5
-k1 = -0.1
-[observer.lens]
-focal_length_mm = 35
-f_number = 2.8
-focus_distance_m = 1.25
-[observer.response]
-kind = "table"
-table = [0, 0.25, 1]
-responsivity = 3.5
+intrinsics = {width = 640, height = 480, fx = 612, fy = 613.5, cx = 319.5, cy = 239.5, k1 = -0.1}
+lens = {focal_length_mm = 35, f_number = 2.8, focus_distance_m = 1.25}
+response = {kind = "table", table = [0, 0.25, 1], responsivity = 3.5}
 [light_camera.intrinsics]
 width = 512
 height = 512
@@ -101,12 +81,9 @@ cy = 255.5
 k = [0.01, 0, 0, 0]
 max_angle_deg = 100
 vignetting = [-0.05, 0, 0.001]
-[light_camera.response]
-kind = "gamma"
-gamma = 2.4
-dark_level = [0.01, 0.02, 0.01]
-[light_camera.pose]
-position_m = [1, 2, 3]
+[light_camera]
+response = {kind = "gamma", gamma = 2.4, dark_level = [0.01, 0.02, 0.01]}
+pose = {position_m = [1, 2, 3]}
 [lighting]
 environment_rotation_deg = -90
 unseen = "constant"
@@ -203,9 +180,8 @@ TEST(SetValues, SetsOfSessionsNameFilesOfTheirOwnFolderOnly) {
 }
 
 TEST(SetValues, RotationTurnsAboutWorldXThenYThenZ) {
-  const auto set =
-      parse("[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [1, 2, 3]\nrotation_deg = [90, 0, 90]\n");
-  const auto& m = set.tracking.tags.at(0).world_from_tag;
+  const auto m =
+      tag_of("size_m = 0.1\nposition_m = [1, 2, 3]\nrotation_deg = [90, 0, 90]\n").world_from_tag;
   // X turns nothing of the tag's right; Z then turns it to +Y. Up goes to +Z and stays there. Out
   // of the paper goes to -Y and on to +X.
   expect_near(m[0], {0, 1, 0, 0}, rounding);
@@ -215,18 +191,14 @@ TEST(SetValues, RotationTurnsAboutWorldXThenYThenZ) {
 }
 
 TEST(SetValues, WallTagFacesMinusY) {
-  const auto set =
-      parse("[[tag]]\nid = 1\nsize_m = 0.1\nposition_m = [0, 0, 1]\nrotation_deg = [90, 0, 0]\n");
-  expect_near(set.tracking.tags.at(0).world_from_tag[2], {0, -1, 0, 0}, rounding);
+  const Tag tag = tag_of("size_m = 0.1\nposition_m = [0, 0, 1]\nrotation_deg = [90, 0, 0]\n");
+  expect_near(tag.world_from_tag[2], {0, -1, 0, 0}, rounding);
 }
 
 TEST(SetValues, MatricesAreRowMajor) {
-  const auto set = parse(
-      "[[tag]]\nid = 1\nsize_m = 0.1\n"
-      "world_from_tag = [[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]\n"
-      "[[tag]]\nid = 2\nsize_m = 0.1\n"
-      "world_from_tag = [0, -1, 0, 1,  1, 0, 0, 2,  0, 0, 1, 3,  0, 0, 0, 1]\n");
-  for (const auto& tag : set.tracking.tags) {
+  for (const char* matrix : {"[[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]",
+                             "[0, -1, 0, 1,  1, 0, 0, 2,  0, 0, 1, 3,  0, 0, 0, 1]"}) {
+    const Tag tag = tag_of("size_m = 0.1\nworld_from_tag = " + std::string(matrix));
     expect_near(tag.world_from_tag[0], {0, 1, 0, 0}, 0);
     expect_near(tag.world_from_tag[3], {1, 2, 3, 1}, 0);
   }
@@ -235,20 +207,17 @@ TEST(SetValues, MatricesAreRowMajor) {
 // A pose typed with 4 digits is off by up to 5e-5 an entry: taken, and made exactly rigid, moving
 // no entry by more than the error that was tolerated.
 TEST(SetValues, RoundedPosesBecomeExactlyRigid) {
-  const auto set = parse(
-      "[[tag]]\nid = 1\nsize_m = 0.1\n"
+  const Tag tag = tag_of(
+      "size_m = 0.1\n"
       "world_from_tag = [[0.8660, -0.5, 0, 0], [0.5, 0.8660, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n");
-  const auto& m = set.tracking.tags.at(0).world_from_tag;
+  const auto& m = tag.world_from_tag;
   EXPECT_LT(rigidity_error(m), rounding);
   EXPECT_NEAR(m[0][0], 0.8660, rigid_tolerance);
   EXPECT_NEAR(m[0][1], 0.5, rigid_tolerance);
 }
 
 TEST(SetValues, CornersGiveSizeAndPose) {
-  const auto set = parse(
-      "[[tag]]\nid = 1\n"
-      "corners_m = [[1, 0, 2.0], [1, 0.1, 2.0], [1, 0.1, 2.1], [1, 0, 2.1]]\n");
-  const auto& tag = set.tracking.tags.at(0);
+  const Tag tag = tag_of("corners_m = [[1, 0, 2.0], [1, 0.1, 2.0], [1, 0.1, 2.1], [1, 0, 2.1]]\n");
   EXPECT_NEAR(tag.size_m, 0.1, rounding);
   expect_near(tag.world_from_tag[0], {0, 1, 0, 0}, rounding);
   expect_near(tag.world_from_tag[1], {0, 0, 1, 0}, rounding);
@@ -260,10 +229,9 @@ TEST(SetValues, CornersGiveSizeAndPose) {
 // e off; the fitted side is a mean of four differences, at most 2e off.
 TEST(SetValues, MeasuredCornersAreFitted) {
   constexpr double e = 0.001;
-  const auto set = parse(
-      "[[tag]]\nid = 1\nsize_m = 0.1\n"
+  const Tag tag = tag_of(
+      "size_m = 0.1\n"
       "corners_m = [[0.001, 0, 0], [0.1, 0.001, 0], [0.1, 0.1, 0.001], [0, 0.099, 0]]\n");
-  const auto& tag = set.tracking.tags.at(0);
   EXPECT_EQ(tag.size_m, 0.1);  // what was measured along the edge wins
   EXPECT_LT(rigidity_error(tag.world_from_tag), rounding);
   expect_near(tag.world_from_tag[3], {0.05, 0.05, 0, 1}, e);
@@ -271,24 +239,24 @@ TEST(SetValues, MeasuredCornersAreFitted) {
 
 TEST(SetValues, FilesAreRelativeToTheSetAndAssetsStandIn) {
   test::TemporaryDirectory directory;
-  std::filesystem::create_directories(directory.path() / "assets");
-  std::ofstream(directory.path() / "vase.glb") << "glTF";
-  std::ofstream(directory.path() / "assets" / "abc.glb") << "glTF";
-  const auto file = directory.path() / "stage.toml";
+  std::filesystem::create_directories(directory / "assets");
+  std::ofstream(directory / "vase.glb") << "glTF";
+  std::ofstream(directory / "assets/abc.glb") << "glTF";
+  const auto file = directory / "stage.toml";
   const std::string text =
       "[observer]\ndevice = 'takes/1'\n"
       "[[object]]\nname = 'vase'\nfile = 'vase.glb'\npresence = 'removed'\n"
       "position_m = [1, 0, 0]\nrotation_deg = [0, 0, 90]\nscale = 2\n";
   const auto set = parse_set(text, file);
-  EXPECT_EQ(set.objects.at(0).file, directory.path() / "vase.glb");
+  EXPECT_EQ(set.objects.at(0).file, directory / "vase.glb");
   EXPECT_EQ(set.objects[0].file_as_written, "vase.glb");
   EXPECT_EQ(set.objects[0].presence, Presence::removed);
   expect_near(set.objects[0].world_from_file[0], {0, 2, 0, 0}, rounding);
   expect_near(set.objects[0].world_from_file[3], {1, 0, 0, 1}, rounding);
-  EXPECT_EQ(set.observer.device, (directory.path() / "takes/1").string());
+  EXPECT_EQ(set.observer.device, (directory / "takes/1").string());
 
   const auto replayed = parse_set(text, file, {{"vase.glb", "assets/abc.glb"}});
-  EXPECT_EQ(replayed.objects.at(0).file, directory.path() / "assets" / "abc.glb");
+  EXPECT_EQ(replayed.objects.at(0).file, directory / "assets/abc.glb");
   EXPECT_EQ(replayed.objects[0].file_as_written, "vase.glb");
 }
 
@@ -305,28 +273,11 @@ TEST(SetValues, RectangleGetsAnUpAcrossItsDirection) {
 // A stick with one tag, which is its frame, and a tray with two.
 TEST(SetValues, CarriersAreWhatTagsAreStuckTo) {
   const auto set = parse(R"(
-[[tag]]
-id = 1
-size_m = 0.08
-position_m = [0, 0, 0]
-[[tag]]
-id = 5
-size_m = 0.05
-carrier = "stick"
-[[tag]]
-id = 6
-size_m = 0.05
-carrier = "tray"
-position_m = [0.1, 0, 0]
-[[tag]]
-id = 7
-carrier = "tray"
-corners_m = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-[[light]]
-type = "point"
-emission = [1, 1, 1]
-position_m = [0, 0, 0.1]
-carrier = "stick"
+tag = [{id = 1, size_m = 0.08, position_m = [0, 0, 0]},
+       {id = 5, size_m = 0.05, carrier = "stick"},
+       {id = 6, size_m = 0.05, carrier = "tray", position_m = [0.1, 0, 0]},
+       {id = 7, carrier = "tray", corners_m = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]}]
+light = [{type = "point", emission = [1, 1, 1], position_m = [0, 0, 0.1], carrier = "stick"}]
 )");
   ASSERT_EQ(set.tracking.tags.size(), 1u);
   ASSERT_EQ(set.tracking.carriers.size(), 2u);
