@@ -249,30 +249,6 @@ scene::Scene furnace_sphere(double radius_m, int subdivisions, const scene::Mate
   return scene;
 }
 
-scene::Scene cornell_box() {
-  scene::Scene scene;
-  const std::uint32_t white = add_material(scene, diffuse({0.73f, 0.73f, 0.73f}));
-  const std::uint32_t red = add_material(scene, diffuse({0.63f, 0.065f, 0.05f}));
-  const std::uint32_t green = add_material(scene, diffuse({0.14f, 0.45f, 0.091f}));
-  const std::uint32_t lamp = add_material(scene, emitter({15, 12, 8}));
-  const std::uint32_t square = add_mesh(scene, rectangle_mesh({1, 1}));
-  const std::uint32_t lamp_square = add_mesh(scene, rectangle_mesh({0.4, 0.4}));
-  const auto place = [](const glm::dvec3& where, double angle, const glm::dvec3& axis) {
-    return glm::rotate(at(where), angle, axis);
-  };
-  const glm::dvec3 x(1, 0, 0), y(0, 1, 0), z(0, 0, 1);
-  add_instance(scene, square, white, place({0, 0, 0}, 0, x));
-  add_instance(scene, square, white, place({0, 0, 1}, pi, x));
-  add_instance(scene, square, white, place({0, 0.5, 0.5}, pi / 2, x));
-  add_instance(scene, square, red, place({-0.5, 0, 0.5}, pi / 2, y));
-  add_instance(scene, square, green, place({0.5, 0, 0.5}, -pi / 2, y));
-  add_instance(scene, lamp_square, lamp, place({0, 0, 0.999}, pi, x));
-  // Both boxes sink a millimetre into the floor.
-  add(scene, box_mesh({0.3, 0.3, 0.6}), white, place({-0.18, 0.18, 0.299}, 0.3, z));
-  add(scene, box_mesh({0.3, 0.3, 0.3}), white, place({0.2, -0.15, 0.149}, -0.3, z));
-  return scene;
-}
-
 set::Light lamp(set::LightType type, const glm::dvec3& emission) {
   set::Light light;
   light.name = "lamp";

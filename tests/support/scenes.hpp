@@ -1,5 +1,5 @@
 // Scenes made by code for tests of the renderer and of the CPU tracer: simple shapes, closed
-// furnaces, a Cornell-like box and whole random sets. World space, Z up, metres.
+// furnaces and whole random sets. World space, Z up, metres.
 #pragma once
 
 #include <cstdint>
@@ -58,9 +58,6 @@ scene::Scene facing_planes(double side_m, double gap_m, const scene::Material& l
 // 0.99 and 1 times the one given at 3 subdivisions.
 scene::Scene furnace_box(const glm::dvec3& size, const scene::Material& wall);
 scene::Scene furnace_sphere(double radius_m, int subdivisions, const scene::Material& wall);
-// The unit box [-0.5, 0.5]^2 x [0, 1], open towards -Y: white floor, ceiling and back, red wall at
-// -X, green wall at +X, a square emitter of side 0.4 just below the ceiling, two white boxes.
-scene::Scene cornell_box();
 
 // Lamps that are there in both worlds.
 set::Light lamp(set::LightType type, const glm::dvec3& emission = glm::dvec3(1));

@@ -1,10 +1,9 @@
-// Which types the numbers of a glTF file may have, and what colours of vertices are.
-#include "daemon/scene/gltf_accessor.hpp"
+// Which types the numbers of a glTF file may have.
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::gltf_components_test {
 
-constexpr int byte = 5120, ubyte = 5121, short_ = 5122, ushort_ = 5123, uint_ = 5125;
+constexpr int byte = 5120, ubyte = 5121, short_ = 5122, ushort_ = 5123, uint_ = 5125, float_ = 5126;
 
 class GltfComponents : public GltfTest {
  protected:
@@ -62,36 +61,18 @@ TEST_F(GltfComponents, OfAnimationsAreFloatsOrNormalized) {
                                          "normalized integers of 1 or 2 bytes"));
 }
 
-// The colours that an accessor of these bytes stands for.
-std::vector<glm::vec4> read(const std::vector<unsigned char>& bytes, int component_type, int type,
-                            bool normalized) {
-  tinygltf::Model model;
-  model.buffers.emplace_back().data = bytes;
-  tinygltf::BufferView& view = model.bufferViews.emplace_back();
-  view.buffer = 0;
-  view.byteLength = bytes.size();
-  tinygltf::Accessor& accessor = model.accessors.emplace_back();
-  accessor.bufferView = 0;
-  accessor.componentType = component_type;
-  accessor.type = type;
-  accessor.normalized = normalized;
-  accessor.count = 1;
-  return scene::read_colors(model, 0, "colours");
-}
+using VertexColors = GltfComponents;
 
-TEST(VertexColors, AreReadOfEveryTypeThatGltfHasForThem) {
-  const auto floats = GltfWriter::bytes_of(std::vector<float>{0.25f, 2, 0.5f});
-  EXPECT_THAT(read(floats, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC3, false),
-              ElementsAre(glm::vec4(0.25f, 2, 0.5f, 1)));
-  const auto words = GltfWriter::bytes_of(std::vector<std::uint16_t>{65535, 0, 65535, 0});
-  EXPECT_THAT(read(words, TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT, TINYGLTF_TYPE_VEC4, true),
-              ElementsAre(glm::vec4(1, 0, 1, 0)));
-  for (const bool normalized : {true, false})
-    EXPECT_THAT(read({255, 0, 51, 0}, TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE, TINYGLTF_TYPE_VEC4,
-                     normalized),
-                ElementsAre(glm::vec4(1, 0, 0.2f, 0)));
-  EXPECT_THROW(read({1, 2, 3}, TINYGLTF_COMPONENT_TYPE_BYTE, TINYGLTF_TYPE_VEC3, true), Error);
-  EXPECT_THROW(read(floats, TINYGLTF_COMPONENT_TYPE_FLOAT, TINYGLTF_TYPE_VEC2, false), Error);
+TEST_F(VertexColors, AreReadOfEveryTypeThatGltfHasForThem) {
+  const std::vector<std::uint8_t> violet = {255, 0, 51, 0, 255, 0, 51, 0, 255, 0, 51, 0};
+  for (const bool normalized : {true, false}) {
+    triangle<std::uint8_t>("COLOR_0", ubyte, "VEC4", violet, normalized);
+    EXPECT_EQ(load().meshes[0].colors[0], glm::vec4(1, 0, 0.2f, 0)) << normalized;
+  }
+  triangle<std::int8_t>("COLOR_0", byte, "VEC3", std::vector<std::int8_t>(12, 1), true);
+  EXPECT_NE(error(), "");
+  triangle<float>("COLOR_0", float_, "VEC2", std::vector<float>(12, 1), false);
+  EXPECT_NE(error(), "");
 }
 
 }  // namespace previz::test::gltf_components_test

@@ -132,13 +132,6 @@ TEST_F(GltfMaterials, ColourInsideOfGlassIsPerMetre) {
   EXPECT_TRUE(std::isfinite(sigma.b) && sigma.b > 100);  // black is finite, and leaves nothing
 }
 
-TEST_F(GltfMaterials, ReadsLacquer) {
-  const scene::Material m = loaded(with(
-      "KHR_materials_clearcoat", {{"clearcoatFactor", 0.5}, {"clearcoatRoughnessFactor", 0.25}}));
-  EXPECT_EQ(m.clearcoat, 0.5f);
-  EXPECT_EQ(m.clearcoat_roughness, 0.25f);
-}
-
 TEST_F(GltfMaterials, ReadsSheen) {
   const auto sheen_of = [](Json sheen) { return with("KHR_materials_sheen", std::move(sheen)); };
   const scene::Material m =

@@ -115,25 +115,15 @@ TEST(Placement, AnimatesBeforeItMoves) {
   EXPECT_EQ(placement.lights[0].gain_mixed, 0);
 }
 
-TEST(Placement, DimmingIsOfTheMixedWorldOnly) {
+// Two lamps, one of each world, would share no sample, and their difference would be all noise.
+TEST(Placement, ARealLampThatIsDimmedAndTintedStaysOneLamp) {
   Stage stage;
   stage.state.lights["key"] = state_of(stage.set.lights[0]);
   stage.state.lights["key"]->gain_mixed = 0.25;
-  const Placement placement = stage.placed();
-  ASSERT_EQ(placement.lights.size(), 2u);
-  EXPECT_EQ(placement.lights[1].gain_mixed, 0.25);
-  EXPECT_EQ(placement.lights[1].gain_real, 1);
-  EXPECT_EQ(placement.lights[1].emission, stage.set.lights[0].emission);
-}
-
-// Two lamps, one of each world, would share no sample, and their difference would be all noise.
-TEST(Placement, ATintedRealLampStaysOneLamp) {
-  Stage stage;
-  stage.state.lights["key"] = state_of(stage.set.lights[0]);
   stage.state.lights["key"]->tint = {2, 1, 0.5};
   const Placement placement = stage.placed();
   ASSERT_EQ(placement.lights.size(), 2u);
-  EXPECT_EQ(placement.lights[1].gain_mixed, 1);
+  EXPECT_EQ(placement.lights[1].gain_mixed, 0.25);
   EXPECT_EQ(placement.lights[1].tint, glm::dvec3(2, 1, 0.5));
   EXPECT_EQ(placement.lights[1].gain_real, 1);
   EXPECT_EQ(placement.lights[1].emission, stage.set.lights[0].emission);
