@@ -248,11 +248,6 @@ TEST(Yuv, PlanesThatLieApartAreJoinedWithoutWhatFollowsTheirLastRows) {
 
 // ---- plain samples
 
-TEST(Mono, EightBitsAreCopied) {
-  EXPECT_EQ(converted(plain(Layout::mono), 3, 2, {1, 2, 3, 4, 5, 255}).bytes,
-            (Bytes{1, 2, 3, 4, 5, 255}));
-}
-
 TEST(Mono, EveryCodeOfEveryDepthStaysApartAndOnTheLine) {
   for (int bits = 9; bits <= 16; ++bits) {
     const int codes = 1 << bits;

@@ -70,19 +70,6 @@ TEST(Frame, Bt709ReferenceValues) {
   EXPECT_EQ(rgb_of_yuv(255, 128, 128), (Rgb{255, 255, 255}));  // above white
 }
 
-// Chroma sits on the even columns and is linear between them; the last odd column repeats.
-TEST(Frame, ChromaIsInterpolated) {
-  const auto red_of = [](double cr) {
-    return static_cast<int>(std::lround(255.0 * (110.0 / 219.0 + 1.5748 * (cr - 128.0) / 224.0)));
-  };
-  const Plate plate =
-      to_plate(frame_of(PixelFormat::yuv422p8, 4, 1, {126, 126, 126, 126, 128, 128, 100, 131}));
-  EXPECT_EQ(plate.samples[0], red_of(100));
-  EXPECT_EQ(plate.samples[3], red_of(115.5));
-  EXPECT_EQ(plate.samples[6], red_of(131));
-  EXPECT_EQ(plate.samples[9], red_of(131));
-}
-
 TEST(Frame, OddWidthsOfYuv) {
   const Plate plate =
       to_plate(frame_of(PixelFormat::yuv422p8, 1, 2, {235, 16, 128, 128, 128, 128}));
