@@ -1,11 +1,8 @@
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
 extern "C" {
 #include <libavformat/avformat.h>
 }
 
+#include "tests/support/child_process.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 
@@ -352,25 +349,16 @@ TEST_F(Damage, FilesThatAreEmptyOrGone) {
 // The child says so after each frame it has written; then it is killed in the middle of its work.
 TEST_F(Damage, AKilledRecordingKeepsEveryWrittenFrame) {
   const std::filesystem::path take = whole().parent_path() / "killed";
-  int ends[2];
-  ASSERT_EQ(::pipe(ends), 0);
-  const pid_t child = ::fork();
-  if (child == 0) {
+  test::ChildProcess recording([&](int tells) {
     SessionWriter writer(take, {});
     for (std::uint64_t i = 0;; ++i) {
       writer.write(noise_frame("observer", i, PixelFormat::rgb8, 64, 48));
-      if (::write(ends[1], "f", 1) != 1) ::_exit(1);
+      test::tell(tells, i + 1);
     }
-  }
-  char report = 0;
+  });
   std::uint64_t written = 0;
-  while (written < 20 && ::read(ends[0], &report, 1) == 1) ++written;
-  ::kill(child, SIGKILL);
-  int status = 0;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  ::close(ends[0]);
-  ::close(ends[1]);
-  ASSERT_EQ(written, 20u);
+  while (written < 20) ASSERT_TRUE(recording.is_told(written));
+  recording.kill();
 
   Session session = open_session(take);
   EXPECT_TRUE(mentions(session.missing, "was not closed"));

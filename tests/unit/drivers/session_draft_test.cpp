@@ -1,12 +1,10 @@
 // Drafts are nobody else's files, and those of dead processes go.
 #include "drivers/session/draft.hpp"
 
-#include <fcntl.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "drivers/session/session.hpp"
+#include "tests/support/child_process.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
@@ -83,28 +81,22 @@ TEST(Draft, KeepsTheModeOfWhatItReplaces) {
 // A process makes a file and a folder, and is killed.
 TEST(Draft, OfADeadProcessIsRemovedAndNoOther) {
   const test::TemporaryDirectory directory;
-  int says[2];
-  ASSERT_EQ(::pipe(says), 0);
-  const pid_t child = ::fork();
-  if (child == 0) {
+  test::ChildProcess child([&](int tells) {
     const Draft draft(directory / "0001.exr");
     const DraftFolder folder(directory / "K_take003");
     std::ofstream(folder.path() / "observer.mkv") << "some frames";
-    static_cast<void>(!::write(says[1], "x", 1));
+    test::tell(tells, true);
     for (;;) ::pause();
-  }
-  char made = 0;
-  ASSERT_EQ(::read(says[0], &made, 1), 1);
+  });
+  bool has_made_them = false;
+  ASSERT_TRUE(child.is_told(has_made_them));
   const Draft own(directory / "own.exr");
   std::ofstream(directory / "frames.part") << "of somebody else";
   EXPECT_TRUE(remove_dead_drafts(directory.path()).empty()) << "the child lives";
-  ::kill(child, SIGKILL);
-  ASSERT_EQ(::waitpid(child, nullptr, 0), child);
+  child.kill();
   EXPECT_EQ(remove_dead_drafts(directory.path()).size(), 2u);
   EXPECT_EQ(files_in(directory), 2);
   EXPECT_TRUE(fs::exists(own.path()));
-  ::close(says[0]);
-  ::close(says[1]);
 }
 
 TEST(DraftFolder, GetsItsNameWhereNothingIs) {

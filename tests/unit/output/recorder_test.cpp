@@ -1,12 +1,8 @@
 // Takes: every frame is in them or counted, whatever happens to process and disk.
 #include "daemon/output/recorder.hpp"
 
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <csignal>
-
 #include "drivers/bracket.hpp"
+#include "tests/support/child_process.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
@@ -210,39 +206,29 @@ TEST(Recorder, MarksTheRunningTakeOrTheLast) {
   EXPECT_TRUE(session::open_session(directory / "12A_take002").info.take->good);
 }
 
-TEST(Recorder, AnotherFormatBeginsTheNextTake) {
-  const TemporaryDirectory directory;
-  {
-    Recorder recorder(options_in(directory.path()));
-    recorder.start();
-    recorder.offer(picture(0));
-    recorder.offer(picture(1, "observer", 40));
-    recorder.offer(picture(2, "observer", 40));
-  }
-  EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, 0));
-  EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(1, 2));
+FramePtr mosaic(std::uint64_t index, BayerPattern bayer) {
+  auto frame = std::make_shared<Frame>(noise_frame("observer", index, PixelFormat::gray8, 32, 24));
+  frame->bayer = bayer;
+  return frame;
 }
 
-TEST(Recorder, AnotherBayerPatternBeginsTheNextTake) {
-  const TemporaryDirectory directory;
-  const auto mosaic = [](std::uint64_t index, BayerPattern bayer) {
-    auto frame =
-        std::make_shared<Frame>(noise_frame("observer", index, PixelFormat::gray8, 32, 24));
-    frame->bayer = bayer;
-    return frame;
-  };
-  {
+TEST(Recorder, AnotherSizeOrBayerPatternBeginsTheNextTake) {
+  for (const auto& [one, other] :
+       {std::pair(picture(0), picture(1, "observer", 40)),
+        std::pair(mosaic(0, BayerPattern::rggb), mosaic(1, BayerPattern::none))}) {
+    const TemporaryDirectory directory;
     Recorder recorder(options_in(directory.path()));
     recorder.start();
-    recorder.offer(mosaic(0, BayerPattern::rggb));
-    recorder.offer(mosaic(1, BayerPattern::none));
+    recorder.offer(one);
+    recorder.offer(other);
     ASSERT_TRUE(wait_until("the second take has a frame", [&] {
       return recorder.status().frames == 1 && recorder.status().number == 2;
     }));
     EXPECT_EQ(recorder.status().failures, 0u);
+    end_take(recorder);
+    EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, 0));
+    EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(1, 1));
   }
-  EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, 0));
-  EXPECT_EQ(frames_of(directory / "12A_take002"), count_from(1, 1));
 }
 
 // Room for three frames: what the disk cannot take in time is counted, and the rest is whole.
@@ -381,29 +367,20 @@ TEST(RecorderDeath, AKilledProcessKeepsEveryFrameThatItCounted) {
   struct Report {
     std::uint64_t offered = 0, counted = 0;
   };
-  int reports[2];
-  ASSERT_EQ(pipe(reports), 0);
-  const pid_t child = fork();
-  ASSERT_GE(child, 0);
-  if (child == 0) {
+  test::ChildProcess recording([&](int tells) {
     Recorder recorder(options_in(directory.path()));
     recorder.start();
     for (std::uint64_t i = 0;; ++i) {
       recorder.offer(picture(i));
       recorder.offer(track_of(i));
-      const Report report{i, recorder.status().frames};
-      if (write(reports[1], &report, sizeof report) != sizeof report) _exit(1);
+      test::tell(tells, Report{i, recorder.status().frames});
       std::this_thread::sleep_for(std::chrono::nanoseconds(interval_ns));
     }
-  }
-  close(reports[1]);
+  });
   Report report;
-  while (report.offered < 40)
-    ASSERT_EQ(read(reports[0], &report, sizeof report), ssize_t{sizeof report});
-  ASSERT_EQ(kill(child, SIGKILL), 0);
-  waitpid(child, nullptr, 0);
-  while (read(reports[0], &report, sizeof report) == ssize_t{sizeof report}) continue;
-  close(reports[0]);
+  while (report.offered < 40) ASSERT_TRUE(recording.is_told(report));
+  recording.kill();
+  while (recording.is_told(report)) continue;
 
   const std::vector<std::uint64_t> there = frames_of(directory / "12A_take001");
   ASSERT_FALSE(there.empty());

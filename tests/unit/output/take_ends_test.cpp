@@ -139,18 +139,6 @@ TEST(Recorder, EndsATakeAndItselfWhileAFileOfTheSetCannotBeRead) {
 
 // ---- numbers, losses, and what cannot be recorded
 
-TEST(Recorder, NumbersTakesOnWhereTheFirstDiskCannotBeListed) {
-  Rig rig;
-  Recorder recorder(rig.options());
-  record_take(recorder);
-  ASSERT_TRUE(wait_for_finished(recorder, 1));
-  std::filesystem::rename(rig.first, rig.directory / "elsewhere");
-  write_content(rig.first, "no folder");
-  record_take(recorder, 1);
-  ASSERT_TRUE(wait_for_finished(recorder, 2));
-  EXPECT_EQ(recorder.status().directory, rig.second / "12A_take002");
-}
-
 // The first disk is mounted later than the service starts; the second one knows what is on it.
 TEST(Recorder, GivesNoTakeTheNameOfOneOnADiskThatIsNotThere) {
   Rig rig;
