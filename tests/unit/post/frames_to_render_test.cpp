@@ -65,22 +65,4 @@ TEST_F(FramesToRenderTest, OfALongTakeRunsOfSixteenAreTaken) {
   EXPECT_EQ(written(first, 30, 40), frames_from(32, 40));
 }
 
-TEST_F(FramesToRenderTest, AFrameThatCannotBeReadIsNobodys) {
-  const std::set<std::uint64_t> all = frames_from(0, 8);
-  for (const int neighbours : {0, 2}) {
-    FramesToRender first(one_, all, neighbours, 8), second(two_, all, neighbours, 8);
-    EXPECT_EQ(written(first, 0, 1), frames_from(0, 1));
-    first.leave_out(1);
-    EXPECT_EQ(written(first, 2, 4), frames_from(2, 4));
-    EXPECT_EQ(written(second, 0, 1), std::set<std::uint64_t>());
-    EXPECT_EQ(two_.claim(1), Claim::mine) << neighbours;
-    two_.release(1);
-    second.leave_out(1);
-    EXPECT_EQ(written(second, 2, 8), frames_from(4, 8));
-    EXPECT_FALSE(second.left().contains(1));
-    EXPECT_EQ(one_.claim(1), Claim::mine) << neighbours;
-    release(all);
-  }
-}
-
 }  // namespace previz::post::frames_to_render_test

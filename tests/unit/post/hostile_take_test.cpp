@@ -1,14 +1,13 @@
 // A take comes from elsewhere: whatever lies in its folder, nobody else's file is read or written,
 // nobody waits for ever, and what is no file is named.
 #include <sys/stat.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "daemon/output/salvage.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/post/takes.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/summary.hpp"
+#include "tests/support/child_process.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -121,22 +120,10 @@ INSTANTIATE_TEST_SUITE_P(Holds, HostileTake, testing::ValuesIn(cases()), [](cons
 
 // Returns what the action says to somebody who is not root, from whom no folder is kept.
 std::string said_to_nobody(const std::function<void(std::ostream&)>& action) {
-  int says[2];
-  if (::pipe(says) != 0) throw Error("no pipe");
-  const pid_t child = ::fork();
-  if (child == 0) {
+  return test::text_of_child([&] {
     if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(1);
-    const std::string text = said(action) + "\n";
-    ::_exit(::write(says[1], text.data(), text.size()) > 0 ? 0 : 1);
-  }
-  ::close(says[1]);
-  std::string text(4096, '\0');
-  const ssize_t count = ::read(says[0], text.data(), text.size());
-  ::close(says[0]);
-  ::waitpid(child, nullptr, 0);
-  if (count <= 0) throw Error("nothing is said");
-  text.resize(static_cast<std::size_t>(count));
-  return text;
+    return "said: " + said(action);
+  });
 }
 
 // A folder of takes that belongs to somebody else is no empty one.
@@ -169,7 +156,8 @@ TEST(TakesList, PassesOverWhatTheDiskKeepsForItself) {
     std::vector<std::string> salvaged;
     output::Salvage({disk}, [&](const std::string& what) { out << what; }).look(salvaged);
   });
-  EXPECT_THAT(said, AllOf(Not(HasSubstr("lost+found")), Not(HasSubstr("Trash"))));
+  EXPECT_THAT(said,
+              AllOf(StartsWith("said: "), Not(HasSubstr("lost+found")), Not(HasSubstr("Trash"))));
 }
 
 // What a copy that was killed left goes with the next one.
@@ -178,13 +166,11 @@ TEST(TakesCopy, RemovesWhatADeadCopyLeft) {
   test::write_small_take(directory.path());
   const fs::path disk = directory / "disk";
   fs::create_directories(disk);
-  const pid_t child = ::fork();
-  if (child == 0) {
+  test::text_of_child([&]() -> std::string {
     const session::DraftFolder draft(disk / "session");
     std::ofstream(draft.path() / "observer.mkv") << "half of it";
-    ::kill(::getpid(), SIGKILL);
-  }
-  ::waitpid(child, nullptr, 0);
+    ::_exit(1);
+  });
   EXPECT_EQ(std::distance(fs::directory_iterator(disk), {}), 1);
   std::ostringstream out;
   copy_takes({{directory / "session"}, disk}, out, {});

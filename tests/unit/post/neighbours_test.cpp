@@ -7,7 +7,6 @@
 #include "daemon/pipeline/take_shots.hpp"
 #include "daemon/post/render.hpp"
 #include "daemon/scene/load.hpp"
-#include "drivers/plate.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/test.hpp"
@@ -16,7 +15,6 @@ namespace previz::post::neighbours_test {
 
 using test::small_take_frames;
 using test::small_take_lost;
-using test::small_take_unlit;
 
 using Sums = std::map<std::string, std::string>;  // SHA-256 by the file's name
 
@@ -65,19 +63,6 @@ TEST_F(RenderNeighbours, EveryPartOfATakeHasTheFilesOfTheWhole) {
     const Sums part = sums_of(render(folder, range));
     EXPECT_EQ(part.size(), 2 * (range.last - range.first + 1));
     for (const auto& [file, sum] : part) EXPECT_EQ(sum, expected.at(file)) << file;
-  }
-}
-
-TEST_F(RenderNeighbours, WhatPassesThroughUntouchedIsNobodysNeighbour) {
-  const RenderReport report = render("out");
-  for (const FinishedFrame& frame : report.frames) {
-    const int index = static_cast<int>(frame.frame);
-    const bool untouched = index == small_take_lost || index == small_take_unlit;
-    EXPECT_EQ(frame.status == FrameStatus::untouched, untouched) << index;
-    if (untouched) {
-      EXPECT_EQ(output::read_png(directory_ / ("out/000" + std::to_string(index) + ".png")).samples,
-                to_plate(test::small_take_frame(index)).samples);
-    }
   }
 }
 

@@ -1,18 +1,13 @@
 // What a render leaves behind, and how the next one goes on from it.
 #include "daemon/post/render_directory.hpp"
 
-#include <fcntl.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <csignal>
-
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/post/render.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/child_process.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_shot.hpp"
 #include "tests/support/test.hpp"
@@ -92,6 +87,12 @@ TEST_F(RenderDirectoryTest, WritesNumberedFilesAndALineAFrame) {
   EXPECT_EQ(record->counters.rays, 1234u);
   EXPECT_EQ(record->counters.unfinished, 5u);
   EXPECT_EQ(record->counters.rebuilt_trees, 2u);
+  EXPECT_TRUE(again.rejected().empty());
+  for (const char* name : {"0007.exr", "0007.png"}) {
+    ASSERT_TRUE(record->files.contains(name));
+    EXPECT_EQ(record->files.at(name).bytes, content_of(directory_ / "out" / name).size());
+    EXPECT_EQ(record->files.at(name).sha256, session::sha256_of(directory_ / "out" / name));
+  }
 }
 
 TEST_F(RenderDirectoryTest, UntouchedFrameSaysWhyAndHasNoPose) {
@@ -143,19 +144,6 @@ TEST_F(RenderDirectoryTest, AFileThatIsNotAsItWasWrittenIsDoneAgain) {
       {"its .png has other content (SHA-256) than when it was written", {4}},
       {"it has no complete line in frames.jsonl", {5}}};
   EXPECT_EQ(again.rejected(), expected);
-}
-
-TEST_F(RenderDirectoryTest, ALineHasSizeAndHashOfItsFiles) {
-  open().write(sample_shot(7), set_);
-  const RenderDirectory again = open();
-  ASSERT_NE(again.finished(7), nullptr);
-  EXPECT_TRUE(again.rejected().empty());
-  for (const char* name : {"0007.exr", "0007.png"}) {
-    const auto& files = again.finished(7)->files;
-    ASSERT_TRUE(files.contains(name));
-    EXPECT_EQ(files.at(name).bytes, content_of(directory_ / "out" / name).size());
-    EXPECT_EQ(files.at(name).sha256, session::sha256_of(directory_ / "out" / name));
-  }
 }
 
 // Lines of a previzd that wrote no hashes: what decodes is kept, and has its hash from then on.
@@ -278,25 +266,20 @@ TEST_F(RenderDirectoryTest, ARunOfFramesIsTakenAsFarAsItIsFree) {
 TEST_F(RenderDirectoryTest, FramesOfAKilledProcessAreFreeAgain) {
   RenderDirectory directory = open();
   directory.write(sample_shot(0), set_);
-  std::array<int, 2> ready{};
-  ASSERT_EQ(::pipe(ready.data()), 0);
-  const pid_t child = ::fork();
-  if (child == 0) {
+  test::ChildProcess child([&](int tells) {
     RenderDirectory other = open();
-    const bool has_it = other.claim(3) == Claim::mine;
+    const Claim claim = other.claim(3);
     const session::Draft draft(directory_ / "out/0003.exr");
     std::ofstream(directory_ / "out/frames.jsonl", std::ios::app) << R"({"frame":3,"ti)";
-    [[maybe_unused]] const ssize_t sent = ::write(ready[1], has_it ? "y" : "n", 1);
+    test::tell(tells, claim);
     for (;;) ::pause();
-  }
-  char answer = 0;
-  ASSERT_EQ(::read(ready[0], &answer, 1), 1);
-  EXPECT_EQ(answer, 'y');
+  });
+  Claim claim = Claim::finished;
+  ASSERT_TRUE(child.is_told(claim));
+  EXPECT_EQ(claim, Claim::mine);
   EXPECT_EQ(directory.claim(3), Claim::at_another);
   EXPECT_EQ(directory.at_others({3}).size(), 1u);
-  ::kill(child, SIGKILL);
-  ::waitpid(child, nullptr, 0);
-  for (const int end : ready) ::close(end);
+  child.kill();
 
   EXPECT_TRUE(directory.at_others({3}).empty());
   EXPECT_EQ(directory.claim(3), Claim::mine);
@@ -373,19 +356,6 @@ TEST(FolderLocks, WithoutLocksOfTheFileSystemEveryClaimSucceedsAndThatIsSaid) {
   EXPECT_TRUE(locks.claim(3));
   EXPECT_FALSE(locks.is_at_another(3));
   EXPECT_TRUE(locks.others().empty());
-}
-
-TEST_F(RenderDirectoryTest, VideoIsMadeOfThePicturesInOrder) {
-  RenderDirectory directory = open();
-  std::vector<FinishedFrame> frames;
-  for (const std::uint64_t frame : {0, 1, 2}) {
-    directory.write(sample_shot(frame), set_);
-    frames.push_back(*directory.finished(frame));
-  }
-  std::ostringstream out;
-  const std::filesystem::path video = directory.write_video(frames, out);
-  EXPECT_GT(std::filesystem::file_size(video), 0u);
-  EXPECT_THAT(out.str(), HasSubstr("3 pictures"));
 }
 
 TEST(FrameRange, ReadsWhatTheHelpSays) {
