@@ -66,21 +66,14 @@ TEST(Controls, SamplesGoThroughTheirStepsAndStopAtTheEnds) {
   EXPECT_EQ(fine("samples_down").said, "50 samples");
 }
 
-TEST(Controls, ANumberOfSamplesEndsTheGovernor) {
-  set::Set set = stage();
-  set.quality.fps = 25;
-  Desk desk{set};
-  EXPECT_TRUE(desk.controls.look().governed);
-  desk("samples_up");
-  EXPECT_FALSE(desk.controls.look().governed);
-}
-
 TEST(Controls, SamplesGoOnFromTheGovernorsNumberAndTheRateCanBeHadBack) {
   set::Set set = stage();
   set.quality.fps = 25;
   Desk desk{set};
+  EXPECT_TRUE(desk.controls.look().governed);
   desk.controls.use_governed(3);
   EXPECT_EQ(desk("samples_up").said, "4 samples");
+  EXPECT_FALSE(desk.controls.look().governed);
   desk.controls.use_governed(9);  // of a picture before the press
   EXPECT_EQ(desk("samples_down").said, "3 samples");
   EXPECT_EQ(desk("hold_rate").said, "holding 25 frames per second");

@@ -87,22 +87,19 @@ TEST_F(GpuKeeperTest, WithoutADeviceTheSetStartsAndTheRenderThreadWaitsForIt) {
   EXPECT_EQ(count_of("device lost"), count_of("device reopened"));
 }
 
+// After a loss, in the set that comes next, and where the CPU stands in from the start.
 TEST_F(GpuKeeperTest, ThatTheCpuStandsInStaysOnTheDisplay) {
-  stands_in_ = true;
-  EXPECT_TRUE(keeper().renew(render::DeviceLost("render: device lost")));
-  ASSERT_EQ(reports_.troubles().size(), 1u);
-  EXPECT_TRUE(reports_.troubles()[0].lasts);
-  EXPECT_EQ(line_of(reports_.troubles()[0]),
-            "graphics card: is gone; rendering on the CPU, slowly");
-}
-
-// Also in the set that comes next, and where the CPU stands in from the start.
-TEST_F(GpuKeeperTest, ThatTheCpuStandsInIsShownFromTheStart) {
+  const auto expect_shown = [&] {
+    ASSERT_EQ(reports_.troubles().size(), 1u);
+    EXPECT_TRUE(reports_.troubles()[0].lasts);
+    EXPECT_EQ(line_of(reports_.troubles()[0]),
+              "graphics card: is gone; rendering on the CPU, slowly");
+  };
   stands_in_ = true;
   keeper().start();
-  ASSERT_EQ(reports_.troubles().size(), 1u);
-  EXPECT_EQ(line_of(reports_.troubles()[0]),
-            "graphics card: is gone; rendering on the CPU, slowly");
+  expect_shown();
+  EXPECT_TRUE(keeper().renew(render::DeviceLost("render: device lost")));
+  expect_shown();
   stands_in_ = false;
   keeper().start();
   EXPECT_FALSE(reports_.troubles().at(0).lasts);

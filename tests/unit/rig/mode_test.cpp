@@ -96,31 +96,6 @@ TEST(Modes, WhatMakesNoSenseCannotBeReached) {
   }
 }
 
-TEST(Modes, ALostCameraIsInTheWayOfNothing) {
-  for (const State& state : reachable()) {
-    if (state.camera_lost) continue;
-    for (const Event event : all_events) {
-      if (event == Event::camera_lost || event == Event::camera_back) continue;
-      Step there = step(state, event);
-      const Step lost = step(step(state, Event::camera_lost).state, event);
-      EXPECT_EQ(there.refused, lost.refused);
-      there.state.camera_lost = true;
-      EXPECT_EQ(there.state, lost.state);
-    }
-  }
-}
-
-TEST(Modes, RecordingRunsOnThroughEveryChangeOfMode) {
-  for (const State& state : reachable())
-    for (const Event event : all_events) {
-      const bool ends = event == Event::record_off || event == Event::record_toggle ||
-                        event == Event::recorder_failed;
-      if (state.recording && !ends) {
-        EXPECT_TRUE(step(state, event).state.recording);
-      }
-    }
-}
-
 TEST(ModeTable, EveryModeCanBeWishedFor) {
   State anything;
   anything.has_good = anything.has_take = true;
