@@ -18,21 +18,6 @@ namespace {
 constexpr int width = 48, height = 36, light_size = 32;
 constexpr std::int64_t start_ns = 1'000'000'000'000;
 
-// A square of this side, facing glTF's +Y, which is the world's +Z.
-void write_square(const std::filesystem::path& file, float side_m, float height_m) {
-  test::GltfWriter gltf;
-  const float s = side_m / 2, y = height_m;
-  const int positions = gltf.positions({{-s, y, s}, {s, y, s}, {s, y, -s}, {-s, y, -s}});
-  const int indices = gltf.indices({0, 1, 2, 0, 2, 3});
-  const int material = gltf.add(
-      "materials", {{"name", "paper"},
-                    {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}});
-  gltf.root("square", gltf.mesh({{"attributes", {{"POSITION", positions}}},
-                                 {"indices", indices},
-                                 {"material", material}}));
-  gltf.save(file);
-}
-
 std::string set_text(bool with_card, const std::string& more) {
   std::string text =
       "[set]\nname = \"small\"\n"
@@ -69,6 +54,20 @@ Frame light_frame(int index) {
 }
 
 }  // namespace
+
+void write_square(const std::filesystem::path& file, float side_m, float height_m) {
+  test::GltfWriter gltf;
+  const float s = side_m / 2, y = height_m;
+  const int positions = gltf.positions({{-s, y, s}, {s, y, s}, {s, y, -s}, {-s, y, -s}});
+  const int indices = gltf.indices({0, 1, 2, 0, 2, 3});
+  const int material = gltf.add(
+      "materials", {{"name", "paper"},
+                    {"pbrMetallicRoughness", {{"metallicFactor", 0.0}, {"roughnessFactor", 1.0}}}});
+  gltf.root("square", gltf.mesh({{"attributes", {{"POSITION", positions}}},
+                                 {"indices", indices},
+                                 {"material", material}}));
+  gltf.save(file);
+}
 
 Frame small_take_frame(int index) {
   Frame frame;

@@ -27,6 +27,9 @@ void write_small_take(const std::filesystem::path& directory, bool with_card = t
                       const std::optional<session::CapturedLight>& light = {},
                       std::int64_t interval_ns = small_take_interval_ns);
 
+// A square of this side, facing glTF's +Y, which is the world's +Z.
+void write_square(const std::filesystem::path& file, float side_m, float height_m);
+
 // Spoils the picture of observer frame `index` in such a way that opening the session finds it
 // whole, and reading the frame fails.
 void make_unreadable(const std::filesystem::path& session, int index);

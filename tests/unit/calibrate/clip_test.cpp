@@ -330,10 +330,6 @@ TEST(RealClip, AWindowsBracketShowsWhereItClips) {
   std::printf("window: %s", describe(fit).c_str());
   ASSERT_TRUE(fit.code());
   EXPECT_GE(*fit.code(), 250);
-  const auto memorial = read_bracket(hdr / "memorial", "", hdr / "memorial/exposures.txt");
-  std::printf(
-      "memorial: %s",
-      describe(fit_clip(memorial, fit_response(memorial, ResponseMethod::debevec).curve)).c_str());
 }
 
 }  // namespace previz::calibrate::clip_test

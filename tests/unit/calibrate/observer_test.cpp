@@ -187,20 +187,6 @@ TEST(ObserverCapture, AsksForTheBoardFromNearer) {
   EXPECT_THAT(first_missing(how), HasSubstr("the board from closer"));
 }
 
-TEST(ObserverCalibration, WritesTheTableThatASetFileTakes) {
-  const ObserverFit observer = fit_observer(captured(test::careful_capture()));
-  ObserverCalibration calibration;
-  calibration.intrinsics = observer.intrinsics;
-  const set::Set set = set::parse_set(set::intrinsics_toml(calibration), "printed.toml");
-  ASSERT_TRUE(set.observer.calibration);
-  const PinholeIntrinsics& read = set.observer.calibration->intrinsics;
-  EXPECT_EQ(read.width, width);
-  // 12 digits are printed.
-  EXPECT_NEAR(read.fx, observer.intrinsics.fx, 1e-8);
-  EXPECT_NEAR(read.k1, observer.intrinsics.k1, 1e-11);
-  EXPECT_NEAR(read.p2, observer.intrinsics.p2, 1e-14);
-}
-
 TEST(ObserverCalibration, PlotsEveryCorner) {
   Views views = captured(test::careful_capture());
   views.views[0].name = "a<b>&c.png";

@@ -170,14 +170,6 @@ TEST(Import, AVideoOfBt709KeepsItsSamples) {
   }
 }
 
-TEST(Import, AVideoBringsItsOwnTimes) {
-  Shoot shoot;
-  shoot.film("take.mkv", {.pixel_format = "gray", .fps = 50},
-             {noise_bytes(512, 1), noise_bytes(512, 2)}, Json::object());
-  ASSERT_EQ(shoot.error(), "");
-  EXPECT_EQ(shoot.open()->records().at(1).timestamp_ns, 20'000'000);
-}
-
 // Frame 1 is taken at start_ns + 1e9 / fps; the times of a session are below 2^63 ns = 9.22e18.
 TEST(Import, TimesThatNoSessionCanHoldAreRefused) {
   for (const auto& [fps, start_ns] : {std::pair<double, std::int64_t>{1e-300, 0},

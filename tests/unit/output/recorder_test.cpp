@@ -283,6 +283,8 @@ TEST(Recorder, AnAlmostFullDiskEndsTheTakeInOrder) {
 
   recorder.start();  // refused by the same disk
   ASSERT_TRUE(wait_for_failures(recorder, 2));
+  EXPECT_THAT(recorder.status().fault,
+              HasSubstr(directory.path().string() + ": the disk is almost"));
   EXPECT_FALSE(recorder.status().recording);
   free = 1000;
   recorder.start();

@@ -121,17 +121,6 @@ TEST(TakeFolders, AreOnOneDiskWhereTheFoldersAboveThemAre) {
   EXPECT_FALSE(are_on_one_disk(directory.path(), "/proc"));
 }
 
-TEST(Recorder, OfTwoFullDisksSaysOfEachWhyItCannotRecord) {
-  TwoDisks disks;
-  RecorderOptions options = disks.options();
-  options.free_bytes = [](const auto&) { return 50; };
-  Recorder recorder(std::move(options));
-  recorder.start();
-  ASSERT_TRUE(wait_for_failures(recorder, 1));
-  for (const std::filesystem::path& folder : {disks.first, disks.second})
-    EXPECT_THAT(recorder.status().fault, HasSubstr(folder.string()));
-}
-
 // 25 frames of 2304 bytes a second, of which 23040 bytes hold 10; 4 s are wished.
 TEST(Recorder, ThatCannotKeepWhatIsWishedBeforeTheButtonSaysSoOnce) {
   TwoDisks disks;

@@ -39,28 +39,6 @@ class RigCameras : public testing::Test {
   pipeline::Liveness liveness_;
 };
 
-TEST_F(RigCameras, AReplayedCameraStreams) {
-  const Cameras cameras = open_cameras(replayed());
-  EXPECT_FALSE(cameras.light);
-  const CameraEvent event = cameras.observer->next(milliseconds(10'000));
-  ASSERT_TRUE(std::holds_alternative<FramePtr>(event));
-  EXPECT_TRUE(session::is_frame(*std::get<FramePtr>(event), 0));
-}
-
-TEST_F(RigCameras, FaultsAreRehearsedOnATake) {
-  set::Set set = replayed();
-  set.observer.faults = {"corrupt@2", "disconnect@4+0s"};
-  const Cameras cameras = open_cameras(set, /*loop=*/true);
-  std::string story;
-  while (story.size() < 6) {
-    const CameraEvent event = cameras.observer->next(milliseconds(1000));
-    if (std::holds_alternative<EndOfStream>(event)) break;
-    if (std::holds_alternative<FramePtr>(event)) story += 'f';
-    if (std::holds_alternative<DeviceTrouble>(event)) story += 't';
-  }
-  EXPECT_TRUE(story.starts_with("fftftf")) << story;
-}
-
 // The light's three frames last 3 ms, the film camera's eight 320: each lap is as long as the
 // longer.
 TEST_F(RigCameras, LoopedStreamsOfASessionStayTogether) {

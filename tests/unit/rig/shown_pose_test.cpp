@@ -1,6 +1,5 @@
 // A hand over the tags while the rig runs: the picture stays as it is, the take and a refinement
 // know nothing of it.
-#include "tests/support/gltf_writer.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
@@ -37,14 +36,6 @@ Frame picture(int index) {
   return frame;
 }
 
-void write_floor(const std::filesystem::path& file) {
-  test::GltfWriter gltf;
-  const int positions = gltf.positions({{-2, 0, 2}, {2, 0, 2}, {2, 0, -2}, {-2, 0, -2}});
-  const int indices = gltf.indices({0, 1, 2, 0, 2, 3});
-  gltf.root("floor", gltf.mesh({{"attributes", {{"POSITION", positions}}}, {"indices", indices}}));
-  gltf.save(file);
-}
-
 class ShownPose : public test::RigLive {
  protected:
   ShownPose() {
@@ -72,7 +63,7 @@ class ShownPose : public test::RigLive {
            << at.y << ", 0]\n";
     }
     std::ofstream(directory_ / "set.toml") << text.str();
-    write_floor(directory_ / "floor.gltf");
+    test::write_square(directory_ / "floor.gltf", 4, 0);
     lighting::write_exr_picture(directory_ / "black.exr", {8, 4, std::vector<glm::vec3>(32)});
     session::SessionInfo info;
     info.set_text = text.str();
