@@ -24,6 +24,7 @@
 #include "drivers/aravis/receiver_process.hpp"
 #include "drivers/lifeline.hpp"
 #include "tests/devices/hostile_network.hpp"
+#include "tests/support/child_process.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
@@ -148,23 +149,16 @@ TEST_F(HostileNetwork, AReceiverHasNothingElseInReach) {
 }
 
 TEST(Receiver, EndsWithTheProcessThatStartedIt) {
-  int ends[2];
-  ASSERT_EQ(pipe(ends), 0);
-  const pid_t owner = fork();
-  if (owner == 0) {
+  ChildProcess owner([](int tells) {
     const aravis::ReceiverProcess receiver(aravis::Reach::network);
-    const pid_t pid = receiver.pid();
-    if (write(ends[1], &pid, sizeof pid) < 0) _exit(1);
-    pause();
-  }
+    tell(tells, receiver.pid());
+    for (;;) pause();
+  });
   pid_t receiver = 0;
-  ASSERT_EQ(read(ends[0], &receiver, sizeof receiver), ssize_t{sizeof receiver});
+  ASSERT_TRUE(owner.is_told(receiver));
   EXPECT_TRUE(wait_until("the receiver runs", [&] { return is_running(receiver); }));
-  kill(owner, SIGKILL);
-  waitpid(owner, nullptr, 0);
+  owner.kill();
   EXPECT_TRUE(wait_until("the receiver ends", [&] { return !is_running(receiver); }));
-  close(ends[0]);
-  close(ends[1]);
 }
 
 // A message of any bytes is read as one of its kind or as none; ASan sees what reads beyond it.
@@ -293,10 +287,7 @@ TEST(Sandbox, SignalsNobodyByWayOfADescriptor) {
 // kernel or the service's filter does; returns what it says of its trouble, "" for none.
 template <class Call>
 std::string trouble_without(long system_call, int error, const Call& call) {
-  int ends[2];
-  if (pipe(ends) != 0) return "no pipe";
-  const pid_t child = fork();
-  if (child == 0) {
+  return text_of_child([&] {
     namespace bpf = aravis::bpf;
     bpf::Program filter =
         bpf::all({bpf::load(BPF_W, offsetof(seccomp_data, nr)),
@@ -308,16 +299,8 @@ std::string trouble_without(long system_call, int error, const Call& call) {
     if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0 ||
         prctl(PR_SET_SECCOMP, SECCOMP_MODE_FILTER, &program, 0, 0) != 0)
       said = "no filter";
-    said += error_of(call);
-    _exit(write(ends[1], said.data(), said.size()) < 0);
-  }
-  close(ends[1]);
-  std::string said(1000, '\0');
-  const ssize_t size = read(ends[0], said.data(), said.size());
-  said.resize(static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
-  close(ends[0]);
-  waitpid(child, nullptr, 0);
-  return said;
+    return said + error_of(call);
+  });
 }
 
 TEST(Sandbox, WithoutLandlockAUsbReceiverIsRefusedInWordsThatLeadOn) {

@@ -9,7 +9,6 @@
 namespace previz::test {
 
 std::unique_ptr<DeviceUnderTest> make_replay(std::string& why_not);
-std::unique_ptr<DeviceUnderTest> make_fast_replay(std::string& why_not);
 std::unique_ptr<DeviceUnderTest> make_unpaced_replay(std::string& why_not);
 std::unique_ptr<DeviceUnderTest> make_aravis(std::string& why_not);
 std::unique_ptr<DeviceUnderTest> make_lossy_aravis(std::string& why_not);

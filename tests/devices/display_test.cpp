@@ -141,19 +141,6 @@ TEST_P(KmsScreen, IsReleasedToOthersAndTakenBack) {
   EXPECT_TRUE(std::holds_alternative<Shown>(display->show(screenful(mode, 100))));
 }
 
-TEST_P(KmsScreen, IsOpenedAgainAndAgainWithoutALeak) {
-  const auto descriptors = [] {
-    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), {});
-  };
-  std::ptrdiff_t first = 0;
-  for (int i = 0; i < 5; ++i) {
-    const auto display = open();
-    ASSERT_TRUE(std::holds_alternative<Shown>(display->show(screenful(display->mode(), 10 * i))));
-    if (i == 1) first = descriptors();
-  }
-  EXPECT_LE(descriptors(), first);
-}
-
 // The cable by the kernel's own switch for connectors, and its word that something has changed.
 class Cable {
  public:

@@ -13,7 +13,6 @@ std::span<const RegisteredDevice> registered_devices() {
   static const std::vector<RegisteredDevice> devices = [] {
     std::vector<RegisteredDevice> all{
         {"replay", false, true, make_replay},
-        {"replay_at_four_times_the_speed", false, true, make_fast_replay},
         {"replay_as_fast_as_consumed", false, true, make_unpaced_replay},
 #ifdef PREVIZ_WITH_V4L2
         {"v4l2_on_a_stand_in", true, true, make_v4l2_stand_in},

@@ -43,9 +43,6 @@ class ReplayDevice final : public DeviceUnderTest {
 std::unique_ptr<DeviceUnderTest> make_replay(std::string&) {
   return std::make_unique<ReplayDevice>(1);
 }
-std::unique_ptr<DeviceUnderTest> make_fast_replay(std::string&) {
-  return std::make_unique<ReplayDevice>(4);
-}
 std::unique_ptr<DeviceUnderTest> make_unpaced_replay(std::string&) {
   return std::make_unique<ReplayDevice>(0);
 }

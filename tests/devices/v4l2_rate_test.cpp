@@ -16,11 +16,6 @@ std::unique_ptr<Camera> open(FakeDevice& device, const CameraSettings& wanted) {
   return open_v4l2(std::make_unique<FakeNode>(device), wanted, device.clock);
 }
 
-TEST(V4l2Configure, TheRateIsWhatTheDeviceMadeOfIt) {
-  FakeDevice device;
-  EXPECT_EQ(open(device, asking(1000))->format().rate_hz, 60);
-}
-
 // A C920 at 1080p: YUYV takes 5 frames a second over USB 2, and MJPG 30.
 TEST(V4l2Configure, TakesACompressedFormatWhereOnlyThatHoldsTheRate) {
   FakeDevice device;

@@ -3,11 +3,7 @@
 #include "tests/support/test.hpp"
 
 #include <poll.h>
-#include <sys/eventfd.h>
-#include <sys/timerfd.h>
-#include <unistd.h>
 
-#include "daemon/rig/event_loop.hpp"
 #include "drivers/host_clock.hpp"
 
 namespace previz::test::simulated_time_test {
@@ -66,35 +62,6 @@ TEST(SimulatedTimeTest, AThreadThatIsSignalledRunsBeforeTimeGoesOn) {
   }
   other.join();
   EXPECT_LT(latest_ns, begin_ns % second + 1'000'000);
-}
-
-TEST(SimulatedTimeTest, AnEventLoopTicksAndAnswersInIt) {
-  const SimulatedTime time(noon);
-  rig::EventLoop loop;
-  const int descriptor = ::eventfd(0, EFD_NONBLOCK);
-  int ticks = 0, news = 0;
-  const auto timer = loop.every(20ms, [&] {
-    if (++ticks == 3600 * 50) loop.exit();
-  });
-  const auto watch = loop.on_readable(descriptor, [&] {
-    eventfd_t ignored = 0;
-    eventfd_read(descriptor, &ignored);
-    ++news;
-  });
-  const std::int64_t begin_ns = time.now_ns();
-  std::jthread other([&] {
-    for (int i = 0; i < 60; ++i) {
-      std::this_thread::sleep_for(1min);
-      eventfd_write(descriptor, 1);
-    }
-  });
-  loop.run();
-  other.join();
-  ::close(descriptor);
-  EXPECT_EQ(news, 60);
-  // sd-event may let a timer be late by its accuracy of a millisecond.
-  EXPECT_GE(time.now_ns() - begin_ns, 3600 * second);
-  EXPECT_LE(time.now_ns() - begin_ns, 3600 * second * 21 / 20 + second);
 }
 
 TEST(SimulatedTimeTest, StepsAndASuspensionMoveTheOtherClocksAlone) {

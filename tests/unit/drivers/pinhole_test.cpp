@@ -101,15 +101,6 @@ std::optional<double> radius_shown(const PinholeIntrinsics& lens, double at) {
   return ray ? std::optional(ray->x) : std::nullopt;
 }
 
-// r - 0.4 r^3 turns back at r^2 = 1 / 1.2, where it is 0.6086.
-TEST(PinholeFold, OfAPolynomialHasNoInverseBeyondIt) {
-  PinholeIntrinsics lens = plain_lens();
-  lens.k1 = -0.4;
-  EXPECT_TRUE(radius_shown(lens, 0.60));
-  EXPECT_FALSE(radius_shown(lens, 0.61));
-  EXPECT_FALSE(radius_shown(lens, 0.9));
-}
-
 // r - 0.4 r^3 + 0.05 r^5 turns at r = 1.036, where it is 0.651, and grows again from r = 1.93 on:
 // it is 0.9 at r = 2.42, but nothing is seen there.
 TEST(PinholeFold, IsNotCrossedToWhereTheLensGrowsAgain) {

@@ -233,20 +233,6 @@ TEST(Session, TimestampsMayBeCloseOrJump) {
   }
 }
 
-TEST(Session, WhatWasWrittenIsReadableBeforeClose) {
-  const TemporaryDirectory directory;
-  SessionWriter writer(directory.path(), {});
-  for (int i = 0; i < 4; ++i) {
-    writer.write(noise_frame("observer", i, PixelFormat::rgb8, 40, 30));
-    Session session = open_session(directory.path());
-    EXPECT_TRUE(mentions(session.missing, "not closed"));
-    const auto stream = open_stream(session, "observer");
-    EXPECT_EQ(session.missing.size(), 1u);
-    ASSERT_EQ(stream->records().size(), static_cast<std::size_t>(i) + 1);
-    EXPECT_TRUE(is_frame(*stream->read(i), i));
-  }
-}
-
 TEST(Session, AssetsAreKeptByContent) {
   const TemporaryDirectory directory;
   write_content(directory / "ball.glb", "glTF-like");
