@@ -1,6 +1,6 @@
 // What tracking costs at 1920x1080: CPU time a frame of libapriltag alone on the whole picture, of
 // the tracker on the whole picture, and of the tracker in parts, as live, by turns on the same
-// frames. The frames are those of ground truth sets, enlarged, or of the video of a wall.
+// frames. The frames are those of ground truth sets, enlarged.
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
@@ -22,7 +22,6 @@
 #include "tests/bench/measure.hpp"
 #include "tests/bench/program.hpp"
 #include "tests/truth/tracking_measure.hpp"
-#include "tests/truth/tracking_photographs.hpp"
 
 namespace previz::bench {
 namespace {
@@ -69,13 +68,6 @@ Film enlarged(const std::filesystem::path& directory, int times) {
   }
   for (std::size_t i = 0; i < film.frames.size(); ++i)
     film.frames[i].timestamp_ns = static_cast<std::int64_t>(i) * 33'333'333;
-  return film;
-}
-
-Film of_wall(const std::filesystem::path& video) {
-  truth::WallVideo wall = truth::read_wall_video(video);
-  Film film{video.stem().string(), wall.lens, {}, std::move(wall.frames), {}};
-  film.settings.tags = wall.tags;
   return film;
 }
 
@@ -192,15 +184,12 @@ void run(const Film& film) {
 
 int main(int argc, char** argv) {
   std::vector<std::string> sets;
-  std::string video;
   int times = 2;
   CLI::App app("CPU time of tracking at 1920x1080");
   app.add_option("SETDIR", sets)->check(CLI::ExistingDirectory);
-  app.add_option("--video", video, "of the wall with tags 3 and 4")->check(CLI::ExistingFile);
   app.add_option("--times", times, "plays the frames of a set so often, forth and back")
       ->check(CLI::Range(1, 100));
   return previz::bench::run_program(app, argc, argv, [&] {
     for (const std::string& set : sets) previz::bench::run(previz::bench::enlarged(set, times));
-    if (!video.empty()) previz::bench::run(previz::bench::of_wall(video));
   });
 }
