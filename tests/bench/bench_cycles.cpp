@@ -2,7 +2,6 @@
 // and how far each converged picture is from the truth. tests/bench/cycles/run calls it.
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -71,7 +70,6 @@ class Comparison {
   Reference cycles_reference();
   Way our_way(std::uint32_t seed);
   Way cycles_way(std::uint32_t seed);
-  void write_ways() const;
   void print_times(const char* what, std::vector<Point> Way::*points) const;
   void print_bias() const;
 
@@ -129,22 +127,6 @@ Way Comparison::cycles_way(std::uint32_t seed) {
     way.add(render.cpu_s,
             error_of(cycles_converged_, read_shadow_catcher(render.file, cycles_converged_.frame)));
   return way;
-}
-
-void Comparison::write_ways() const {
-  const fs::path path = options_.out / view_.set / "ways.csv";
-  std::ofstream file(path);
-  file << "method,round,cpu_s,e_diff,e_virtual\n";
-  const auto write = [&](const char* method, const std::vector<Way>& ways) {
-    for (std::size_t round = 0; round < ways.size(); ++round)
-      for (std::size_t i = 0; i < ways[round].diff.size(); ++i)
-        file << method << ',' << round + 1 << ',' << ways[round].diff[i].cpu_s << ','
-             << ways[round].diff[i].error << ',' << ways[round].virtual_part[i].error << '\n';
-  };
-  write("previzd", our_ways_);
-  write("cycles", cycles_ways_);
-  file.close();
-  if (!file) throw Error(path.string() + ": cannot be written");
 }
 
 void Comparison::print_times(const char* what, std::vector<Point> Way::*points) const {
@@ -222,7 +204,6 @@ void Comparison::run() {
     our_ways_.push_back(our_way(static_cast<std::uint32_t>(round)));
     cycles_ways_.push_back(cycles_way(static_cast<std::uint32_t>(round)));
   }
-  write_ways();
   std::printf(
       "\n%s, frame %d, %dx%d, %d threads. CPU seconds to an error; * beyond what was "
       "measured in some round\n\n"

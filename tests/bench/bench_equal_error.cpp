@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -120,10 +119,6 @@ void measure(MethodRun& run, std::uint32_t seed, const Reference& reference, con
   const TimeToError time = time_to_error(points, options.error);
   result.is_beyond = result.is_beyond || time.is_beyond;
   result.seconds.push_back(time.cpu_s);
-}
-
-double mean(const std::vector<double>& values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
 // Of rounds: the median of times that were measured, the mean of those that follow from an error.

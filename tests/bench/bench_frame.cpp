@@ -1,9 +1,7 @@
 // Time of a frame of one sample a pixel over resolution, for several numbers of triangles: the
-// paper's figure 4. Prints a table, and writes it as CSV where that is asked for.
+// paper's figure 4.
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
-#include <fstream>
 #include <string>
 #include <vector>
 
@@ -21,7 +19,6 @@ struct Options {
   std::vector<std::size_t> triangles{4'000, 98'000, 582'000, 1'000'000};
   int rounds = 3;
   int depth = 4;
-  std::string csv;
 };
 
 struct Resolution {
@@ -29,10 +26,6 @@ struct Resolution {
 };
 constexpr Resolution resolutions[] = {{320, 240},  {640, 480},  {800, 600},
                                       {1024, 768}, {1280, 720}, {1920, 1080}};
-
-struct Times {
-  double wall_ms = 0, cpu_ms = 0;
-};
 
 lighting::EnvironmentMap sky() {
   lighting::EnvironmentMap map{32, {}};
@@ -50,15 +43,13 @@ lighting::EnvironmentMap sky() {
 Times measure(render::Renderer& renderer, const render::FrameInput& frame, int rounds) {
   std::vector<double> wall, cpu;
   for (int round = -1; round < rounds; ++round) {
-    const auto wall_start = std::chrono::steady_clock::now();
-    const double cpu_start = cpu_seconds();
-    renderer.begin(frame);
-    renderer.render(1);
-    const std::chrono::duration<double, std::milli> elapsed =
-        std::chrono::steady_clock::now() - wall_start;
+    const Times times = time_of([&] {
+      renderer.begin(frame);
+      renderer.render(1);
+    });
     if (round < 0) continue;  // compiles the pipelines
-    wall.push_back(elapsed.count());
-    cpu.push_back(1e3 * (cpu_seconds() - cpu_start));
+    wall.push_back(times.wall_ms);
+    cpu.push_back(times.cpu_ms);
   }
   return {median(wall), median(cpu)};
 }
@@ -69,9 +60,6 @@ void run(const Options& options) {
               options.depth);
   std::printf(
       "| triangles | resolution | ms a frame | CPU ms a frame |\n| --- | --- | --- | --- |\n");
-  std::ofstream csv(options.csv);
-  if (!csv && !options.csv.empty()) throw Error(options.csv + ": cannot be written");
-  csv << "triangles,width,height,wall_ms,cpu_ms\n";
   set::Estimation estimation;
   estimation.max_depth = options.depth;
   for (const std::size_t triangles : options.triangles) {
@@ -90,8 +78,6 @@ void run(const Options& options) {
       std::printf("| %zu | %dx%d | %.0f | %.0f |\n", count, r.width, r.height, times.wall_ms,
                   times.cpu_ms);
       std::fflush(stdout);
-      csv << count << ',' << r.width << ',' << r.height << ',' << times.wall_ms << ','
-          << times.cpu_ms << '\n';
     }
   }
 }
@@ -105,6 +91,5 @@ int main(int argc, char** argv) {
   app.add_option("--triangles", options.triangles, "Triangles of the real scene, about");
   app.add_option("--rounds", options.rounds, "Frames measured; the median counts");
   app.add_option("--depth", options.depth, "Path vertices after the camera");
-  app.add_option("--csv", options.csv, "File for the table");
   return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run(options); });
 }

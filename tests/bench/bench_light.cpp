@@ -26,7 +26,6 @@ struct Options {
   int samples = 256;         // the most of every method
   int paper_samples = 1024;  // of the paper's
   int reference_samples = 4096;
-  bool photons = true;
 };
 
 struct LightPoint {
@@ -39,10 +38,9 @@ struct LitMethod {
   Method method;
 };
 
-std::vector<LitMethod> light_methods(const Options& options) {
+std::vector<LitMethod> light_methods() {
   set::Estimation estimation;
   estimation.estimator = set::Estimator::difference;
-  if (!options.photons) estimation.caustics = set::Caustics::none;
   using enum set::LightMode;
   return {{image, {"image, by the BSDF", estimation, false, set::LightSampling::bsdf}},
           {image, {"image, by importance", estimation}},
@@ -84,7 +82,7 @@ struct Way {
 // The two ways to sample the image have one reference.
 std::vector<Way> make_ways(const std::shared_ptr<render::Device>& device, const Options& options) {
   std::vector<Way> ways;
-  for (const auto& [mode, method] : light_methods(options)) {
+  for (const auto& [mode, method] : light_methods()) {
     const View view = load_view(options.set, options.frame, options.width, mode);
     const bool is_paper = method.sampling == set::LightSampling::bsdf;
     std::shared_ptr<const Reference> reference;
@@ -154,6 +152,5 @@ int main(int argc, char** argv) {
   app.add_option("--samples", options.samples, "the most of every method but the paper's");
   app.add_option("--paper-samples", options.paper_samples);
   app.add_option("--reference", options.reference_samples);
-  app.add_flag("!--no-photons", options.photons, "without caustics");
   return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run_light(options); });
 }

@@ -13,15 +13,11 @@
 namespace previz::bench {
 namespace {
 
-struct Options {
-  int levels = 7;  // 20 * 4^levels triangles
-  int rounds = 15;
-  int width = 320, height = 240;
-};
+constexpr int width = 320, height = 240;
 
-scene::Scene make_scene(int levels) {
+scene::Scene make_scene() {
   scene::Scene scene = scene_of(grid(4, 8));  // the real table
-  scene.meshes.push_back(bumpy_sphere(levels, 0.5, 0.2, 7));
+  scene.meshes.push_back(bumpy_sphere(7, 0.5, 0.2, 7));
   scene::Instance sphere;
   sphere.name = "virtual";
   sphere.mesh = 1;
@@ -34,11 +30,11 @@ scene::Scene make_scene(int levels) {
   return scene;
 }
 
-void run(const Options& options) {
+void run(int rounds) {
   const auto device = render::open_device();
-  const scene::Scene scene = make_scene(options.levels);
-  const ViewFromAbove view(device, scene, options.width, options.height);
-  const ChangeTimes times = time_changes(view, options.rounds, [&](int round) {
+  const scene::Scene scene = make_scene();
+  const ViewFromAbove view(device, scene, width, height);
+  const ChangeTimes times = time_changes(view, rounds, [&](int round) {
     const glm::dvec3 step(0.01 * round, 0, 0.5);
     std::vector<scene::Instance> instances = scene.instances;
     instances[1].world_from_object = glm::translate(glm::dmat4(1), step);
@@ -47,8 +43,8 @@ void run(const Options& options) {
     return [&view, instances, lights] { view.renderer->move(instances, lights); };
   });
   std::printf("%s, %zu triangles, %dx%d, 1 sample, CPU ms\n\n",
-              render::device_name(*device).c_str(), scene.meshes[1].triangles.size(), options.width,
-              options.height);
+              render::device_name(*device).c_str(), scene.meshes[1].triangles.size(), width,
+              height);
   print_changes(times, "moved");
 }
 
@@ -57,10 +53,7 @@ void run(const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app("The time of frames between which things move");
-  previz::bench::Options options;
-  app.add_option("--levels", options.levels, "20 * 4^levels triangles")->check(CLI::Range(0, 8));
-  app.add_option("--rounds", options.rounds)->check(CLI::Range(1, 1000));
-  app.add_option("--width", options.width)->check(CLI::Range(8, 8192));
-  app.add_option("--height", options.height)->check(CLI::Range(8, 8192));
-  return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run(options); });
+  int rounds = 15;
+  app.add_option("--rounds", rounds)->check(CLI::Range(1, 1000));
+  return previz::bench::run_program(app, argc, argv, [&] { previz::bench::run(rounds); });
 }

@@ -116,7 +116,6 @@ void print(const char* kind, const Measured& m, double wrong) {
 
 struct Options {
   std::vector<std::size_t> triangles{4'000, 98'000, 582'000, 1'000'000};
-  std::string quality = "high";
   int size = 512;
   int rounds = 7;
   bool instanced = false;
@@ -125,13 +124,11 @@ struct Options {
 void run(render::Device& device, std::size_t triangles, const Options& options) {
   const scene::Scene scene =
       options.instanced ? instanced_field(triangles) : scene_of(sphere_field(triangles));
-  const bool high = options.quality == "high";
-  const EmbreeTracer embree(scene, high ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM, false);
+  const EmbreeTracer embree(scene, RTC_BUILD_QUALITY_HIGH, false);
   std::vector<scene::MeshBvh> meshes;
   const double start = cpu_seconds();
   for (const scene::Mesh& mesh : scene.meshes)
-    meshes.push_back(
-        build_mesh_bvh(mesh, high ? scene::BvhQuality::high : scene::BvhQuality::medium));
+    meshes.push_back(build_mesh_bvh(mesh, scene::BvhQuality::high));
   const double built = cpu_seconds() - start;
   GpuTracer ours(device, scene_texels(scene, meshes));
   const RaySets sets = make_rays(scene, embree, options.size);
@@ -180,8 +177,6 @@ int main(int argc, char** argv) {
   previz::bench::Options options;
   CLI::App app("Rays per second a core, ours beside Embree's single-ray calls");
   app.add_option("--triangles", options.triangles, "Sizes of the mesh");
-  app.add_option("--quality", options.quality, "Both builders' quality")
-      ->check(CLI::IsMember({"medium", "high"}));
   app.add_option("--size", options.size, "Primary rays in x and y, a multiple of 16");
   app.add_option("--rounds", options.rounds, "Rounds in turns");
   app.add_flag("--instanced", options.instanced, "One instance a sphere instead of one mesh");

@@ -26,7 +26,6 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 struct Options {
-  fs::path session = "config/demo/session";
   fs::path folder;  // takes are recorded in a folder of it that is removed again
   PixelFormat format = PixelFormat::yuv422p8;
   session::VideoCodec codec = session::VideoCodec::ffv1;
@@ -37,11 +36,8 @@ struct Options {
   std::uint64_t frames() const { return static_cast<std::uint64_t>(rate_hz * seconds); }
 };
 
-const std::map<std::string, PixelFormat> formats = {{"rgb8", PixelFormat::rgb8},
-                                                    {"yuv422p8", PixelFormat::yuv422p8},
-                                                    {"gray8", PixelFormat::gray8},
-                                                    {"gray16", PixelFormat::gray16},
-                                                    {"rgb16", PixelFormat::rgb16}};
+const std::map<std::string, PixelFormat> formats = {{"yuv422p8", PixelFormat::yuv422p8},
+                                                    {"gray8", PixelFormat::gray8}};
 const std::map<std::string, session::VideoCodec> codecs = {{"ffv1", session::VideoCodec::ffv1},
                                                            {"raw", session::VideoCodec::raw}};
 
@@ -68,8 +64,8 @@ struct Folder {
 // A session of a few pictures, to be replayed again and again, that costs little to read.
 void write_source(const Options& options, const fs::path& folder) {
   constexpr int pictures = 16;
-  const auto frames =
-      camera_pictures(options.session, options.format, options.width, options.height, pictures);
+  const auto frames = camera_pictures("config/demo/session", options.format, options.width,
+                                      options.height, pictures);
   session::SessionWriter writer(folder, {}, std::chrono::hours(1), session::VideoCodec::raw);
   for (std::size_t i = 0; i < frames.size(); ++i) {
     Frame frame = *frames[i];
@@ -111,7 +107,7 @@ struct Outcome {
   std::uint64_t offered = 0;  // to the recorder
   std::uint64_t ended = 0;    // not offered, because the take had ended
   double most_behind_s = 0, most_behind_mb = 0;
-  double offering_s = 0, finishing_s = 0;  // until the last frame was offered, and on the disk
+  double finishing_s = 0;  // from the last frame's offer until it was on the disk
   double cpu_s = 0;
 };
 
@@ -140,14 +136,13 @@ Outcome record(const Options& options, const fs::path& source, const fs::path& f
   const auto camera = open_replay(source, "observer", replay);
   output::Recorder recorder(settings_of(options, folder, left_out));
   const double cpu = cpu_seconds();
-  const auto begin = Clock::now();
   recorder.start();
   camera->start();
   offer(options, *camera, recorder, outcome);
-  outcome.offering_s = seconds_since(begin);
+  const auto offered = Clock::now();
   recorder.stop();
   recorder.finish();
-  outcome.finishing_s = seconds_since(begin) - outcome.offering_s;
+  outcome.finishing_s = seconds_since(offered);
   outcome.cpu_s = cpu_seconds() - cpu;
   session::Session take = session::open_session(recorder.status().directory);
   if (const auto stream = session::open_stream(take, "observer"))
@@ -157,23 +152,19 @@ Outcome record(const Options& options, const fs::path& source, const fs::path& f
 
 void print(const Options& options, const Outcome& outcome, const LeftOut& left_out) {
   std::string causes;
-  std::uint64_t counted = outcome.kept + outcome.ended;
-  for (const auto& [cause, pictures] : left_out.causes) {
+  for (const auto& [cause, pictures] : left_out.causes)
     causes += (causes.empty() ? "" : ", ") + cause + ' ' + std::to_string(pictures);
-    counted += pictures;
-  }
   if (outcome.ended > 0)
     causes += (causes.empty() ? "" : ", ") + std::string("after the take's end ") +
               std::to_string(outcome.ended);
-  const auto uncounted = static_cast<long long>(options.frames()) - static_cast<long long>(counted);
-  std::printf(
-      "| %s %dx%d at %g | %s | %s | %llu of %llu | %s | %lld | %.2f, %.0f | %.1f | %.1f | %.1f |\n",
-      to_string(options.format), options.width, options.height, options.rate_hz,
-      options.codec == session::VideoCodec::raw ? "raw" : "ffv1", options.folder.c_str(),
-      static_cast<unsigned long long>(outcome.kept),
-      static_cast<unsigned long long>(options.frames()), causes.empty() ? "none" : causes.c_str(),
-      uncounted, outcome.most_behind_s, outcome.most_behind_mb, outcome.offering_s,
-      outcome.finishing_s, 1e3 * outcome.cpu_s / static_cast<double>(options.frames()));
+  std::printf("| %s %dx%d at %g | %s | %s | %llu of %llu | %s | %.2f, %.0f | %.1f | %.1f |\n",
+              to_string(options.format), options.width, options.height, options.rate_hz,
+              options.codec == session::VideoCodec::raw ? "raw" : "ffv1", options.folder.c_str(),
+              static_cast<unsigned long long>(outcome.kept),
+              static_cast<unsigned long long>(options.frames()),
+              causes.empty() ? "none" : causes.c_str(), outcome.most_behind_s,
+              outcome.most_behind_mb, outcome.finishing_s,
+              1e3 * outcome.cpu_s / static_cast<double>(options.frames()));
 }
 
 void run(const Options& options) {
@@ -191,7 +182,6 @@ int main(int argc, char** argv) {
   previz::bench::Options options;
   CLI::App app("What a recording keeps of a camera's pictures");
   app.add_option("--folder", options.folder, "A folder on the disk of takes")->required();
-  app.add_option("--session", options.session, "The session whose pictures are enlarged");
   app.add_option("--format", options.format, "Pixel format")
       ->transform(CLI::CheckedTransformer(previz::bench::formats));
   app.add_option("--codec", options.codec, "Form of the pictures")

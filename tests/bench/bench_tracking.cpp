@@ -1,11 +1,10 @@
 // What tracking costs at 1920x1080: CPU time a frame of libapriltag alone on the whole picture, of
 // the tracker on the whole picture, and of the tracker in parts, as live, by turns on the same
-// frames. The frames are those of ground truth sets, enlarged, or of the video of a wall.
+// frames. The frames are those of ground truth sets, enlarged.
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -22,7 +21,6 @@
 #include "tests/bench/measure.hpp"
 #include "tests/bench/program.hpp"
 #include "tests/truth/tracking_measure.hpp"
-#include "tests/truth/tracking_photographs.hpp"
 
 namespace previz::bench {
 namespace {
@@ -37,9 +35,9 @@ struct Film {
   set::Tracking settings;
 };
 
-// Enlarged to the full width; of the height the middle is kept. The set's frames are played
-// `times` times, forth and back, as a camera moves.
-Film enlarged(const std::filesystem::path& directory, int times) {
+// Enlarged to the full width; of the height the middle is kept. The set's frames are played forth
+// and back, as a camera moves.
+Film enlarged(const std::filesystem::path& directory) {
   const truth::TruthSet set = truth::load_truth_set(directory);
   Film film{
       set.name, set.observer.intrinsics, set.observer.response, {}, truth::tracking_settings(set)};
@@ -61,46 +59,24 @@ Film enlarged(const std::filesystem::path& directory, int times) {
     film.frames.push_back(std::move(frame));
   }
   const std::vector<Frame> once = film.frames;
-  for (int i = 1; i < times; ++i) {
-    if (i % 2)
-      film.frames.insert(film.frames.end(), once.rbegin(), once.rend());
-    else
-      film.frames.insert(film.frames.end(), once.begin(), once.end());
-  }
+  film.frames.insert(film.frames.end(), once.rbegin(), once.rend());
   for (std::size_t i = 0; i < film.frames.size(); ++i)
     film.frames[i].timestamp_ns = static_cast<std::int64_t>(i) * 33'333'333;
-  return film;
-}
-
-Film of_wall(const std::filesystem::path& video) {
-  truth::WallVideo wall = truth::read_wall_video(video);
-  Film film{video.stem().string(), wall.lens, {}, std::move(wall.frames), {}};
-  film.settings.tags = wall.tags;
   return film;
 }
 
 struct Row {
   std::string name;
   std::function<int(const Frame&)> search;  // returns how many tags it found
-  std::vector<double> cpu_ms = {}, wall_ms = {};
+  std::vector<double> cpu_ms = {};
   int tags = 0;
 
   void measure(const Frame& frame) {
-    const auto begin = std::chrono::steady_clock::now();
     const double cpu_s = cpu_seconds();
     tags += search(frame);
     cpu_ms.push_back(1e3 * (cpu_seconds() - cpu_s));
-    wall_ms.push_back(
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin)
-            .count());
   }
 };
-
-double mean(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double value : values) sum += value;
-  return sum / static_cast<double>(values.size());
-}
 
 // Returns how far the corners of the tags are apart by two poses, px.
 double apart(const Film& film, const tracking::Pose& a, const tracking::Pose& b) {
@@ -173,14 +149,12 @@ void run(const Film& film) {
       apart_px = std::max(apart_px, apart(film, *in_whole.pose, *in_parts.pose));
   }
   std::printf(
-      "\n%s, %zu frames of %dx%d\n\n| search | tags a frame | CPU ms a frame | median | wall ms | "
-      "most | CPU of libapriltag's |\n| --- | --- | --- | --- | --- | --- | --- |\n",
+      "\n%s, %zu frames of %dx%d\n\n| search | tags a frame | CPU ms a frame | CPU of "
+      "libapriltag's |\n| --- | --- | --- | --- |\n",
       film.name.c_str(), film.frames.size(), width, height);
   for (const Row& row : rows)
-    std::printf("| %s | %.1f | %.1f | %.1f | %.1f | %.1f | %.2f |\n", row.name.c_str(),
+    std::printf("| %s | %.1f | %.1f | %.2f |\n", row.name.c_str(),
                 1.0 * row.tags / static_cast<double>(film.frames.size()), mean(row.cpu_ms),
-                median(row.cpu_ms), mean(row.wall_ms),
-                *std::max_element(row.wall_ms.begin(), row.wall_ms.end()),
                 mean(row.cpu_ms) / mean(rows.front().cpu_ms));
   std::printf(
       "\nIn parts: other tags in %d frames; by its poses corners are at most %.2g px off.\n",
@@ -192,15 +166,9 @@ void run(const Film& film) {
 
 int main(int argc, char** argv) {
   std::vector<std::string> sets;
-  std::string video;
-  int times = 2;
   CLI::App app("CPU time of tracking at 1920x1080");
   app.add_option("SETDIR", sets)->check(CLI::ExistingDirectory);
-  app.add_option("--video", video, "of the wall with tags 3 and 4")->check(CLI::ExistingFile);
-  app.add_option("--times", times, "plays the frames of a set so often, forth and back")
-      ->check(CLI::Range(1, 100));
   return previz::bench::run_program(app, argc, argv, [&] {
-    for (const std::string& set : sets) previz::bench::run(previz::bench::enlarged(set, times));
-    if (!video.empty()) previz::bench::run(previz::bench::of_wall(video));
+    for (const std::string& set : sets) previz::bench::run(previz::bench::enlarged(set));
   });
 }

@@ -38,21 +38,11 @@ class Sensor {
     return std::clamp(light + std::sqrt(1 + 0.01 * light) * noise_(random_), 0.0, 255.0);
   }
   std::uint8_t read_8(double level) { return static_cast<std::uint8_t>(std::lround(read(level))); }
-  // Counts as a sensor of 12 bits does, over the range of 16.
-  std::uint16_t read_16(double level) {
-    const auto count = static_cast<unsigned>(std::lround(read(level) * 4095 / 255));
-    return static_cast<std::uint16_t>(count << 4 | count >> 8);
-  }
 
  private:
   std::minstd_rand random_{1};
   std::normal_distribution<double> noise_;
 };
-
-void append(std::vector<std::uint8_t>& bytes, std::uint16_t sample) {
-  bytes.push_back(static_cast<std::uint8_t>(sample));
-  bytes.push_back(static_cast<std::uint8_t>(sample >> 8));
-}
 
 double luma(const cv::Vec3f& rgb) {
   return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];  // ITU-R BT.709-6
@@ -75,22 +65,14 @@ std::vector<std::uint8_t> yuv422(const cv::Mat_<cv::Vec3f>& picture, Sensor& sen
   return bytes;
 }
 
-std::vector<std::uint8_t> samples_of(const cv::Mat_<cv::Vec3f>& picture, PixelFormat format,
-                                     Sensor& sensor) {
-  if (format == PixelFormat::yuv422p8) return yuv422(picture, sensor);
+std::vector<std::uint8_t> gray(const cv::Mat_<cv::Vec3f>& picture, Sensor& sensor) {
   std::vector<std::uint8_t> bytes;
-  bytes.reserve(frame_bytes(format, picture.cols, picture.rows));
   for (int y = 0; y < picture.rows; ++y) {
     for (int x = 0; x < picture.cols; ++x) {
       const cv::Vec3f& rgb = picture(y, x);
       // RGGB, as the sensor counts: green, or red and blue on the diagonal.
       const float mosaic = rgb[(y + x) % 2 == 1 ? 1 : (y % 2 == 0 ? 0 : 2)];
-      if (format == PixelFormat::gray8) bytes.push_back(sensor.read_8(mosaic));
-      if (format == PixelFormat::gray16) append(bytes, sensor.read_16(mosaic));
-      for (int c = 0; c < 3; ++c) {
-        if (format == PixelFormat::rgb8) bytes.push_back(sensor.read_8(rgb[c]));
-        if (format == PixelFormat::rgb16) append(bytes, sensor.read_16(rgb[c]));
-      }
+      bytes.push_back(sensor.read_8(mosaic));
     }
   }
   return bytes;
@@ -109,10 +91,13 @@ std::vector<FramePtr> camera_pictures(const std::filesystem::path& session, Pixe
     frame->format = format;
     frame->width = width;
     frame->height = height;
-    if (format == PixelFormat::gray8 || format == PixelFormat::gray16)
+    const cv::Mat& picture = pictures[static_cast<std::size_t>(i) % pictures.size()];
+    if (format == PixelFormat::gray8) {
       frame->bayer = BayerPattern::rggb;
-    frame->bytes =
-        samples_of(pictures[static_cast<std::size_t>(i) % pictures.size()], format, sensor);
+      frame->bytes = gray(picture, sensor);
+    } else {
+      frame->bytes = yuv422(picture, sensor);
+    }
     frames.push_back(std::move(frame));
   }
   return frames;

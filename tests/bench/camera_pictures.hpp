@@ -10,8 +10,8 @@
 namespace previz::bench {
 
 // Returns `count` frames of the source "observer", of the session's frames in turn. Noise is that
-// of light and of the sensor's reading: its variance is 1 + 0.01 v at level v of 255. Samples of 16
-// bits are those of a sensor of 12. Throws previz::Error if the session cannot be read.
+// of light and of the sensor's reading: its variance is 1 + 0.01 v at level v of 255. The format is
+// yuv422p8 or gray8. Throws previz::Error if the session cannot be read.
 std::vector<FramePtr> camera_pictures(const std::filesystem::path& session, PixelFormat format,
                                       int width, int height, int count);
 

@@ -1,9 +1,11 @@
-// Clock and median for the benchmarks.
+// Clocks, mean and median for the benchmarks.
 #pragma once
 
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <chrono>
+#include <numeric>
 #include <vector>
 
 namespace previz::bench {
@@ -17,6 +19,24 @@ inline double cpu_seconds() {
     return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
   };
   return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+// Time of something on the clock, and of all threads.
+struct Times {
+  double wall_ms = 0, cpu_ms = 0;
+};
+
+template <class Run>
+Times time_of(const Run& run) {
+  const auto start = std::chrono::steady_clock::now();
+  const double cpu_start = cpu_seconds();
+  run();
+  const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - start;
+  return {wall.count(), 1e3 * (cpu_seconds() - cpu_start)};
+}
+
+inline double mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
 // Returns the median of at least one value; of an even number, the upper of the middle two.

@@ -1,6 +1,6 @@
 #!/bin/sh
 # All benchmarks of a build: run.sh BUILD_DIR OUT_DIR [SETDIR...]. Writes rays.md, instances.md,
-# frame.md, frame.csv, picture.md, move.md, deform.md, and where ground truth sets are given live.md,
+# frame.md, picture.md, move.md, deform.md, and where ground truth sets are given live.md,
 # equal_error.md and tracking.md.
 # Beside Cycles: cycles/run.
 set -eu
@@ -15,7 +15,7 @@ mkdir -p "$out"
 
 "$bench/bench_rays" | tee "$out/rays.md"
 "$bench/bench_rays" --instanced --triangles 98000 1000000 | tee "$out/instances.md"
-"$bench/bench_frame" --csv "$out/frame.csv" | tee "$out/frame.md"
+"$bench/bench_frame" | tee "$out/frame.md"
 "$bench/bench_picture" | tee "$out/picture.md"
 "$bench/bench_move" | tee "$out/move.md"
 "$bench/bench_deform" | tee "$out/deform.md"

@@ -166,12 +166,4 @@ TEST(ExtremeCamera, AnExposureStatedTwoStopsWrongIsTold) {
   EXPECT_NEAR(lighting.environment.radiance[up].g, 0.7, 0.005);
 }
 
-TEST(ExtremeCamera, AFrameOfAnotherSizeIsRefusedByName) {
-  const FramePtr frame = make_frame(3, 5, 1, std::vector<glm::dvec3>(15));
-  EXPECT_EQ(test::error_of([&] {
-              estimate({&frame, 1}, upward(fisheye_camera(128)), {});
-            }),
-            "light frame 0 has 3x5 pixels, the light camera's calibration 128x128");
-}
-
 }  // namespace previz::lighting::camera_test

@@ -80,12 +80,6 @@ TEST(Mutators, ChangeToml) {
   expect_trees("set", "demo.toml", tree_of_toml);
 }
 
-TEST(Mutators, ChangeTomlToNumbersThatJsonLacks) {
-  const std::vector<std::string> all = mutations("session_toml", "a = 1.5\nb = [2, 3]\n");
-  for (const char* text : {"a = inf", "a = -inf", "a = nan"})
-    EXPECT_THAT(all, Contains(HasSubstr(text)));
-}
-
 TEST(Mutators, ChangeJson) {
   expect_trees("frames_json", "list", tree_of_json);
   expect_trees("import_video", "both", tree_of_json);
@@ -146,27 +140,7 @@ TEST(Mutators, ChangeBinaryGltfWithTheRightLengths) {
   EXPECT_THAT(counts, ElementsAre(1, 2, 3));  // the buffer is dropped and repeated
 }
 
-// Indices in range, and the first two beyond it.
-TEST(Mutators, ExchangeIndicesOfGltf) {
-  const std::string input = kept("gltf", "pane.gltf");
-  const Json before = Json::parse(input);
-  const std::size_t accessors = before["accessors"].size();
-  std::set<std::size_t> seen;
-  for (const std::string& output : mutations("gltf", input)) {
-    const Json flat = Json::parse(output).flatten();
-    const Json indices = flat.value("/meshes/0/primitives/0/indices", Json());
-    if (indices.is_number_unsigned()) seen.insert(indices.get<std::size_t>());
-  }
-  for (std::size_t index = 0; index < accessors + 2; ++index)
-    EXPECT_TRUE(seen.contains(index)) << index;
-}
-
 // ---- Matroska
-
-struct Walk {
-  bool is_readable = true;  // all the bytes are elements
-  bool is_right = true;     // and the sizes end where what holds them ends
-};
 
 // Those of the kept file that hold others.
 constexpr std::array<std::uint64_t, 12> holding = {0x1a45dfa3, 0x18538067, 0x114d9b74, 0x4dbb,
@@ -187,61 +161,38 @@ std::size_t width_of(std::string_view bytes) {
   return static_cast<std::size_t>(std::countl_zero(static_cast<unsigned char>(bytes[0]))) + 1;
 }
 
-void walk(std::string_view bytes, Walk& walked) {
+// Returns whether all the bytes are elements, each of which ends within what holds it.
+bool is_matroska(std::string_view bytes) {
   while (!bytes.empty()) {
     const std::size_t id_width = width_of(bytes);
     const std::uint64_t id = take(bytes, id_width);
     const std::size_t size_width = width_of(bytes);
-    if (id_width > 4 || size_width > 8 || size_width > bytes.size()) {
-      walked.is_readable = walked.is_right = false;
-      return;
-    }
+    if (id_width > 4 || size_width > 8 || size_width > bytes.size()) return false;
     const std::uint64_t size = take(bytes, size_width) ^ std::uint64_t{1} << 7 * size_width;
-    walked.is_right = walked.is_right && size <= bytes.size();
-    const std::string_view body = bytes.substr(0, size);
-    bytes.remove_prefix(body.size());
-    if (std::ranges::find(holding, id) != holding.end()) walk(body, walked);
+    if (size > bytes.size()) return false;
+    if (std::ranges::find(holding, id) != holding.end() && !is_matroska(bytes.substr(0, size)))
+      return false;
+    bytes.remove_prefix(size);
   }
+  return true;
 }
 
-Walk walk(const std::string& file) {
-  Walk walked;
-  walk(file, walked);
-  return walked;
-}
-
+// A change makes a size wrong in 1/16 * 5/8 of cases, and those of all that hold what is changed in
+// 1/32: below 0.071, and below 0.2 for three changes.
 TEST(Mutators, ChangeMatroska) {
-  const std::string input = kept("matroska", "observer.mkv");
-  ASSERT_TRUE(walk(input).is_right);
-  std::uint32_t readable = 0, right = 0;
-  std::set<std::string> sizes;
-  for (const std::string& output : mutations("matroska", input)) {
-    const Walk after = walk(output);
-    readable += after.is_readable ? 1 : 0;
-    right += after.is_right ? 1 : 0;
-    for (const char* last : {"\xff", "\xfe"})  // an unknown size, and the largest
-      if (output.find(std::string("\x01\xff\xff\xff\xff\xff\xff") + last) != std::string::npos)
-        sizes.insert(last);
+  for (const auto& [target, file, mark] :
+       {std::tuple{"matroska", "observer.mkv", ""}, std::tuple{"import_video", "vp9", "v0"}}) {
+    SCOPED_TRACE(target);
+    const std::size_t first = std::string(mark).size();
+    const std::string input = kept(target, file);
+    ASSERT_TRUE(is_matroska(std::string_view(input).substr(first)));
+    std::uint32_t right = 0;
+    for (const std::string& output : mutations(target, input)) {
+      ASSERT_THAT(output, StartsWith(mark));
+      right += is_matroska(std::string_view(output).substr(first)) ? 1 : 0;
+    }
+    EXPECT_GT(right, many * 80 / 100);
   }
-  EXPECT_EQ(sizes.size(), 2u);
-  // A change makes a size wrong in 1/16 * 5/8 of cases, and those of all that hold what is changed
-  // in 1/32: below 0.071, and below 0.2 for three changes. Bytes that are no element are left where
-  // a size is one off (1/16 * 2/8) and where those wrong ones cut an element (half of 1/32, since
-  // as many changes keep the length): 0.032, and 0.064 for the two changes that there are on
-  // average, of which a part looks like elements by chance.
-  EXPECT_GT(right, many * 80 / 100);
-  EXPECT_GT(readable, many * 95 / 100);
-}
-
-TEST(Mutators, ChangeAVideoBehindItsMark) {
-  const std::string input = kept("import_video", "vp9");
-  ASSERT_EQ(input.substr(0, 2), "v0");
-  std::uint32_t right = 0;
-  for (const std::string& output : mutations("import_video", input)) {
-    ASSERT_EQ(output.substr(0, 2), "v0");
-    right += walk(output.substr(2)).is_right ? 1 : 0;
-  }
-  EXPECT_GT(right, many * 80 / 100);
 }
 
 // ---- what is not of the format
@@ -250,51 +201,19 @@ TEST(Mutators, RefuseWhatIsNotOfTheFormat) {
   const std::string deep = std::string(100, '[') + std::string(100, ']');
   const std::string binary = std::string("glTF\2\0\0\0\x1a\0\0\0\6\0\0\0", 16);
   const std::pair<const char*, std::string> refused[] = {
-      {"set", ""},
-      {"set", "# a comment"},
       {"set", "a = "},
-      {"session_toml", "a = 1\na = 2"},
       {"session_toml", std::string("\xff\0", 2)},
-      {"frames_json", ""},
-      {"frames_json", "{\"a\": 1"},
       {"frames_json", "{}"},
-      {"frames_json", "3"},
-      {"frames_json", "{\"a\": \"\xff\"}"},
       {"frames_json", deep},
-      {"gltf", "glTF"},
       {"gltf", binary + "BIN [1, 2]"},
-      {"gltf", binary + "JSON[1, 2"},
-      {"frame_lines", ""},
-      {"track_lines", "\n\n"},
       {"button_lines", "{\"a\": 1\n{\"b\": 1"},
-      {"matroska", ""},
-      {"matroska", "\x1a\x45\xdf"},
       {"matroska", "RIFF, and so on"},
       {"import_video", "v0RIFF, and so on"},
-      {"import_video", "v"},
   };
   for (const auto& [target, input] : refused)
     for (std::uint32_t seed = 0; seed < 16; ++seed)
       EXPECT_FALSE(mutated(target, input, seed)) << target << ": " << input;
   EXPECT_TRUE(mutated("gltf", binary + "JSON[1, 2]", 0));
-}
-
-// Cut and changed bytes are what libFuzzer hands over most of the time.
-TEST(Mutators, TakeAnyBytes) {
-  for (const Target& target : targets()) {
-    if (!target.mutate) continue;
-    const auto folder =
-        std::filesystem::path(PREVIZ_SOURCE_DIR) / "tests/fuzz/corpus" / target.name;
-    for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-      const std::string whole = session::content_of(entry.path());
-      std::mt19937 random(1);
-      for (int times = 0; times < 100; ++times) {
-        std::string damaged = whole.substr(0, below(random, whole.size() + 1));
-        if (!damaged.empty()) damaged[below(random, damaged.size())] = static_cast<char>(random());
-        mutated(target.name, damaged, 1);
-      }
-    }
-  }
 }
 
 }  // namespace previz::fuzz::mutators_test

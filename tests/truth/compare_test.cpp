@@ -4,7 +4,6 @@
 
 #include "daemon/lighting/response.hpp"
 #include "drivers/plate.hpp"
-#include "tests/truth/cpu_random.hpp"
 
 namespace previz::truth::compare_test {
 
@@ -63,14 +62,6 @@ TEST(Compare, ErrorsAreRelativeToTheSignalOfTheirBlocks) {
   EXPECT_NEAR(m.bias_diff, 0.1, 1e-5);
   EXPECT_NEAR(m.e_virtual, 0.05 / std::sqrt(3.0), 1e-6);
   EXPECT_NEAR(m.bias_virtual, 0.05 / 3, 1e-6);
-}
-
-TEST(Compare, BlockMeansAverageNoiseAway) {
-  const TruthFrame t = constructed();
-  EstimatedFrame e = perfect(t);
-  // A checkerboard of +-0.05 vanishes in every 8x8 mean.
-  for (std::size_t i = 0; i < e.diff.size(); ++i) e.diff[i] += glm::vec3((i % 2) ? 0.05F : -0.05F);
-  EXPECT_LT(compare(t, e).e_diff, 1e-5);
 }
 
 TEST(Compare, EverythingIsClippedAtTheSensorsWhite) {
@@ -154,17 +145,13 @@ TEST(Compare, PsnrOfAKnownDifference) {
   EXPECT_NEAR(psnr(a, b), 10 * std::log10(255.0 * 255.0 / 25.0), 1e-12);
 }
 
-TEST(Compare, SsimOfConstantAndUncorrelatedPictures) {
+TEST(Compare, SsimOfConstantAndNegatedPictures) {
   Plate a{24, 24, 8, std::vector<std::uint16_t>(24 * 24 * 3, 100)};
   Plate b = a;
   for (auto& sample : b.samples) sample = 120;
   // No variance: only the luminance term is left.
   const double c1 = 2.55 * 2.55;
   EXPECT_NEAR(ssim(a, b), (2 * 100.0 * 120 + c1) / (100.0 * 100 + 120 * 120 + c1), 1e-9);
-  Random random(1, 1);
-  for (auto& sample : a.samples) sample = static_cast<std::uint16_t>(256 * random.uniform());
-  for (auto& sample : b.samples) sample = static_cast<std::uint16_t>(256 * random.uniform());
-  EXPECT_LT(std::abs(ssim(a, b)), 0.1);
   // A negated picture about its mean has covariance -variance.
   for (std::size_t i = 0; i < a.samples.size(); ++i) {
     a.samples[i] = static_cast<std::uint16_t>(i / 3 % 2 ? 140 : 100);
@@ -172,15 +159,6 @@ TEST(Compare, SsimOfConstantAndUncorrelatedPictures) {
   }
   EXPECT_LT(ssim(a, b), -0.7);
   EXPECT_NEAR(ssim(a, a), 1, 1e-12);
-}
-
-TEST(Compare, RefusesPicturesThatDoNotFit) {
-  const TruthFrame t = constructed();
-  EstimatedFrame e = perfect(t);
-  e.diff.pop_back();
-  EXPECT_THROW(compare(t, e), Error);
-  Plate small{10, 10, 8, std::vector<std::uint16_t>(300)};
-  EXPECT_THROW(ssim(small, small), Error);
 }
 
 TEST(Bounds, AllowTheTruthsNoiseAndNameWhatIsViolated) {

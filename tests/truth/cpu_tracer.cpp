@@ -357,10 +357,8 @@ CpuTracer::~CpuTracer() = default;
 
 TracedPicture CpuTracer::trace(const ObserverCalibration& calibration,
                                const glm::dmat4& world_from_camera, std::uint32_t world_bit,
-                               int samples, std::uint64_t seed,
-                               const std::optional<Region>& region) {
-  const Region r =
-      region.value_or(Region{0, 0, calibration.intrinsics.width, calibration.intrinsics.height});
+                               int samples, std::uint64_t seed) {
+  const int width = calibration.intrinsics.width, height = calibration.intrinsics.height;
   const glm::dvec3 eye(world_from_camera[3]);
   const glm::dmat3 rotation(world_from_camera);
   impl_->geometry.place(eye);
@@ -398,20 +396,17 @@ TracedPicture CpuTracer::trace(const ObserverCalibration& calibration,
   };
 
   TracedPicture out;
-  out.width = r.width;
-  out.height = r.height;
-  out.samples = samples;
-  const auto pixels = static_cast<std::size_t>(r.width) * static_cast<std::size_t>(r.height);
+  const auto pixels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   out.mean.resize(pixels);
   out.standard_error.resize(pixels);
   out.mask.resize(pixels);
   out.depth.resize(pixels);
   std::atomic<int> next_row{0};
   const auto work = [&] {
-    for (int row = next_row++; row < r.height; row = next_row++) {
-      for (int column = 0; column < r.width; ++column) {
-        const PixelSums p = pixel(r.x0 + column, r.y0 + row);
-        const auto i = static_cast<std::size_t>(row) * static_cast<std::size_t>(r.width) +
+    for (int row = next_row++; row < height; row = next_row++) {
+      for (int column = 0; column < width; ++column) {
+        const PixelSums p = pixel(column, row);
+        const auto i = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                        static_cast<std::size_t>(column);
         const double n = samples;
         out.mean[i] = p.sum / n;

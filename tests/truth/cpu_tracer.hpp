@@ -6,7 +6,6 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "daemon/lighting/environment.hpp"
@@ -23,15 +22,8 @@ struct TraceOptions {
   bool caustics = true;
 };
 
-// Pixels [x0, x0 + width) x [y0, y0 + height) of the picture.
-struct Region {
-  int x0 = 0, y0 = 0, width = 0, height = 0;
-};
-
-// Row-major, region.width * region.height. Linear Rec. 709 radiance.
+// Row-major. Linear Rec. 709 radiance.
 struct TracedPicture {
-  int width = 0, height = 0;
-  int samples = 0;  // per pixel, independent
   std::vector<glm::dvec3> mean;
   std::vector<glm::dvec3> standard_error;  // of the mean, from the samples' own variance
   std::vector<double> mask;   // share of samples whose first hit of either world is not in both
@@ -46,10 +38,9 @@ class CpuTracer {
   ~CpuTracer();
 
   // `world` is scene::world_mixed or scene::world_real. Two threads; the result depends only on
-  // the arguments. `region` absent: the whole picture.
+  // the arguments.
   TracedPicture trace(const ObserverCalibration& calibration, const glm::dmat4& world_from_camera,
-                      std::uint32_t world, int samples, std::uint64_t seed,
-                      const std::optional<Region>& region = {});
+                      std::uint32_t world, int samples, std::uint64_t seed);
 
  private:
   struct Impl;

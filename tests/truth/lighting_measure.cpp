@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <fstream>
 #include <glm/geometric.hpp>
@@ -12,12 +11,11 @@
 
 #include "daemon/lighting/exr_picture.hpp"
 #include "daemon/lighting/resampling.hpp"
-#include "daemon/output/png.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "drivers/error.hpp"
-#include "drivers/plate.hpp"
 #include "tests/truth/cpu_geometry.hpp"
+#include "tests/truth/truth_take.hpp"
 
 namespace previz::truth {
 namespace {
@@ -28,30 +26,17 @@ using std::numbers::pi;
 constexpr double degree = pi / 180;
 
 FramePtr read_light_frame(const LightFrame& file) {
-  const Plate plate = output::read_png(file.file);
-  Frame frame;
-  frame.source = "light";
+  Frame frame = frame_from_png(file.file, "light");
   frame.timestamp_ns = file.timestamp_ns;
   frame.exposure = file.exposure;
-  frame.format = plate.bits == 8 ? PixelFormat::rgb8 : PixelFormat::rgb16;
-  frame.width = plate.width;
-  frame.height = plate.height;
-  for (const std::uint16_t sample : plate.samples) {
-    frame.bytes.push_back(static_cast<std::uint8_t>(sample & 0xff));
-    if (plate.bits == 16) frame.bytes.push_back(static_cast<std::uint8_t>(sample >> 8));
-  }
   return std::make_shared<Frame>(std::move(frame));
 }
 
 // Per texel: whether the camera sees the environment there.
 std::vector<bool> comparable(const TruthSet& set, int size) {
-  set::Set phantom_only;
-  set::Object& phantom = phantom_only.objects.emplace_back();
-  phantom.name = "phantom";
-  phantom.file = set.phantom;
-  phantom.file_as_written = set.phantom.string();
-  phantom.presence = set::Presence::phantom;
-  const scene::Scene scene = scene::load_scene(phantom_only);
+  set::Set phantom = set_of(set);
+  phantom.objects.pop_back();
+  const scene::Scene scene = scene::load_scene(phantom);
   Geometry geometry(scene);
   const glm::dmat4& pose = set.light_camera->world_from_camera;
   geometry.place(glm::dvec3(pose[3]));
@@ -193,10 +178,7 @@ LightingMeasure measure_lighting(const TruthSet& set, const std::vector<FramePtr
                                  const set::Lighting& settings) {
   if (!set.light_camera) throw Error(set.directory.string() + ": the set has no light camera");
   LightingMeasure measure;
-  const auto start = std::chrono::steady_clock::now();
   measure.captured = lighting::estimate(frames, *set.light_camera, settings);
-  measure.milliseconds =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
   const EnvironmentMap& map = measure.captured.environment;
 
   set::Lighting environment;

@@ -50,7 +50,6 @@ struct LightingMeasure {
   std::vector<LampError> lamps;
   lighting::Extraction extraction;   // of the captured map
   std::vector<SourceError> sources;  // one a lamp, where any was found
-  double milliseconds = 0;           // of lighting::estimate
 };
 
 // The fisheye frames of the set, automatic exposure and brackets. Throws

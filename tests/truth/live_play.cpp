@@ -13,6 +13,7 @@
 #include "daemon/pipeline/take.hpp"
 #include "daemon/pipeline/take_shots.hpp"
 #include "daemon/scene/load.hpp"
+#include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/truth/cpu_camera.hpp"
@@ -24,15 +25,6 @@ namespace {
 constexpr int flicker_step = 4;
 // A point is seen if the ray to it ends within this share of its distance.
 constexpr double seen_tolerance = 2e-3;
-
-// Returns the place of a point, in camera axes, in the picture (Brown 1966, Conrady 1919).
-glm::dvec2 projected(const PinholeIntrinsics& k, const glm::dvec3& camera) {
-  const double x = camera.x / camera.z, y = camera.y / camera.z, r2 = x * x + y * y;
-  const double radial =
-      (1 + r2 * (k.k1 + r2 * (k.k2 + r2 * k.k3))) / (1 + r2 * (k.k4 + r2 * (k.k5 + r2 * k.k6)));
-  return {k.fx * (x * radial + 2 * k.p1 * x * y + k.p2 * (r2 + 2 * x * x)) + k.cx,
-          k.fy * (y * radial + k.p1 * (r2 + 2 * y * y) + 2 * k.p2 * x * y) + k.cy};
-}
 
 std::vector<glm::dvec3> radiance_of(const Plate& picture, const lighting::Response& response,
                                     double exposure) {
@@ -58,7 +50,7 @@ bool Flicker::find(const Seen& frame, const glm::dvec3& point, glm::dvec3& added
   const glm::dvec3 seen = glm::transpose(glm::dmat3(frame.world_from_camera)) * (point - camera);
   if (seen.z <= 0) return false;
   const PinholeIntrinsics& k = calibration_.intrinsics;
-  const glm::dvec2 at = projected(k, seen);
+  const glm::dvec2 at = distort(k, {seen.x / seen.z, seen.y / seen.z});
   if (!(at.x >= 0 && at.y >= 0 && at.x < k.width - 1 && at.y < k.height - 1)) return false;
   const double distance = glm::length(point - camera);
   const std::optional<Hit> hit =

@@ -145,14 +145,7 @@ std::filesystem::path truth_directory(const std::string& name) {
 
 View truth_view(const std::filesystem::path& directory) {
   const truth::TruthSet truth_set = truth::load_truth_set(directory);
-  set::Set set;
-  set.objects.resize(2);
-  set.objects[0].name = "phantom";
-  set.objects[0].file = truth_set.phantom;
-  set.objects[0].presence = set::Presence::phantom;
-  set.objects[1].name = "virtual";
-  set.objects[1].file = truth_set.virtual_objects;
-  set.lighting.environment = truth_set.environment;
+  set::Set set = truth::set_of(truth_set);
   set.lighting.resolution = 256;
   View view;
   view.scene = scene::load_scene(set);

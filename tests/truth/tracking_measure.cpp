@@ -1,7 +1,6 @@
 #include "tests/truth/tracking_measure.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
@@ -23,13 +22,9 @@ namespace previz::truth {
 namespace {
 
 std::vector<glm::dvec3> virtual_vertices(const TruthSet& set) {
-  set::Set scene_set;
-  set::Object object;
-  object.name = "virtual";
-  object.file = set.virtual_objects;
-  object.file_as_written = set.virtual_objects.string();
-  scene_set.objects.push_back(object);
-  const scene::Scene scene = scene::load_scene(scene_set);
+  set::Set objects = set_of(set);
+  objects.objects.erase(objects.objects.begin());  // the phantom
+  const scene::Scene scene = scene::load_scene(objects);
   std::vector<glm::dvec3> vertices;
   for (const scene::Instance& instance : scene.instances)
     for (const glm::vec3& p : scene.meshes[instance.mesh].positions)
@@ -142,9 +137,8 @@ Frame read_frame(const std::filesystem::path& file) {
     frame.format = deep ? PixelFormat::gray16 : PixelFormat::gray8;
   } else {
     frame.format = deep ? PixelFormat::rgb16 : PixelFormat::rgb8;
-    const int first[3] = {2, 1, 0};  // OpenCV's order is B, G, R
     cv::Mat rgb(picture.rows, picture.cols, deep ? CV_16UC3 : CV_8UC3);
-    const int pairs[6] = {first[0], 0, first[1], 1, first[2], 2};
+    const int pairs[6] = {2, 0, 1, 1, 0, 2};  // OpenCV's order is B, G, R
     cv::mixChannels(&picture, 1, &rgb, 1, pairs, 3);
     picture = rgb;
   }
@@ -176,10 +170,7 @@ std::vector<TrackedFrame> measure_tracking(const TruthSet& set, const set::Track
     frame.timestamp_ns = observed.timestamp_ns;
     TrackedFrame row;
     row.index = observed.index;
-    const auto start = std::chrono::steady_clock::now();
     row.track = tracker->track(frame);
-    row.milliseconds =
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     if (row.track.pose) compare_pose(set, vertices, observed.world_from_camera, &row);
     const auto shown = filter.shown(row.track, frame.timestamp_ns);
     const auto errors = [&](const glm::dmat4* pose) {
@@ -204,11 +195,9 @@ std::vector<TrackedFrame> measure_tracking(const TruthSet& set, const set::Track
     const auto detections = detector.detect(frame, settings.decimate);
     for (const set::Tag& tag : set.tags) {
       const auto exact = exact_corners(set, tag, truth);
-      if (std::all_of(exact.begin(), exact.end(), [](const auto& c) { return c.has_value(); }))
-        ++row.visible_tags;
       for (const tracking::TagDetection& d : detections) {
         if (d.id != tag.id) continue;
-        CornerError error{d.id, d.margin, d.refined, d.trouble, {}, 0};
+        CornerError error{d.id, d.trouble, {}, 0};
         cv::Matx<double, 8, 1> e = cv::Matx<double, 8, 1>::zeros();
         for (std::size_t i = 0; i < 4; ++i) {
           if (!exact[i]) continue;

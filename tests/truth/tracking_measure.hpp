@@ -21,8 +21,6 @@ set::Tracking tracking_settings(const TruthSet& set);
 // One seen tag, its corners against the exact ones.
 struct CornerError {
   int id = 0;
-  double margin = 0;
-  bool refined = false;
   std::string trouble;
   std::vector<glm::dvec2> error_px;  // measured - exact, four
   double chi_square = 0;             // of the error against the stated covariance, 8 degrees
@@ -32,14 +30,12 @@ struct TrackedFrame {
   int index = 0;
   tracking::Track track;
   std::vector<CornerError> corners;  // of every tag of the map that was detected
-  int visible_tags = 0;              // that lie in the picture by the true pose (may be covered)
   // Only where tracked:
   double vertex_px = 0;  // mean over the virtual vertices in the picture, tracked against true
   double vertex_max_px = 0;
   double reprojection_px = 0;  // mean over the corners of the tags used, likewise
   double rotation_rad = 0, translation_m = 0;
   double error_squared = 0;  // normalised by the covariance: chi-square of 6 degrees
-  double milliseconds = 0;
   // What a live picture shows; absent where it shows nothing.
   double held_s = 0;
   std::optional<double> shown_px;  // as vertex_px

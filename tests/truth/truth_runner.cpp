@@ -43,13 +43,17 @@ struct JudgedFrame {
   Measures measures;
   post::FinishedFrame record;
   std::vector<std::string> violations;
+  std::optional<Chance> chance;
 };
 
 JudgedFrame judge_frame(const TruthSet& set, int frame, const Arguments& arguments,
                         const fs::path& directory) {
-  RenderedFrame rendered = render_truth_frame(set, frame, arguments.render, directory);
+  RenderedFrame rendered = arguments.render.reference
+                               ? trace_truth_frame(set, frame, arguments.render.samples)
+                               : render_truth_frame(set, frame, arguments.render, directory);
   JudgedFrame out;
   out.record = std::move(rendered.record);
+  out.chance = rendered.chance;
   EstimatedFrame estimate = std::move(rendered.estimate);
 
   const TruthFrame truth = load_truth_frame(set, frame);
@@ -115,6 +119,11 @@ void print_row(const std::string& set, int frame, const JudgedFrame& judged) {
               m.e_virtual, m.noise_virtual.value_or(0), m.e_mask, m.e_mask_edge, m.psnr, m.ssim,
               m.e_edge, m.e_real, judged.record.render_s);
   if (!judged.record.reason.empty()) std::printf("    %s\n", judged.record.reason.c_str());
+  // The mean of two halves is off by a half of what they are off each other.
+  if (judged.chance)
+    std::printf("    by chance: e_diff %.4f, e_virt %.4f; biases: diff %+.5f, virt %+.5f\n",
+                judged.chance->e_diff / std::sqrt(2), judged.chance->e_virtual / std::sqrt(2),
+                m.bias_diff, m.bias_virtual);
   for (const std::string& line : judged.violations) std::printf("    BOUND %s\n", line.c_str());
   std::fflush(stdout);
 }
@@ -260,6 +269,8 @@ int main(int argc, char** argv) {
   app.add_option("--neighbours", arguments.render.neighbours,
                  "with --denoise, average with this many frames on each side [0]")
       ->check(CLI::Range(0, 4));
+  app.add_flag("--reference", arguments.render.reference, "by the reference CPU tracer")
+      ->excludes(live);
   app.add_option("--out", arguments.out, "directory for the pictures and figures")->required();
   app.add_option("--bounds", arguments.bounds, "judge by this row of bounds")
       ->check(CLI::IsMember({"paired", "full", "captured"}));

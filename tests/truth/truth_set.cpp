@@ -387,6 +387,22 @@ void expose_longer(TruthSet& set, double times, const fs::path& directory) {
   }
 }
 
+set::Set set_of(const TruthSet& truth) {
+  set::Set set;
+  const auto add = [&](const char* name, const fs::path& file, set::Presence presence) {
+    set::Object& object = set.objects.emplace_back();
+    object.name = name;
+    object.file = file;
+    object.file_as_written = file.string();
+    object.presence = presence;
+  };
+  add("phantom", truth.phantom, set::Presence::phantom);
+  add("virtual", truth.virtual_objects, set::Presence::virtual_object);
+  set.lighting.environment = truth.environment;
+  set.lighting.environment_as_written = truth.environment.string();
+  return set;
+}
+
 const ObserverFrame& observer_frame(const TruthSet& set, int frame) {
   const auto found = std::find_if(set.frames.begin(), set.frames.end(),
                                   [&](const auto& f) { return f.index == frame; });

@@ -66,6 +66,9 @@ TruthFrame load_truth_frame(const TruthSet& set, int frame);
 // file.
 void expose_longer(TruthSet& set, double times, const std::filesystem::path& directory);
 
+// The objects and the true environment as a set, whose scene and light can be loaded.
+set::Set set_of(const TruthSet& truth);
+
 const ObserverFrame& observer_frame(const TruthSet& set, int frame);
 
 // "0012"

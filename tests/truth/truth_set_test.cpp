@@ -1,13 +1,10 @@
-// Ground truth sets: read from disk, refused where they are wrong, turned into sessions.
+// Ground truth sets: read from disk, and refused where they are wrong. That they become sessions is
+// shown by what is made of these (truth_picture_test.cpp, runner_test.sh).
 #include "tests/truth/truth_set.hpp"
 #include "tests/support/test.hpp"
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/set/load.hpp"
-#include "daemon/set/set.hpp"
-#include "drivers/plate.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/truth/truth_take.hpp"
 
 namespace previz::truth::truth_set_test {
@@ -85,14 +82,6 @@ TEST(TruthSet, ReadsTruthPicturesAndThePlate) {
   EXPECT_NEAR(truth.mixed_rmse_of_mean.value(), 0.036561, 1e-5);
 }
 
-TEST_F(ChangedSet, WithoutLensOrDistortionIsAPinhole) {
-  json_["observer"]["lens"] = nullptr;
-  json_["observer"].erase("distortion");
-  const TruthSet set = load();
-  EXPECT_FALSE(set.observer.lens);
-  EXPECT_EQ(set.observer.intrinsics.k1, 0);
-}
-
 TEST_F(ChangedSet, UnderstandsOtherResponses) {
   json_["observer"]["response"] = "value = floor(255*clip(signal)^(1/2.4)+0.5)";
   TruthSet set = load();
@@ -105,15 +94,17 @@ TEST_F(ChangedSet, UnderstandsOtherResponses) {
   EXPECT_THAT(refusal(), HasSubstr("set.observer.response: 'S-Log3' is not understood"));
 }
 
-TEST_F(ChangedSet, WithoutLightCameraTagsOrStatisticsStillLoads) {
+TEST_F(ChangedSet, MayBeOfAPinholeWithoutLightCameraTagsOrStatistics) {
+  json_["observer"]["lens"] = nullptr;
+  json_["observer"].erase("distortion");
   json_.erase("light_camera");
   json_.erase("tags");
   json_["truth"].erase("statistics");
   const TruthSet set = load();
+  EXPECT_FALSE(set.observer.lens);
+  EXPECT_EQ(set.observer.intrinsics.k1, 0);
   EXPECT_FALSE(set.light_camera);
   EXPECT_FALSE(load_truth_frame(set, 0).diff_rmse);
-  const fs::path session = directory_ / "session";
-  write_take(set, {}, session);
   EXPECT_THROW(write_take(set, {LightFrom::captured, PoseFrom::truth}, directory_ / "a"), Error);
   EXPECT_THROW(write_take(set, {LightFrom::truth, PoseFrom::tracked}, directory_ / "b"), Error);
 }
@@ -130,54 +121,6 @@ TEST_F(ChangedSet, RefusalsNameFileAndKey) {
   json_["observer"]["vignetting"] = nullptr;
   json_["truth"]["frames"] = {23};
   EXPECT_THAT(refusal(), HasSubstr("no frame has both truth and picture"));
-}
-
-TEST_F(ChangedSet, BecomesASession) {
-  const TruthSet set = load();
-  const fs::path directory = directory_ / "session";
-  write_take(set, {}, directory);
-  session::Session session = session::open_session(directory);
-  EXPECT_TRUE(session.missing.empty());
-  ASSERT_EQ(session.track.size(), 2u);
-  EXPECT_TRUE(session.track[1].tracked);
-  EXPECT_EQ(session.track[1].world_from_camera, set.frames[1].world_from_camera);
-  ASSERT_TRUE(session.info.observer && session.info.observer->lens);
-  EXPECT_DOUBLE_EQ(session.info.observer->lens->f_number, 2.0);
-  const auto observer = session::open_stream(session, "observer");
-  ASSERT_EQ(observer->records().size(), 2u);
-  EXPECT_EQ(observer->records()[1].timestamp_ns, 1700000001045871617);
-  EXPECT_DOUBLE_EQ(observer->records()[1].exposure, 1.1);
-  const auto light = session::open_stream(session, "light");
-  ASSERT_EQ(light->records().size(), 7u);
-  EXPECT_DOUBLE_EQ(light->records()[0].exposure, 0.0001953125);
-  // The very samples of the picture.
-  const FramePtr frame = observer->read(1);
-  const TruthFrame truth = load_truth_frame(set, 12);
-  const Plate plate = to_plate(*frame);
-  EXPECT_EQ(
-      plate.samples,
-      displayed(truth.plate, truth.width, truth.height, truth.exposure, truth.response).samples);
-}
-
-TEST_F(ChangedSet, ItsSetFileIsOneTheParserTakes) {
-  const TruthSet truth = load();
-  for (const LightFrom light : {LightFrom::truth, LightFrom::captured}) {
-    for (const PoseFrom pose : {PoseFrom::truth, PoseFrom::tracked}) {
-      const set::Set set =
-          set::parse_set(set_file_text(truth, {light, pose}), directory_ / "set.toml");
-      EXPECT_EQ(set.name, "glass");
-      ASSERT_EQ(set.objects.size(), 2u);
-      EXPECT_EQ(set.objects[1].presence, set::Presence::virtual_object);
-      EXPECT_EQ(set.lighting.environment.has_value(), light == LightFrom::truth);
-      EXPECT_EQ(set.tracking.enabled, pose == PoseFrom::tracked);
-      ASSERT_EQ(set.tracking.tags.size(), 3u);
-      for (int c = 0; c < 4; ++c)
-        EXPECT_LT(
-            glm::length(set.tracking.tags[2].world_from_tag[c] - truth.tags[2].world_from_tag[c]),
-            1e-12);
-      EXPECT_EQ(set.estimation.max_depth, 16);
-    }
-  }
 }
 
 }  // namespace previz::truth::truth_set_test

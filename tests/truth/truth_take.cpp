@@ -50,25 +50,6 @@ std::string as_written(const fs::path& file) {
   return file.filename().string();
 }
 
-Frame frame_from_png(const fs::path& file, const char* source, int width, int height) {
-  const Plate plate = output::read_png(file);
-  if (plate.width != width || plate.height != height) {
-    throw Error(file.string() + ": is " + std::to_string(plate.width) + "x" +
-                std::to_string(plate.height) + ", but set.json says " + std::to_string(width) +
-                "x" + std::to_string(height));
-  }
-  Frame frame;
-  frame.source = source;
-  frame.width = width;
-  frame.height = height;
-  frame.format = plate.bits == 8 ? PixelFormat::rgb8 : PixelFormat::rgb16;
-  for (const std::uint16_t sample : plate.samples) {
-    frame.bytes.push_back(static_cast<std::uint8_t>(sample & 0xff));
-    if (plate.bits > 8) frame.bytes.push_back(static_cast<std::uint8_t>(sample >> 8));
-  }
-  return frame;
-}
-
 // Written as a shutter time with unit gain and responsivity, so that exposure is their product.
 void stamp(Frame& frame, std::uint64_t sequence, std::int64_t timestamp_ns, double exposure) {
   frame.sequence = sequence;
@@ -91,6 +72,20 @@ void require(const TruthSet& set, const TakeOptions& options) {
 }
 
 }  // namespace
+
+Frame frame_from_png(const fs::path& file, const char* source) {
+  const Plate plate = output::read_png(file);
+  Frame frame;
+  frame.source = source;
+  frame.width = plate.width;
+  frame.height = plate.height;
+  frame.format = plate.bits == 8 ? PixelFormat::rgb8 : PixelFormat::rgb16;
+  for (const std::uint16_t sample : plate.samples) {
+    frame.bytes.push_back(static_cast<std::uint8_t>(sample & 0xff));
+    if (plate.bits > 8) frame.bytes.push_back(static_cast<std::uint8_t>(sample >> 8));
+  }
+  return frame;
+}
 
 std::string set_file_text(const TruthSet& set, const TakeOptions& options) {
   std::ostringstream out;
@@ -141,18 +136,16 @@ void write_take(const TruthSet& set, const TakeOptions& options, const fs::path&
   }
 
   if (set.light_camera) {
-    const FisheyeIntrinsics& k = set.light_camera->intrinsics;
     for (std::size_t i = 0; i < set.light_frames.size(); ++i) {
       const LightFrame& light = set.light_frames[i];
-      Frame frame = frame_from_png(light.file, "light", k.width, k.height);
+      Frame frame = frame_from_png(light.file, "light");
       stamp(frame, i, light.timestamp_ns, light.exposure);
       writer.write(frame);
     }
   }
-  const PinholeIntrinsics& k = set.observer.intrinsics;
   for (std::size_t i = 0; i < set.frames.size(); ++i) {
     const ObserverFrame& observer = set.frames[i];
-    Frame frame = frame_from_png(observer.file, "observer", k.width, k.height);
+    Frame frame = frame_from_png(observer.file, "observer");
     stamp(frame, static_cast<std::uint64_t>(observer.index), observer.timestamp_ns, set.exposure);
     writer.write(frame);
     if (options.pose == PoseFrom::tracked) continue;

@@ -24,6 +24,9 @@ struct TakeOptions {
 // rendered with at most 16 bounces.
 std::string set_file_text(const TruthSet& set, const TakeOptions& options);
 
+// An 8- or 16-bit PNG as a camera would have delivered it.
+Frame frame_from_png(const std::filesystem::path& file, const char* source);
+
 // Writes the session; the directory must not exist or be empty. The i-th observer frame of the
 // session is set.frames[i]. True poses go into the track. Throws previz::Error naming the file that
 // cannot be read or written, or what the set lacks for these options.

@@ -13,15 +13,6 @@
 namespace previz::bench {
 namespace {
 
-set::Object object(const char* name, const std::filesystem::path& file, set::Presence presence) {
-  set::Object result;
-  result.name = name;
-  result.file = file;
-  result.file_as_written = file.string();
-  result.presence = presence;
-  return result;
-}
-
 int chosen_frame(const truth::TruthSet& set, std::optional<int> frame) {
   if (set.truth_frames.empty()) throw Error(set.directory.string() + ": has no truth frame");
   if (!frame) return set.truth_frames.front();
@@ -38,11 +29,7 @@ View load_view(const std::filesystem::path& directory, std::optional<int> frame,
   View view;
   view.set = truth.name;
   view.frame = chosen_frame(truth, frame);
-  set::Set set;
-  set.objects = {object("phantom", truth.phantom, set::Presence::phantom),
-                 object("virtual", truth.virtual_objects, set::Presence::virtual_object)};
-  set.lighting.environment = truth.environment;
-  set.lighting.environment_as_written = truth.environment.string();
+  set::Set set = truth::set_of(truth);
   view.scene = scene::load_scene(set);
   set.lighting.mode = light;
   lighting::Lighting lighting = lighting::load_environment(set.lighting);

@@ -108,23 +108,6 @@ TEST(Smoothing, WhatChangesByItselfLeavesTheRestAveraged) {
     EXPECT_NEAR(picture.radiance[static_cast<std::size_t>(p)].g, 59 % 7, 6 * pixel_sigma);
 }
 
-TEST(Smoothing, TotalFluxOfAStaticSceneStandsStill) {
-  std::mt19937 random(5);
-  Smoothing smoothing(0.25);
-  double sum = 0, squares = 0;
-  constexpr int frames = 100;
-  for (int i = 0; i < frames; ++i) {
-    HdrPicture picture = noisy(grey, random);
-    smoothing(picture, i * frame_ns);
-    const double flux = sum_of(picture) / picture_pixels;
-    sum += flux;
-    squares += flux * flux;
-  }
-  const double mean = sum / frames;
-  EXPECT_LT(std::sqrt(std::max(0.0, squares / frames - mean * mean)) / mean, 0.005);
-  EXPECT_NEAR(mean, 1, 5 * pixel_sigma / std::sqrt(static_cast<double>(picture_pixels)));
-}
-
 TEST(Smoothing, APictureOfAnotherSizeStartsAnew) {
   std::mt19937 random(6);
   Smoothing smoothing(10);

@@ -38,20 +38,6 @@ TEST(StageThreads, EndOfStreamRunsThroughTheWholeLine) {
   EXPECT_EQ(snapshot.stages.at("display").frames, 100u);
 }
 
-TEST(StageThreads, MailboxDropsAreCountedByStageAndCause) {
-  Metrics metrics;
-  Mailbox<std::unique_ptr<int>> mailbox;
-  std::atomic<int> shown = 0;
-  StageThreads stages(metrics, {});
-  stages.source("camera", mailbox, count_to(5000));
-  stages.sink("display", mailbox, [&](std::unique_ptr<int>) { ++shown; });
-  stages.wait();
-  const MetricsSnapshot snapshot = metrics.snapshot(1);
-  const auto& dropped = snapshot.stages.at("display").dropped;
-  const std::uint64_t count = dropped.contains("newer frame") ? dropped.at("newer frame") : 0;
-  EXPECT_EQ(shown + count, 5000u);
-}
-
 // In front of a stage that stands still each kind of queue fills, says for how long and with how
 // much, and then drops by its rule or takes no more.
 TEST(StageThreads, WhatWaitsInFrontOfAStageIsInItsMetricsUntilItDrops) {

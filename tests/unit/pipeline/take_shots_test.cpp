@@ -52,10 +52,6 @@ TEST_F(TakeShotsTest, EveryFrameComesOnceWithItsPoseAndItsLight) {
   EXPECT_EQ(shots[1].light, shots.back().light);  // the same light frames
 }
 
-TEST_F(TakeShotsTest, ATakeCanBeGoneThroughAgain) {
-  EXPECT_EQ(all().size(), all().size());
-}
-
 // Whatever session.toml says, files outside of the session are not read as its assets.
 TEST_F(TakeShotsTest, ATakeCannotMakeForeignFilesItsAssets) {
   replace_quoted("\"assets/", "../floor.gltf");

@@ -37,16 +37,16 @@ struct Lit {
   std::vector<set::Light> lamps;
 };
 
-Lit split(const lighting::EnvironmentMap& map, set::LightMode mode,
-          std::optional<double> distance_m = {}) {
+Lit split(const lighting::EnvironmentMap& map, set::LightMode mode) {
   lighting::Lighting lighting;
   lighting.environment = map;
   set::Lighting settings;
   settings.mode = mode;
   lighting::SourceTracker tracker(0);
   lighting::apply_mode(lighting, settings, tracker, 0);
-  return {lighting.environment, lighting::lamps_of(lighting.sources, glm::dvec3(0),
-                                                   [=](const glm::dvec3&) { return distance_m; })};
+  return {lighting.environment,
+          lighting::lamps_of(lighting.sources, glm::dvec3(0),
+                             [](const glm::dvec3&) { return std::optional<double>(); })};
 }
 
 class SourceLight : public ::testing::Test {
@@ -91,24 +91,6 @@ TEST_F(SourceLight, LightsAsTheImageItWasTakenOutOf) {
     expect_same(split_up.mixed, image.mixed);
     expect_same(split_up.difference, image.difference);
   }
-}
-
-// A sphere 100 times as far off as the scene is wide lights it like the distant disc.
-TEST_F(SourceLight, FarAwayASphereIsADisc) {
-  const Lit disc = split(view_.environment, set::LightMode::hybrid);
-  const Lit sphere = split(view_.environment, set::LightMode::hybrid, 100.0);
-  ASSERT_EQ(sphere.lamps.front().type, set::LightType::sphere);
-  // The ball's 0.4 m at 100 m: half a percent of distance, one of flux.
-  EXPECT_NEAR(mean(rendered(sphere, 64).mixed).g / mean(rendered(disc, 64).mixed).g, 1, 0.02);
-}
-
-// The light is the same in both worlds, so nothing is put onto the plate where nothing is virtual.
-TEST_F(SourceLight, WithoutAVirtualObjectTheDifferenceIsZero) {
-  View view = ball_on_floor();
-  view.scene.instances.pop_back();
-  renderer_.set_scene(view.scene);
-  for (const glm::vec3& pixel : rendered(split(view_.environment, set::LightMode::hybrid), 4).diff)
-    EXPECT_EQ(pixel, glm::vec3(0));
 }
 
 // A lamp that goes out between two frames is gone in the next, with the pipelines of the first.
