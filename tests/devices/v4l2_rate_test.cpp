@@ -71,7 +71,7 @@ TEST(V4l2Configure, ARateThatNoDeviceHasIsRefusedWithThoseOnOffer) {
   FakeDevice device;
   device.rates = {{V4L2_PIX_FMT_YUYV, {5, 2}}};
   for (const auto& [rate_hz, text] : {std::pair{-1.0, "-1"}, std::pair{1e6, "1e+06"}})
-    EXPECT_EQ(test::error_of([&] { open(device, asking(rate_hz)); }),
+    EXPECT_EQ(test::error_of([&, wanted = asking(rate_hz)] { open(device, wanted); }),
               "usb-cam: rate_hz " + std::string(text) +
                   " is not possible; allowed: 5, 2 (pixel_format YUYV) at 32x24; "
                   "change rate_hz or remove it");

@@ -121,9 +121,9 @@ TEST(PictureSize, ThatIsAveragedFitsOrIsRefused) {
 // More than any Vulkan device can address: refused at once, though a set file may ask for it.
 TEST(PictureSize, OfMoreThanTheDeviceHoldsIsRefusedByTheRenderer) {
   for (const auto& [width, height] : {std::pair(65535, 65535), std::pair(0, 10)}) {
-    EXPECT_THAT(
-        words_of([&] { render::Renderer(shared_device(), {}, pinhole(width, height, 0.5)); }),
-        HasSubstr(std::to_string(width) + "x"));
+    const ObserverCalibration camera = pinhole(width, height, 0.5);
+    EXPECT_THAT(words_of([&] { render::Renderer(shared_device(), {}, camera); }),
+                HasSubstr(std::to_string(width) + "x"));
   }
 }
 

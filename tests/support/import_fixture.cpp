@@ -150,7 +150,7 @@ ImportReport Shoot::import() const {
 }
 
 std::string Shoot::error() const {
-  const std::string message = test::error_of([&] { import(); });
+  std::string message = test::error_of([&] { import(); });
   if (message.empty()) return "";
   EXPECT_FALSE(std::filesystem::exists(session()));
   for (const auto& entry : std::filesystem::directory_iterator(folder()))

@@ -67,7 +67,7 @@ class RigLive : public testing::Test {
 
   // Replaces words of the set file. Returns its text as it was before.
   std::string replace_in_set(const std::string& old, const std::string& by) {
-    const std::string before = session::read_file(directory_ / "set.toml");
+    std::string before = session::read_file(directory_ / "set.toml");
     std::string text = before;
     EXPECT_THAT(text, HasSubstr(old));
     text.replace(text.find(old), old.size(), by);

@@ -47,7 +47,7 @@ class Pages {
     std::unique_lock lock(mutex_);
     await(
         news_, lock, [&] { return !unread_.empty(); }, [] { return std::string("no page"); });
-    const output::OsdPage page = unread_.front();
+    output::OsdPage page = std::move(unread_.front());
     unread_.pop_front();
     return page;
   }

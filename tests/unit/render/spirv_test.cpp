@@ -88,7 +88,7 @@ TEST(Spirv, NoPixelDependsOnAFeatureThatIsOnlyCompiledIn) {
   const auto layers_with = [&](std::uint32_t features) {
     SetRenderer renderer(view, up_to_depth(3));
     renderer.carry(features);
-    const render::Layers layers = renderer.rendered_clean(2);
+    render::Layers layers = renderer.rendered_clean(2);
     EXPECT_NE(carried & ~renderer.needed(), 0u);
     return layers;
   };
