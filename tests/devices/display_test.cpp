@@ -141,6 +141,16 @@ TEST_P(KmsScreen, IsReleasedToOthersAndTakenBack) {
   EXPECT_TRUE(std::holds_alternative<Shown>(display->show(screenful(mode, 100))));
 }
 
+TEST_P(KmsScreen, IsOpenedAgainAndAgainWithoutALeak) {
+  std::size_t first = 0;
+  for (int i = 0; i < 5; ++i) {
+    const auto display = open();
+    ASSERT_TRUE(std::holds_alternative<Shown>(display->show(screenful(display->mode(), 10 * i))));
+    if (i == 1) first = test::open_descriptors();
+  }
+  EXPECT_LE(test::open_descriptors(), first);
+}
+
 // The cable by the kernel's own switch for connectors, and its word that something has changed.
 class Cable {
  public:

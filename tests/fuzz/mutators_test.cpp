@@ -71,8 +71,19 @@ Json tree_of_json(const std::string& text) {
 
 // The writers write what their parsers take, whatever the tree is, so all are of the format.
 void expect_trees(const char* target, const char* file, Json (*tree_of)(const std::string&)) {
-  for (const std::string& output : mutations(target, kept(target, file)))
-    ASSERT_FALSE(tree_of(output).is_discarded()) << output;
+  const std::vector<std::string> all = mutations(target, kept(target, file));
+  for (const std::string& output : all) ASSERT_FALSE(tree_of(output).is_discarded()) << output;
+  const std::size_t leaves = tree_of(kept(target, file)).flatten().size();
+  const auto has = [&](const std::function<bool(const std::string&)>& is) {
+    return std::ranges::any_of(all, is);
+  };
+  const auto leaves_of = [&](const std::string& output) {
+    return tree_of(output).flatten().size();
+  };
+  EXPECT_TRUE(has([&](const std::string& output) { return leaves_of(output) < leaves; })) << "drop";
+  EXPECT_TRUE(has([&](const std::string& output) { return leaves_of(output) > leaves; })) << "add";
+  for (const char* extreme : {"9223372036854775807", "9007199254740993", "-1", "../.."})
+    EXPECT_THAT(all, Contains(HasSubstr(extreme)));
 }
 
 TEST(Mutators, ChangeToml) {
@@ -91,13 +102,16 @@ TEST(Mutators, ChangeLinesOfJson) {
        {std::pair{"frame_lines", "observer.jsonl"}, std::pair{"track_lines", "track.jsonl"},
         std::pair{"button_lines", "events.jsonl"}}) {
     SCOPED_TRACE(target);
+    const std::string input = kept(target, file);
     std::set<std::ptrdiff_t> counts;
-    for (const std::string& output : mutations(target, kept(target, file))) {
+    for (const std::string& output : mutations(target, input)) {
       std::istringstream lines(output);
       for (std::string line; std::getline(lines, line);) ASSERT_TRUE(Json::accept(line)) << line;
       counts.insert(std::ranges::count(output, '\n'));
     }
-    EXPECT_GE(counts.size(), 3u);  // lines are dropped and repeated
+    const std::ptrdiff_t before = std::ranges::count(input, '\n');
+    EXPECT_LT(*counts.begin(), before) << "no line is dropped";
+    EXPECT_GT(*counts.rbegin(), before) << "no line is repeated";
   }
 }
 
@@ -192,6 +206,7 @@ TEST(Mutators, ChangeMatroska) {
       right += is_matroska(std::string_view(output).substr(first)) ? 1 : 0;
     }
     EXPECT_GT(right, many * 80 / 100);
+    EXPECT_LT(right, many) << "no size is wrong";
   }
 }
 

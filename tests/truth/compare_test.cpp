@@ -138,6 +138,15 @@ TEST(Compare, WhatACompositeShowsIsMeasuredInPlaceOfItsLayers) {
   EXPECT_EQ(as_composited({}, e).diff[1], e.composite[1]);
 }
 
+TEST(Compare, RefusesPicturesThatDoNotFit) {
+  const TruthFrame t = constructed();
+  EstimatedFrame e = perfect(t);
+  e.diff.pop_back();
+  EXPECT_THROW(compare(t, e), Error);
+  const Plate small{10, 10, 8, std::vector<std::uint16_t>(300)};
+  EXPECT_THROW(ssim(small, small), Error);
+}
+
 TEST(Compare, PsnrOfAKnownDifference) {
   Plate a{16, 16, 8, std::vector<std::uint16_t>(16 * 16 * 3, 100)};
   Plate b = a;

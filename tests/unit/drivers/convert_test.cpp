@@ -126,19 +126,23 @@ TEST(Yuv, OddWidthsHaveHalfAMacroPixel) {
   EXPECT_EQ(frame.bytes, (Bytes{1, 3, 5, 2, 6, 4, 8}));
 }
 
-// Converted here or later from yuv422p8: the same pixels.
+// Converted here or later from yuv422p8: the same pixels. The last column of an even width has the
+// chroma of the one before it.
 TEST(Yuv, BothWaysFrom422AgreeForBt709) {
-  const int width = 31, height = 9;
-  WireFormat format{Layout::uyvy, 8, Packing::words, YuvMatrix::bt709, YuvRange::limited};
-  const Bytes bytes = random_bytes(picture_bytes(format, width, height), 1);
-  const Plate plate = to_plate(converted(format, width, height, bytes));
-  const YuvToRgb to_rgb(YuvMatrix::bt709, YuvRange::limited);
-  for (int x = 0; x < width; ++x) {
-    const int left = 4 * (x / 2), right = 4 * std::min(x / 2 + x % 2, 15);
-    std::array<std::uint8_t, 3> rgb{};
-    to_rgb(bytes[2 * x + 1], 4 * (bytes[left] + bytes[right]),
-           4 * (bytes[left + 2] + bytes[right + 2]), rgb.data());
-    for (int c = 0; c < 3; ++c) EXPECT_EQ(plate.samples[3 * x + c], rgb[c]);
+  for (const int width : {31, 32}) {
+    SCOPED_TRACE(width);
+    WireFormat format{Layout::uyvy, 8, Packing::words, YuvMatrix::bt709, YuvRange::limited};
+    const int height = 9;
+    const Bytes bytes = random_bytes(picture_bytes(format, width, height), 1);
+    const Plate plate = to_plate(converted(format, width, height, bytes));
+    const YuvToRgb to_rgb(YuvMatrix::bt709, YuvRange::limited);
+    for (int x = 0; x < width; ++x) {
+      const int left = 4 * (x / 2), right = 4 * std::min(x / 2 + x % 2, 15);
+      std::array<std::uint8_t, 3> rgb{};
+      to_rgb(bytes[2 * x + 1], 4 * (bytes[left] + bytes[right]),
+             4 * (bytes[left + 2] + bytes[right + 2]), rgb.data());
+      for (int c = 0; c < 3; ++c) EXPECT_EQ(plate.samples[3 * x + c], rgb[c]) << x;
+    }
   }
 }
 

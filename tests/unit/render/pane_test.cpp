@@ -110,7 +110,7 @@ TEST(Pane, IsPassedOnceByARayThatForksCloseBehindIt) {
   View view = empty_view({0, 0, 1}, {0, 0, 0}, pinhole(16, 16, 0.3), glm::vec3(1));
   const auto wall = add_mesh(view.scene, rectangle_mesh({4, 4}));
   add_instance(view.scene, wall, add_material(view.scene, pane(tint)));
-  // The ray's length is 1.
+  // It is 5e-5 of the ray's length behind the pane.
   add_instance(view.scene, wall, add_material(view.scene, diffuse(glm::vec3(0))), at({0, 0, -5e-5}),
                scene::world_mixed);
   const Rendered result = render_clean(view, 64, up_to_depth(1));

@@ -70,6 +70,7 @@ TEST_F(GltfMaterials, ReadsEveryFactor) {
       "KHR_materials_transmission": {"transmissionFactor": 0.9},
       "KHR_materials_ior": {"ior": 1.33},
       "KHR_materials_specular": {"specularFactor": 0.7},
+      "KHR_materials_clearcoat": {"clearcoatFactor": 0.5, "clearcoatRoughnessFactor": 0.25},
       "KHR_materials_volume": {"thicknessFactor": 0.01, "attenuationColor": [0.8, 0.9, 1],
                                "attenuationDistance": 0.5}}})"_json);
   EXPECT_EQ(m.name, "all");
@@ -83,6 +84,8 @@ TEST_F(GltfMaterials, ReadsEveryFactor) {
   EXPECT_EQ(m.transmission, 0.9f);
   EXPECT_EQ(m.ior, 1.33f);
   EXPECT_EQ(m.specular, 0.7f);
+  EXPECT_EQ(m.clearcoat, 0.5f);
+  EXPECT_EQ(m.clearcoat_roughness, 0.25f);
   EXPECT_FALSE(m.thin_walled);
   EXPECT_EQ(m.attenuation_color, glm::vec3(0.8f, 0.9f, 1));
   EXPECT_EQ(m.attenuation_distance_m, 0.5f);

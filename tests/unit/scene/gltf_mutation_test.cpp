@@ -149,7 +149,7 @@ TEST_F(GltfMutations, OfValuesOfTheJson) {
   for (const char* name : {"sample.gltf", "sample.glb"}) {
     const std::string whole = bytes_of(gltf_sample(), directory_ / name);
     for (std::uint32_t seed = 0; seed < 500; ++seed) {
-      SCOPED_TRACE(seed);
+      SCOPED_TRACE(name + (" by seed " + std::to_string(seed)));
       std::mt19937 random(seed);
       load_bytes(fuzz::mutate_gltf(fuzz::bytes_of(whole), random).value());
     }
