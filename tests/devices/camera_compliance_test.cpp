@@ -162,7 +162,7 @@ TEST_P(CameraCompliance, StartsAndStopsWithoutAFrameTaken) {
 TEST_P(CameraCompliance, StopsWithRequestsInFlight) {
   const auto camera = started();
   ASSERT_NO_FATAL_FAILURE(take(*camera, 1));
-  std::this_thread::sleep_for(150ms);
+  std::this_thread::sleep_for(150ms);  // some frames long: they are captured, and nobody takes them
   camera->stop();
   const std::int64_t stopped_ns = std::chrono::nanoseconds(Clock::now().time_since_epoch()).count();
   expect_silence(*camera);

@@ -21,7 +21,7 @@ inline void for_each_power_cut(const FaultyDisk& disk, std::size_t first,
     }
 }
 
-// Whose value is each kind of fault in turn.
+// Cases that are run once for each kind of fault, which is their parameter.
 class EveryFault : public testing::TestWithParam<DiskFault> {
  protected:
   // A round of work on a disk of its own.

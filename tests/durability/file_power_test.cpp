@@ -58,7 +58,7 @@ std::vector<Kind> kinds() {
   };
 }
 
-// What stands there after some writing that perhaps failed.
+// A file as it is found after some writing that perhaps failed.
 struct Found {
   bool is_whole = false, is_as_before = false;
 };

@@ -21,8 +21,14 @@ class ChildProcess {
     told_ = OwnedDescriptor(ends[0]);
     const OwnedDescriptor tells(ends[1]);
     child_ = ::fork();
+    if (child_ < 0) throw Error("no process");
     if (child_ != 0) return;
-    work(tells.get());
+    try {
+      work(tells.get());
+    } catch (const std::exception& error) {  // the child must not go on as a second test program
+      std::fprintf(stderr, "in the child: %s\n", error.what());
+      ::_exit(1);
+    }
     ::_exit(0);
   }
   ~ChildProcess() { kill(); }

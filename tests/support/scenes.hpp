@@ -36,7 +36,7 @@ std::uint32_t add_texture(scene::Scene& scene, scene::Texture texture);
 std::uint32_t add_instance(scene::Scene& scene, std::uint32_t mesh, std::uint32_t material,
                            const glm::dmat4& world_from_object = glm::dmat4(1.0),
                            std::uint32_t presence = scene::world_both);
-// Of a mesh of its own, and of a material of its own or of one that is there.
+// The same for a mesh of its own, with a material of its own or one that is there.
 std::uint32_t add(scene::Scene& scene, scene::Mesh mesh, scene::Material material,
                   const glm::dmat4& world_from_object = glm::dmat4(1.0),
                   std::uint32_t presence = scene::world_both);

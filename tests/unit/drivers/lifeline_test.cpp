@@ -35,11 +35,11 @@ class LifelineTest : public testing::Test {
     lifeline.start();
     return lifeline;
   }
-  // Of a device with faults.
+  // Starts a lifeline over a device with faults.
   Lifeline started(CameraOpener open, std::vector<Fault> plan, LifelineHooks hooks = {}) {
     return started(with_faults(std::move(open), std::move(plan), clock()), std::move(hooks));
   }
-  // Which keeps the times of its attempts, and has no device before a time.
+  // Returns an opener that keeps the times of its attempts, and has no device before a time.
   CameraOpener take_from(milliseconds begin) {
     return [=, this]() -> std::unique_ptr<Camera> {
       attempts_ms_.push_back(static_cast<int>(elapsed().count()));

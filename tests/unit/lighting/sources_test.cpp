@@ -66,8 +66,8 @@ const Source& nearest(const std::vector<Source>& sources, const glm::dvec3& dire
       sources, {}, [&](const Source& source) { return glm::dot(source.direction, direction); });
 }
 
-// What comes out of a map: so many sources, and with them the flux of the whole. Sums of 65536
-// floats and of what floats were made of them: 1e-5 is far beyond their rounding.
+// Extracts the sources of a map: there must be so many, and no flux may be lost. Both fluxes are
+// sums of 65536 floats, whose rounding stays far below 1e-5.
 Extraction extract(const EnvironmentMap& map, std::size_t sources) {
   Extraction extraction = extract_sources(map, {});
   EXPECT_EQ(extraction.sources.size(), sources);

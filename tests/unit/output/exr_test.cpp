@@ -45,7 +45,7 @@ class Exr : public testing::Test {
     write_exr(file_, sample_layers(5, 3), metadata);
     return Imf::InputFile(file_.c_str()).header();
   }
-  // What is read of these layers.
+  // Writes the layers, and returns what is read again.
   render::Layers read_again(const render::Layers& layers) const {
     write_exr(file_, layers, {});
     return read_exr(file_);

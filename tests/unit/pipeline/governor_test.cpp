@@ -142,7 +142,7 @@ class Trial {
 
 constexpr int two_seconds = 2 * static_cast<int>(fps);
 
-// What is seen in the frames after the two seconds in which a governor may settle.
+// Runs a governor for the two seconds in which it may settle, and returns what is seen after them.
 Seen settled(const Plant& plant, int frames) {
   Trial trial(Governor(fps, 1));
   trial.run(plant, two_seconds);

@@ -40,7 +40,7 @@ class Takes : public testing::Test {
     return out.str();
   }
 
-  // What is said to refuse them.
+  // Each returns the words by which takes are refused.
   std::string refused_mark(const Paths& takes) {
     return test::error_of([&] { mark_takes(takes, true, out_); });
   }

@@ -17,7 +17,7 @@ double transmittance(double cosine, double ior) {
   return 1 - 2 * once / (1 + once);
 }
 
-// Of an even light: 2 times the integral of T(c) c over the cosine.
+// Returns the share of an even light that passes: 2 times the integral of T(c) c over the cosine.
 double mean_transmittance() {
   constexpr int steps = 1000;
   double sum = 0;

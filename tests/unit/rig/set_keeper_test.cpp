@@ -13,7 +13,7 @@ namespace previz::rig::set_keeper_test {
 
 using testing::Optional;
 
-// What is begun ends sooner or later. Returns why it came to nothing, if it did.
+// Waits until what was begun has ended. Returns why it came to nothing, if it did.
 std::optional<std::string> ended(SetKeeper& sets) {
   const std::optional<SetKeeper::Ended> ended = sets.finish(test::longest_wait);
   EXPECT_TRUE(ended) << "it never ended";

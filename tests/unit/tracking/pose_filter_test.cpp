@@ -70,8 +70,7 @@ double step_size(const glm::dmat4& a, const glm::dmat4& b) {
   return std::sqrt(cv::norm(error_between(a, b), cv::NORM_L2SQR));
 }
 
-// Whether a pose is within what the filter calls no surprise; small angles: sin(x) = x to 1e-6
-// here.
+// Expects a pose that the filter calls no surprise. Angles are small: sin(x) = x to 1e-6 here.
 void expect_no_surprise(const std::array<double, 36>& covariance, const glm::dmat4& from,
                         const glm::dmat4& to) {
   EXPECT_LE(square_in_sigmas(covariance, from, to), pose_surprise * (1 + 1e-3));
