@@ -46,13 +46,11 @@ void expect_bounds_every_way(const fs::path& directory, const std::set<int>& hid
 const fs::path committed_set = fs::path(PREVIZ_SOURCE_DIR) / "tests/truth/data/glass";
 
 TEST(TrackingTruth, CommittedSet) {
-  PREVIZ_NEEDS(committed_set / "set.json");
   expect_bounds_every_way(committed_set);
 }
 
 // In parts, from frame to frame, the tags and their corners are those of the whole picture.
 TEST(TrackingTruth, PartsShowWhatTheWholeShows) {
-  PREVIZ_NEEDS(committed_set / "set.json");
   const TruthSet set = load_truth_set(committed_set);
   const set::Tracking settings = tracking_settings(set);
   const std::vector<TrackedFrame> whole = measure_tracking(set, settings);
