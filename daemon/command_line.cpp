@@ -18,6 +18,7 @@ void add_choice(CLI::App& command, const std::string& flags, std::optional<bool>
 }
 
 void add_device_options(CLI::App& command, render::DeviceOptions& device) {
+  device.cache = render::cache_folder();
   command.add_option("--device", device.name, "Vulkan device, by part of its name");
   command.add_flag("--validation", device.validation,
                    "Log the messages of Vulkan's validation layer");
@@ -118,6 +119,21 @@ void add_run(CLI::App& app, rig::LiveOptions& options) {
   add_device_options(command, options.device);
 }
 
+void add_bench(CLI::App& app, bench::BenchOptions& options) {
+  CLI::App& command =
+      *app.add_subcommand("bench", "Measure what this machine's graphics card can do");
+  command.add_option("set", options.set_or_session,
+                     "Set file or session folder whose frames are measured, too");
+  command
+      .add_option("--seconds", options.seconds,
+                  "Time for all measurements; what would take longer is skipped")
+      ->check(CLI::Range(10, 3600))
+      ->capture_default_str();
+  command.add_option("--json", options.json, "File for all figures, as JSON");
+  command.add_option("--page", options.page, "File for a page to read, as HTML");
+  add_device_options(command, options.device);
+}
+
 void add_check(CLI::App& app, std::filesystem::path& set_or_session) {
   CLI::App& command =
       *app.add_subcommand("check", "List the mistakes in a set file or, if none, what it needs");
@@ -214,6 +230,7 @@ void add_commands(CLI::App& app, CommandLine& said) {
   add_export(app, said.export_take);
   add_track(app, said.track);
   add_trade(app, said.trade);
+  add_bench(app, said.bench);
   calibrate::add_calibrate(app, said.calibrate);
   print::add_print(app, said.print);
   add_takes(app, said.takes);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "daemon/bench/bench.hpp"
 #include "daemon/calibrate/command_line.hpp"
 #include "daemon/exchange/camera_track.hpp"
 #include "daemon/exchange/import.hpp"
@@ -30,6 +31,7 @@ struct CommandLine {
   exchange::ExportOptions export_take;
   exchange::TrackOptions track;
   trade::TradeOptions trade;
+  bench::BenchOptions bench;
   calibrate::Commands calibrate;
   print::Commands print;
   TakesCommands takes;

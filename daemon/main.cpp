@@ -10,6 +10,7 @@
 #include <iostream>
 #include <optional>
 
+#include "daemon/bench/figures.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/device_rules.hpp"
 #include "daemon/devices.hpp"
@@ -100,6 +101,16 @@ int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
   return report.interrupted ? 128 + stop.received() : 0;
 }
 
+int do_bench(bench::BenchOptions& options, const StopOnSignal& stop) {
+  options.stop = stop.token();
+  const bench::BenchReport report = bench::run_bench(options, std::cout);
+  std::cout << "\n" << bench::bench_table(report);
+  for (const auto& file : {options.json, options.page})
+    if (file) std::cout << file->string() << "\n";
+  std::cout << std::flush;
+  return report.interrupted ? 128 + stop.received() : 0;
+}
+
 int do_run(rig::LiveOptions& options, const StopOnSignal& stop) {
   options.stop = stop.token();
   report::Reports reports(report::log);
@@ -126,6 +137,7 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     report::start_log(report::severity_named(said.log_level));
     const StopOnSignal stop;
+    if (app.got_subcommand("bench")) return do_bench(said.bench, stop);
     if (app.got_subcommand("check")) return post::check_set(said.check, std::cout);
     if (app.got_subcommand("calibrate"))
       return calibrate::do_calibrate(app, said.calibrate, std::cout);

@@ -168,12 +168,13 @@ bool RenderStage::add_samples(int samples) {
 
 void RenderStage::finish(Shot& shot) {
   shot.whole = true;
-  shot.counters = renderer_->counters();
   const bool composite = view_ == render::View::composite;
   if (composite && !options_.layers) {
     shot.picture = std::make_shared<const Plate>(renderer_->show(set_.quality.denoise));
+    shot.counters = renderer_->counters();
     return;
   }
+  shot.counters = renderer_->counters();
   const auto layers = std::make_shared<render::Layers>(renderer_->layers());
   if (options_.layers) error_ = render::estimate_error(*layers).picture;
   Plate picture;

@@ -56,6 +56,7 @@ bool can_be_traced(const scene::Aabb& bounds) {
 
 void Deformer::clear() {
   meshes_.clear();  // waits for the trees that are being built
+  refitted_.clear();
   rebuilt_ = 0;
 }
 
@@ -183,7 +184,9 @@ void Deformer::record(const vk::raii::CommandBuffer& commands, Mesh& mesh, const
 }
 
 void Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh, const Buffer& vertices) {
+  watch_last();
   std::vector<Mesh*> changed;
+  std::vector<std::size_t> refitted;
   for (std::size_t i = 0; i < meshes_.size(); ++i) {
     Mesh& mesh = meshes_[i];
     if (mesh.shape == shapes[i] || mesh.plan.leaves.empty()) continue;
@@ -193,6 +196,7 @@ void Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh, const B
     mesh.place.bvh->bounds = bounds;
     mesh.place.bvh->grid_exponent = scene::grid_exponent_of(bounds);
     changed.push_back(&mesh);
+    refitted.push_back(i);
   }
   if (changed.empty()) return;
   take_better_trees(changed, bvh);
@@ -203,17 +207,26 @@ void Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh, const B
       {"shaped_vertices", &vertices}, {"bvh_texels", &bvh},         {"refit_leaves", &leaves_},
       {"refit_nodes", &nodes_},       {"refit_boxes", &boxes_}};
   constexpr vk::DeviceSize box_bytes = sizeof(gpu::GpuRefitBox);
-  device_.submit([&](const vk::raii::CommandBuffer& commands) {
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
     for (std::size_t i = 0; i < changed.size(); ++i) {
       record(commands, *changed[i], buffers);
       commands.copyBuffer(
-          *boxes_.buffer, *roots_.buffer,
+          boxes_.buffer, roots_.buffer,
           vk::BufferCopy(changed[i]->first_box * box_bytes, i * box_bytes, box_bytes));
     }
-    barrier(commands);
+    device_.submissions().barrier(commands);
   });
-  const auto roots = download<gpu::GpuRefitBox>(device_, roots_, changed.size());
-  for (std::size_t i = 0; i < changed.size(); ++i) watch(*changed[i], roots[i]);
+  refitted_ = std::move(refitted);
+  costs_.resize(changed.size());
+  costs_down_.add(device_, roots_, std::as_writable_bytes(std::span(costs_)));
+  if (costs_down_.are_here()) watch_last();
+}
+
+// Looks at what the trees that were refitted last have come to cost.
+void Deformer::watch_last() {
+  costs_down_.finish();
+  for (std::size_t i = 0; i < refitted_.size(); ++i) watch(meshes_[refitted_[i]], costs_[i]);
+  refitted_.clear();
 }
 
 // Begins to build a better tree for the shape of now, if the one that there is has become too bad.

@@ -71,6 +71,7 @@ class Deformer {
   void upload_shapes();
   void take_better_trees(std::span<Mesh* const> meshes, Buffer& bvh);
   void record(const vk::raii::CommandBuffer& commands, Mesh& mesh, const Buffers& buffers);
+  void watch_last();
   void watch(Mesh& mesh, const gpu::GpuRefitBox& root);
 
   Device& device_;
@@ -79,6 +80,9 @@ class Deformer {
   Kernel deform_, refit_leaves_, refit_nodes_;
   bool has_kernels_ = false;
   Buffer undeformed_, influences_, joints_, offsets_, weights_, leaves_, nodes_, boxes_, roots_;
+  Downloads costs_down_;
+  std::vector<gpu::GpuRefitBox> costs_;  // of the trees that were refitted last, once they are here
+  std::vector<std::size_t> refitted_;    // their meshes
 };
 
 }  // namespace previz::render

@@ -3,8 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <chrono>
 #include <cstring>
 #include <utility>
 
@@ -14,8 +12,10 @@
 namespace previz::render {
 namespace {
 
-constexpr std::uint64_t gpu_timeout_ns =
-    600'000'000'000;  // 10 minutes; a batch on a slow CPU device takes seconds
+// Samples of a pixel that a submission may have: on a card at first, of which nobody knows yet how
+// fast it is, and on a CPU device, where nothing ends what takes long: a frame of 1920x1080
+// with 16.
+constexpr std::uint64_t first_work = 1u << 21, cpu_work = 1u << 25;
 
 VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
                                           VkDebugUtilsMessageTypeFlagsEXT,
@@ -64,6 +64,8 @@ std::string lacks(const vk::raii::PhysicalDevice& physical) {
                             vk::PhysicalDeviceVulkan13Features>();
   if (!features.get<vk::PhysicalDeviceVulkan12Features>().scalarBlockLayout)
     return "no scalarBlockLayout";
+  if (!features.get<vk::PhysicalDeviceVulkan12Features>().timelineSemaphore)
+    return "no timelineSemaphore";
   if (!features.get<vk::PhysicalDeviceVulkan13Features>().maintenance4) return "no maintenance4";
   if (!features.get<vk::PhysicalDeviceVulkan13Features>().synchronization2)
     return "no synchronization2";
@@ -81,6 +83,22 @@ Device::Device(DeviceOptions options) : options_(std::move(options)) {
   open(true);
 }
 
+Device::Device(DeviceOptions options, Awaited awaited)
+    : options_(std::move(options)), had_gpu_(awaited.gpu) {}
+
+Device::~Device() {
+  try {
+    keep_programs();
+  } catch (const vk::SystemError&) {  // it is lost, and its next start compiles anew
+  }
+}
+
+void Device::keep_programs() {
+  if (!is_open()) return;
+  const std::uint64_t made = made_programs_;
+  if (kept_programs_ != made && pipelines_.save()) kept_programs_ = made;
+}
+
 void Device::reopen(bool cpu_instead) {
   close();
   open(cpu_instead || !had_gpu_);
@@ -94,12 +112,11 @@ void Device::publish(Drawing drawing) {
 // The instance is closed too: a card that was gone has another physical device when it is back.
 void Device::close() {
   publish({});
+  keep_programs();
   programs_.clear();
-  clock_ = {};
-  fence_.clear();
-  commands_.clear();
-  pool_.clear();
-  queue_.clear();
+  pipelines_ = {};
+  staging_.reset();
+  submissions_.reset();
   device_.clear();
   physical_.clear();
   messenger_.clear();
@@ -206,17 +223,19 @@ void Device::create_device() {
   features13.maintenance4 = VK_TRUE;  // for LocalSizeId, which glslang emits for Vulkan 1.3
   vk::PhysicalDeviceVulkan12Features features12;
   features12.scalarBlockLayout = VK_TRUE;
+  features12.timelineSemaphore = VK_TRUE;
   features12.pNext = &features13;
   vk::DeviceCreateInfo info({}, queue);
   info.pNext = &features12;
   device_ = vk::raii::Device(physical_, info);
-  queue_ = vk::raii::Queue(device_, queue_family_, 0);
-  pool_ = vk::raii::CommandPool(
-      device_, {vk::CommandPoolCreateFlagBits::eResetCommandBuffer, queue_family_});
-  commands_ = std::move(
-      vk::raii::CommandBuffers(device_, {*pool_, vk::CommandBufferLevel::ePrimary, 1}).front());
-  fence_ = vk::raii::Fence(device_, vk::FenceCreateInfo{});
-  if (options_.times_passes) clock_ = PassClock(physical_, device_, queue_family_, name_);
+  pipelines_ = PipelineCache(physical_, device_, options_.cache);
+  // How much a card gets at once depends on how long it takes.
+  const bool can_time = !is_cpu_ && families[queue_family_].timestampValidBits > 0;
+  submissions_.emplace(physical_, device_, queue_family_,
+                       Submissions::Options{.name = name_,
+                                            .times_passes = options_.times_passes || can_time,
+                                            .most_work = is_cpu_ ? cpu_work : first_work,
+                                            .adapts = !is_cpu_});
 }
 
 std::uint32_t Device::memory_type(std::uint32_t allowed_bits, vk::MemoryPropertyFlags wanted,
@@ -229,6 +248,14 @@ std::uint32_t Device::memory_type(std::uint32_t allowed_bits, vk::MemoryProperty
     }
   }
   throw Error("Vulkan: " + name_ + " has no suitable memory type");
+}
+
+std::string Device::driver() const {
+  const auto properties =
+      physical_.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceDriverProperties>();
+  const auto& driver = properties.get<vk::PhysicalDeviceDriverProperties>();
+  const std::string name = driver.driverName, info = driver.driverInfo;
+  return info.starts_with(name) ? info : name + " " + info;
 }
 
 std::uint64_t Device::memory_bytes() const {
@@ -244,192 +271,9 @@ std::uint64_t Device::memory_bytes() const {
   return most;
 }
 
-void Device::submit(const std::function<void(const vk::raii::CommandBuffer&)>& record) {
-  try {
-    ++submissions_;
-    commands_.reset();  // it still holds a recording that threw
-    commands_.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
-    clock_.begin(commands_);
-    record(commands_);
-    commands_.end();
-    const vk::CommandBuffer raw = *commands_;
-    const auto start = std::chrono::steady_clock::now();
-    queue_.submit(vk::SubmitInfo({}, {}, raw), *fence_);
-    if (device_.waitForFences(*fence_, VK_TRUE, gpu_timeout_ns) != vk::Result::eSuccess)
-      throw Error("Vulkan: " + name_ + " did not finish within ten minutes");
-    device_.resetFences(*fence_);
-    clock_.collect(
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
-            .count());
-  } catch (const vk::DeviceLostError& error) {
-    throw DeviceLost("Vulkan: " + name_ + " is lost: " + error.what());
-  } catch (const vk::SystemError& error) {
-    throw Error("Vulkan: " + name_ + ": " + error.what());
-  }
-}
-
-namespace {
-
-// Throws previz::Error where the device does not allow so large a buffer.
-void check_buffer(const Device& device, const BufferNeed& need) {
-  if (const auto past = past_limits(device.allows(), need))
-    throw Error("Vulkan: the scene or the picture needs a buffer of " + past->asked + ", but " +
-                device.name() + " allows " + std::to_string(past->allowed) +
-                ". Fewer triangles, smaller textures or a smaller picture need less");
-}
-
-Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage,
-                     vk::MemoryPropertyFlags wanted, vk::MemoryPropertyFlags preferred) {
-  using Usage = vk::BufferUsageFlagBits;
-  Buffer result;
-  result.size = std::max<vk::DeviceSize>((size + 15) / 16 * 16, 16);
-  usage |= Usage::eTransferSrc | Usage::eTransferDst;
-  try {
-    result.buffer = vk::raii::Buffer(device.vk(), {{}, result.size, usage});
-    const auto requirements = result.buffer.getMemoryRequirements();
-    const auto type = device.memory_type(requirements.memoryTypeBits, wanted, preferred);
-    result.memory = vk::raii::DeviceMemory(device.vk(), {requirements.size, type});
-    result.buffer.bindMemory(*result.memory, 0);
-  } catch (const vk::DeviceLostError&) {
-    throw;
-  } catch (const vk::SystemError& error) {
-    const bool is_full = error.code() == vk::Result::eErrorOutOfDeviceMemory;
-    throw Error("Vulkan: " + device.name() + (is_full ? " is out of memory" : " has no room") +
-                " for a buffer of " + std::to_string(result.size) + " bytes" +
-                (is_full ? "" : std::string(": ") + error.what()));
-  }
-  return result;
-}
-
-using Memory = vk::MemoryPropertyFlagBits;
-
-// Where the host works in the device's memory, it is mapped and no staging is needed.
-Buffer create_device_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage) {
-  device.count_buffer();
-  const vk::MemoryPropertyFlags host = Memory::eHostVisible | Memory::eHostCoherent;
-  if (!device.shares_host_memory())
-    return create_buffer(device, size, usage, Memory::eDeviceLocal, {});
-  Buffer result = create_buffer(device, size, usage, host, Memory::eDeviceLocal);
-  result.mapped = result.memory.mapMemory(0, VK_WHOLE_SIZE);
-  return result;
-}
-
-Buffer create_staging_buffer(Device& device, vk::DeviceSize size) {
-  Buffer result = create_buffer(device, size, {}, Memory::eHostVisible | Memory::eHostCoherent,
-                                Memory::eHostCached);
-  result.mapped = result.memory.mapMemory(0, VK_WHOLE_SIZE);
-  return result;
-}
-
-}  // namespace
-
-Buffer create_storage_buffer(Device& device, vk::DeviceSize size) {
-  check_buffer(device, {size, 0, true});
-  return create_device_buffer(device, size, vk::BufferUsageFlagBits::eStorageBuffer);
-}
-
-Buffer create_indirect_buffer(Device& device, vk::DeviceSize size) {
-  return create_device_buffer(
-      device, size,
-      vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eIndirectBuffer);
-}
-
-namespace {
-
-vk::DeviceSize texel_bytes_of(vk::Format format) {
-  switch (format) {
-    case vk::Format::eR32Sfloat:
-      return 4;
-    case vk::Format::eR32G32Sfloat:
-    case vk::Format::eR32G32Uint:
-    case vk::Format::eR16G16B16A16Sfloat:
-      return 8;
-    case vk::Format::eR32G32B32A32Sfloat:
-    case vk::Format::eR32G32B32A32Uint:
-      return 16;
-    default:
-      throw Error("Vulkan: no texel buffer of format " + vk::to_string(format));
-  }
-}
-
-}  // namespace
-
-Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format,
-                           bool is_storage) {
-  using Usage = vk::BufferUsageFlagBits;
-  check_buffer(device, {size, size / texel_bytes_of(format), is_storage});
-  Buffer result =
-      create_device_buffer(device, size, Usage::eUniformTexelBuffer | Usage::eStorageBuffer);
-  result.view = vk::raii::BufferView(device.vk(), {{}, *result.buffer, format, 0, VK_WHOLE_SIZE});
-  return result;
-}
-
-void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> bytes,
-                  vk::DeviceSize offset) {
-  if (bytes.empty()) return;
-  if (offset + bytes.size() > buffer.size) throw Error("Vulkan: upload past a buffer's end");
-  if (buffer.mapped) {
-    std::memcpy(static_cast<std::byte*>(buffer.mapped) + offset, bytes.data(), bytes.size());
-    return;
-  }
-  Buffer staging = create_staging_buffer(device, bytes.size());
-  std::memcpy(staging.mapped, bytes.data(), bytes.size());
-  device.submit([&](const vk::raii::CommandBuffer& commands) {
-    device.clock().start(commands, "copy up");
-    commands.copyBuffer(*staging.buffer, *buffer.buffer, vk::BufferCopy(0, offset, bytes.size()));
-    device.clock().stop(commands);
-    barrier(commands);
-  });
-}
-
-void read_bytes(Device& device, const Buffer& buffer, vk::DeviceSize size,
-                const std::function<void(const std::byte*)>& visit) {
-  if (size == 0) return;
-  if (buffer.mapped) {
-    visit(static_cast<const std::byte*>(buffer.mapped));
-    return;
-  }
-  Buffer staging = create_staging_buffer(device, size);
-  device.submit([&](const vk::raii::CommandBuffer& commands) {
-    barrier(commands);
-    device.clock().start(commands, "copy down");
-    commands.copyBuffer(*buffer.buffer, *staging.buffer, vk::BufferCopy(0, 0, size));
-    device.clock().stop(commands);
-    vk::MemoryBarrier2 to_host(vk::PipelineStageFlagBits2::eCopy,
-                               vk::AccessFlagBits2::eTransferWrite,
-                               vk::PipelineStageFlagBits2::eHost, vk::AccessFlagBits2::eHostRead);
-    commands.pipelineBarrier2(vk::DependencyInfo({}, to_host));
-  });
-  visit(static_cast<const std::byte*>(staging.mapped));
-}
-
-void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> bytes) {
-  read_bytes(device, buffer, bytes.size(),
-             [&](const std::byte* from) { std::memcpy(bytes.data(), from, bytes.size()); });
-}
-
-void barrier(const vk::raii::CommandBuffer& commands) {
-  using Stage = vk::PipelineStageFlagBits2;
-  using Access = vk::AccessFlagBits2;
-  const vk::MemoryBarrier2 everything(
-      Stage::eComputeShader | Stage::eCopy | Stage::eClear,
-      Access::eShaderWrite | Access::eTransferWrite,
-      Stage::eComputeShader | Stage::eDrawIndirect | Stage::eCopy | Stage::eClear,
-      Access::eShaderRead | Access::eShaderWrite | Access::eIndirectCommandRead |
-          Access::eTransferRead | Access::eTransferWrite);
-  commands.pipelineBarrier2(vk::DependencyInfo({}, everything));
-}
-
-void record_clear(const vk::raii::CommandBuffer& commands,
-                  std::initializer_list<const Buffer*> buffers) {
-  for (const Buffer* buffer : buffers) commands.fillBuffer(*buffer->buffer, 0, VK_WHOLE_SIZE, 0);
-  barrier(commands);
-}
-
-void record_clear(const vk::raii::CommandBuffer& commands, const Buffer& buffer,
-                  vk::DeviceSize bytes) {
-  commands.fillBuffer(*buffer.buffer, 0, bytes, 0);
-  barrier(commands);
+void Device::record(const std::function<void(const vk::raii::CommandBuffer&)>& record) {
+  record(submissions_->recording());
+  if (shares_host_memory()) submissions_->finish();
 }
 
 std::shared_ptr<Device> open_device(const DeviceOptions& options) {
@@ -464,6 +308,17 @@ std::string device_name(const Device& device) {
   return device.name();
 }
 
+DeviceFacts facts_of(const Device& device) {
+  return {.name = device.name(),
+          .driver = device.driver(),
+          .is_gpu = !device.is_cpu(),
+          .memory_bytes = device.memory_bytes(),
+          .shares_host_memory = device.shares_host_memory()};
+}
+void keep_programs(Device& device) {
+  device.keep_programs();
+}
+
 PictureMemory memory_of(const Device& device) {
   return {.bytes = device.memory_bytes(),
           .texels = device.limits().maxTexelBufferElements,
@@ -472,6 +327,9 @@ PictureMemory memory_of(const Device& device) {
 
 DeviceTimes take_times(Device& device) {
   return device.clock().take();
+}
+DeviceWork work_of(const Device& device) {
+  return device.submissions().work;
 }
 std::uint64_t validation_messages(const Device& device) {
   return device.validation_messages();

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,9 +24,17 @@ struct DeviceOptions {
   bool as_gpu = false;
   // With `validation`: the layer also looks for accesses to memory that no barrier orders.
   bool synchronization = false;
-  // Every pass is timed by the device's clock (take_times()). Costs two timestamps a pass.
+  // Every pass is timed by the device's clock (take_times()), as a graphics card's always are if it
+  // can do so. Costs two timestamps a pass.
   bool times_passes = false;
+  // Folder in which keep_programs() keeps what the driver has compiled; empty: it keeps nothing.
+  std::filesystem::path cache = {};
 };
+
+// Returns the folder for files that a program makes again when they are gone, as the XDG Base
+// Directory Specification has it: $XDG_CACHE_HOME/previzd, or ~/.cache/previzd; empty: neither is
+// known. The service's unit sets XDG_CACHE_HOME.
+std::filesystem::path cache_folder();
 
 // The passes that ran on a device, and their times by its own clock.
 struct DeviceTimes {
@@ -37,6 +47,23 @@ struct DeviceTimes {
   std::uint64_t submissions = 0;
   double waited_ms = 0;       // of the computer, from handing a submission over to its end
   std::uint64_t untimed = 0;  // passes, of submissions with too many of them
+};
+
+// What a device is.
+struct DeviceFacts {
+  std::string name, driver;  // "NVIDIA H100", "NVIDIA 580.159.04"
+  bool is_gpu = false;
+  std::uint64_t memory_bytes = 0;   // all buffers together may take so much
+  bool shares_host_memory = false;  // nothing is copied to it
+};
+
+// What a device was given to do since it was opened.
+struct DeviceWork {
+  std::uint64_t submissions = 0;
+  std::uint64_t waits = 0;        // of the computer, for the device
+  std::uint64_t allocations = 0;  // of device memory
+  std::uint64_t barriers = 0;
+  std::uint64_t bytes_up = 0, bytes_down = 0;  // copied
 };
 
 // The device is gone (VK_ERROR_DEVICE_LOST): a driver crashed, a cable came loose, a hang led to a
@@ -60,12 +87,23 @@ bool is_open(const Device& device);  // false after a reopen_device() that threw
 bool is_gpu(const Device& device);   // and open
 std::string device_name(const Device& device);
 PictureMemory memory_of(const Device& device);
+// Keeps what has been compiled since the last call, if anything was, for the next start
+// (DeviceOptions::cache). Writes in a thread of its own.
+void keep_programs(Device& device);
 
 // What a device is at the moment, in the crew's words. These two may be called on any thread.
 std::string drawing_device(const Device& device);  // "llvmpipe (CPU)"; empty while there is none
 bool cpu_stands_in(const Device& device);          // a CPU device, where there was a GPU
 std::uint64_t validation_messages(const Device& device);
-// Returns what was timed since the last call; nothing where DeviceOptions::times_passes is false.
+// Returns what was timed since the last call; nothing where no pass is timed.
 DeviceTimes take_times(Device& device);
+DeviceWork work_of(const Device& device);
+DeviceFacts facts_of(const Device& device);
+// Measures copies of 64 MiB: returns bytes a second up to the device and down from it. Nothing
+// where the host works in the device's memory.
+struct CopySpeed {
+  double up_bytes_s, down_bytes_s;
+};
+std::optional<CopySpeed> copy_speed(Device& device);
 
 }  // namespace previz::render

@@ -225,7 +225,7 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
   const auto width = static_cast<std::uint32_t>(now.view.lens.width);
   const auto height = static_cast<std::uint32_t>(now.view.lens.height);
   const std::uint32_t most_rows = std::max(most_pixels_at_once / width, 1u);
-  device_.submit([&](const vk::raii::CommandBuffer& commands) {
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
     for (Kernel* pass : {&surface_, &cover_})
       for (std::uint32_t y = 0; y < height; y += most_rows) {
         const std::uint32_t rows = std::min(most_rows, height - y);
@@ -247,11 +247,11 @@ void History::keep_points(const vk::raii::CommandBuffer& commands, const Buffer&
     if (!stance.deformed || stance.deformed->vertices == 0) continue;
     const vk::DeviceSize count = stance.deformed->vertices;
     commands.copyBuffer(
-        *vertices.buffer, *now.points.buffer,
+        vertices.buffer, now.points.buffer,
         vk::BufferCopy(stance.deformed->first_vertex * bytes, points * bytes, count * bytes));
     points += count;
   }
-  if (points > 0) barrier(commands);
+  if (points > 0) device_.submissions().barrier(commands);
 }
 
 void History::record(const vk::raii::CommandBuffer& commands, gpu::GpuShow constants, int width,

@@ -14,6 +14,10 @@ namespace {
 constexpr auto compute = vk::PipelineBindPoint::eCompute;
 constexpr auto compute_stage = vk::ShaderStageFlagBits::eCompute;
 
+// A pass keeps so many sets of buffers before it writes one anew: the tiles of a large picture, and
+// both sides of what is averaged.
+constexpr std::size_t most_sets = 64;
+
 std::shared_ptr<const Program> compile(const Device& device, const std::string& name,
                                        const SpirvInfo& info,
                                        const std::vector<std::uint32_t>& spirv) {
@@ -35,8 +39,9 @@ std::shared_ptr<const Program> compile(const Device& device, const std::string& 
 
   const vk::raii::ShaderModule module(device.vk(), {{}, spirv});
   const vk::PipelineShaderStageCreateInfo stage({}, compute_stage, *module, "main");
-  program->pipeline = vk::raii::Pipeline(
-      device.vk(), nullptr, vk::ComputePipelineCreateInfo({}, stage, *program->layout));
+  program->pipeline =
+      vk::raii::Pipeline(device.vk(), device.pipelines().get(),
+                         vk::ComputePipelineCreateInfo({}, stage, *program->layout));
   return program;
 }
 
@@ -62,81 +67,87 @@ Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> 
   const SpirvInfo info = describe_spirv(spirv);
   std::vector<std::uint32_t> values = constants;
   if (!values.empty()) values.front() &= info.asked_bits;
-  program_ = device.program(spirv.data(), values, [&] {
-    return compile(device, name_, info, specialised(spirv, values));
-  });
+  const auto compile_now = [&] { return compile(device, name_, info, specialised(spirv, values)); };
+  state_ = {new State{device.program(spirv.data(), values, compile_now), {}},
+            Retire<State>{&device}};
 }
 
 Kernel::BoundSet Kernel::create_set() const {
   std::vector<vk::DescriptorPoolSize> sizes;
-  for (const Program::Binding& binding : program_->bindings) sizes.emplace_back(binding.type, 1);
+  for (const Program::Binding& binding : state_->program->bindings)
+    sizes.emplace_back(binding.type, 1);
   BoundSet result;
   result.pool = vk::raii::DescriptorPool(
       device_->vk(), {vk::DescriptorPoolCreateFlagBits::eFreeDescriptorSet, 1, sizes});
-  const vk::DescriptorSetLayout layout = *program_->set_layout;
+  const vk::DescriptorSetLayout layout = *state_->program->set_layout;
   result.set = std::move(vk::raii::DescriptorSets(device_->vk(), {*result.pool, layout}).front());
   return result;
 }
 
-void Kernel::write(const BoundSet& bound) const {
-  const std::vector<Program::Binding>& bindings = program_->bindings;
-  std::vector<vk::DescriptorBufferInfo> infos(bindings.size());
-  std::vector<vk::BufferView> views(bindings.size());
-  std::vector<vk::WriteDescriptorSet> writes;
-  for (std::size_t i = 0; i < bindings.size(); ++i) {
-    const Buffer& buffer = *bound.buffers[i];
-    infos[i] = vk::DescriptorBufferInfo(*buffer.buffer, 0, buffer.size);
-    views[i] = *buffer.view;
-    writes.emplace_back(*bound.set, bindings[i].number, 0, 1, bindings[i].type, nullptr, &infos[i],
-                        &views[i]);
+// Returns a set that no submission under way uses, the one that was used longest ago if there are
+// many.
+Kernel::BoundSet& Kernel::free_set() {
+  std::vector<BoundSet>& sets = state_->sets;
+  if (sets.size() >= most_sets) {
+    BoundSet& oldest = *std::ranges::min_element(sets, {}, &BoundSet::submission);
+    if (oldest.submission <= device_->submissions().done()) return oldest;
   }
-  device_->vk().updateDescriptorSets(writes, {});
+  return sets.emplace_back(create_set());
 }
 
-// Each submission is waited for before the next one is recorded. A set can therefore be written
-// when a submission first needs it, and then stays unchanged until the submission ends.
-const Kernel::BoundSet& Kernel::bound(const Buffers& buffers) {
-  if (submission_ != device_->submissions()) sets_in_use_ = 0;
-  submission_ = device_->submissions();
+// A live frame uses the buffers of the last one, or of the one before it. A set is therefore
+// written once, and used for as long as there are these buffers.
+vk::DescriptorSet Kernel::bound(const Buffers& buffers) {
+  const std::vector<Program::Binding>& bindings = state_->program->bindings;
   std::vector<const Buffer*> wanted;
-  for (const Program::Binding& binding : program_->bindings) {
+  std::vector<std::uint64_t> ids;
+  for (const Program::Binding& binding : bindings) {
     const auto found = buffers.find(binding.name);
     if (found == buffers.end())
       throw Error("Vulkan: pass \"" + name_ + "\" was given no buffer \"" + binding.name + "\"");
     wanted.push_back(found->second);
+    ids.push_back(found->second->id);
   }
-  const auto end = sets_.begin() + static_cast<std::ptrdiff_t>(sets_in_use_);
-  const auto same =
-      std::find_if(sets_.begin(), end, [&](const BoundSet& set) { return set.buffers == wanted; });
-  if (same != end) return *same;
-  if (end == sets_.end()) sets_.push_back(create_set());
-  BoundSet& next = sets_[sets_in_use_++];
-  next.buffers = std::move(wanted);
-  write(next);
-  return next;
+  const auto same = std::ranges::find(state_->sets, ids, &BoundSet::buffers);
+  const bool is_written = same != state_->sets.end();
+  BoundSet& bound = is_written ? *same : free_set();
+  bound.submission = device_->submissions().next();
+  if (is_written) return *bound.set;
+  bound.buffers = std::move(ids);
+  std::vector<vk::DescriptorBufferInfo> infos(bindings.size());
+  std::vector<vk::BufferView> views(bindings.size());
+  std::vector<vk::WriteDescriptorSet> writes;
+  for (std::size_t i = 0; i < bindings.size(); ++i) {
+    infos[i] = vk::DescriptorBufferInfo(wanted[i]->buffer, 0, wanted[i]->size);
+    views[i] = wanted[i]->view;
+    writes.emplace_back(*bound.set, bindings[i].number, 0, 1, bindings[i].type, nullptr, &infos[i],
+                        &views[i]);
+  }
+  device_->vk().updateDescriptorSets(writes, {});
+  return *bound.set;
 }
 
 void Kernel::bind(const Recording& recording) {
   const vk::raii::CommandBuffer& commands = recording.commands;
   const std::span<const std::byte> push = recording.push.bytes;
-  const vk::DescriptorSet set = *bound(recording.buffers).set;
+  const vk::DescriptorSet set = bound(recording.buffers);
   if (device_->has_labels()) commands.beginDebugUtilsLabelEXT({name_.c_str()});
   device_->clock().start(commands, name_);
-  commands.bindPipeline(compute, *program_->pipeline);
-  commands.bindDescriptorSets(compute, *program_->layout, 0, set, {});
-  commands.pushConstants<std::byte>(*program_->layout, compute_stage, 0,
+  commands.bindPipeline(compute, *state_->program->pipeline);
+  commands.bindDescriptorSets(compute, *state_->program->layout, 0, set, {});
+  commands.pushConstants<std::byte>(*state_->program->layout, compute_stage, 0,
                                     {static_cast<std::uint32_t>(push.size()), push.data()});
 }
 
 void Kernel::finish(const Recording& recording) const {
   device_->clock().stop(recording.commands);
-  barrier(recording.commands);
+  device_->submissions().barrier(recording.commands);
   if (device_->has_labels()) recording.commands.endDebugUtilsLabelEXT();
 }
 
 void Kernel::dispatch(const Recording& recording, std::uint32_t invocations) {
   const std::uint32_t groups =
-      invocations / program_->group_size + (invocations % program_->group_size != 0);
+      invocations / state_->program->group_size + (invocations % state_->program->group_size != 0);
   const std::uint32_t most = device_->limits().maxComputeWorkGroupCount[0];
   if (groups > most)
     throw Error("Vulkan: pass \"" + name_ + "\" needs " + std::to_string(groups) +
@@ -149,7 +160,7 @@ void Kernel::dispatch(const Recording& recording, std::uint32_t invocations) {
 void Kernel::dispatch_indirect(const Recording& recording, const Buffer& groups,
                                vk::DeviceSize offset) {
   bind(recording);
-  recording.commands.dispatchIndirect(*groups.buffer, offset);
+  recording.commands.dispatchIndirect(groups.buffer, offset);
   finish(recording);
 }
 

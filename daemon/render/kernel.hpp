@@ -13,7 +13,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "daemon/render/device.hpp"
+#include "daemon/render/buffer.hpp"
 
 namespace previz::render {
 
@@ -59,34 +59,35 @@ class Kernel {
   Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
          std::initializer_list<std::uint32_t> constants = {});
 
-  // Record the pass, under a debug label with its name, and a barrier() after it. The first runs as
+  // Record the pass, under a debug label with its name, and a barrier after it. The first runs as
   // many work groups as `invocations` need, the second the number of groups stored in an indirect
   // buffer at `offset`. Both throw previz::Error naming the pass where a buffer that it uses is
-  // missing; the first also where the device does not allow so many groups. The buffers must stay
-  // alive until the submission is done.
+  // missing; the first also where the device does not allow so many groups.
   void dispatch(const Recording& recording, std::uint32_t invocations);
   void dispatch_indirect(const Recording& recording, const Buffer& groups, vk::DeviceSize offset);
 
  private:
   struct BoundSet {
-    std::vector<const Buffer*> buffers;  // in the order of the program's bindings
+    std::vector<std::uint64_t> buffers;  // their ids, in the order of the program's bindings
     vk::raii::DescriptorPool pool{nullptr};
     vk::raii::DescriptorSet set{nullptr};
+    std::uint64_t submission = 0;  // the last one that uses it
+  };
+  // What the device works with.
+  struct State {
+    std::shared_ptr<const Program> program;
+    std::vector<BoundSet> sets;  // for the buffers of the last dispatches
   };
 
   void bind(const Recording& recording);
   void finish(const Recording& recording) const;
-  const BoundSet& bound(const Buffers& buffers);
+  vk::DescriptorSet bound(const Buffers& buffers);
+  BoundSet& free_set();
   BoundSet create_set() const;
-  void write(const BoundSet& bound) const;
 
   Device* device_ = nullptr;
   std::string name_;
-  std::shared_ptr<const Program> program_;
-  // The sets used by the submission being recorded come first; a later submission rewrites them.
-  std::vector<BoundSet> sets_;
-  std::size_t sets_in_use_ = 0;
-  std::uint64_t submission_ = 0;
+  std::unique_ptr<State, Retire<State>> state_;
 };
 
 }  // namespace previz::render

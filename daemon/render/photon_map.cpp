@@ -49,7 +49,7 @@ void PhotonMap::add_to(Buffers& buffers) const {
 }
 
 void PhotonMap::record_emission(const Recording& recording) {
-  record_clear(recording.commands, {&buckets_, &filled_, &control_});
+  record_clear(device_, recording.commands, {&buckets_, &filled_, &control_});
   emit_.dispatch(recording, photons_);
 }
 

@@ -103,7 +103,7 @@ void Presenter::composite(const ToPresent& what, const Denoiser::Band& band, gpu
                           {"albedos", &denoiser.albedo()},
                           {"uncovered", &denoiser.uncovered()},
                           {"reals", &denoiser.real()}};
-    device_.submit([&](const vk::raii::CommandBuffer& commands) {
+    device_.record([&](const vk::raii::CommandBuffer& commands) {
       composite_.dispatch({commands, constants, buffers}, constants.count);
     });
   }
@@ -117,7 +117,7 @@ void Presenter::accumulate(const ToPresent& what, const Denoiser::Band& band,
                         {"variances", &denoiser.variance()}, {"surfaces", &denoiser.surface()},
                         {"albedos", &denoiser.albedo()},     {"uncovered", &denoiser.uncovered()},
                         {"reals", &denoiser.real()},         {"caustics", &denoiser.caustic()}};
-  device_.submit([&](const vk::raii::CommandBuffer& commands) {
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
     what.history->record(commands, constants, what.width, band, buffers);
   });
 }
@@ -160,6 +160,7 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
   const auto width = static_cast<std::size_t>(what.width);
   Plate picture{what.width, what.height, bits_,
                 std::vector<std::uint16_t>(3 * width * static_cast<std::size_t>(what.height))};
+  Downloads down;
   for (const Denoiser::Band& band : denoiser.bands(what.width, what.height)) {
     const std::size_t top = static_cast<std::size_t>(band.top) * width;
     const std::size_t first = static_cast<std::size_t>(band.first) * width;
@@ -180,17 +181,17 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
         {"reals", &denoiser.denoised_real()},
         {"signals", what.denoise ? &denoiser.denoised_signal() : &denoiser.signal()},
         {"picture", &picture_}};
-    device_.submit([&](const vk::raii::CommandBuffer& commands) {
+    device_.record([&](const vk::raii::CommandBuffer& commands) {
       if (what.denoise)
         denoiser.record(commands, what.width, band.bottom - band.top, what.samples < 2,
                         what.history != nullptr);
       present_.dispatch({commands, constants, buffers}, (constants.count + 1) / 2);
     });
-    download_bytes(
-        device_, picture_,
-        std::as_writable_bytes(std::span(picture.samples).subspan(3 * first, 3 * count)));
+    down.add(device_, picture_,
+             std::as_writable_bytes(std::span(picture.samples).subspan(3 * first, 3 * count)));
     if (what.denoise && after_band) after_band(band);
   }
+  down.finish();
   return picture;
 }
 

@@ -122,6 +122,8 @@ class Renderer {
   // Throws previz::Error where a frame has another size than the calibration, or the device has no
   // memory for it.
   Plate show_among(const std::vector<KeptFramePtr>& frames, bool denoise, Layers* layers = nullptr);
+  // Returns what was counted since begin(). Waits for the samples, so that it costs least after
+  // show().
   Counters counters() const;
 
  private:

@@ -220,12 +220,14 @@ void Wavefront::clear() {
   control.extend_groups[1] = control.extend_groups[2] = 1;
   control.shadow_groups[1] = control.shadow_groups[2] = 1;
   upload_bytes(device_, control_, std::as_bytes(std::span(&control, 1)));
-  device_.submit([&](const vk::raii::CommandBuffer& commands) {
-    commands.fillBuffer(*limits_.buffer, 0, VK_WHOLE_SIZE, gpu::UNLIMITED);
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
+    commands.fillBuffer(limits_.buffer, 0, VK_WHOLE_SIZE, gpu::UNLIMITED);
     for (std::size_t i = 0; i < tiles_.size(); ++i)
-      record_clear(commands, pixels_[i], bytes_of(tiles_[i]));
-    for (const Buffer& caustics : caustics_) record_clear(commands, caustics, caustics.size);
+      record_clear(device_, commands, pixels_[i], bytes_of(tiles_[i]));
+    for (const Buffer& caustics : caustics_)
+      record_clear(device_, commands, caustics, caustics.size);
   });
+  count();
 }
 
 // The queue that was filled becomes the active one, and each of its paths finds its next hit.
@@ -280,11 +282,13 @@ bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::u
       gpu::GpuBatch batch = tile.batch;
       batch.first_sample = sample;
       batch.samples = std::min(at_once, end - sample);
-      device_.submit([&](const vk::raii::CommandBuffer& commands) {
+      device_.record([&](const vk::raii::CommandBuffer& commands) {
         record_batch({commands, batch, buffers}, batch, max_depth);
       });
+      device_.submissions().add_work(slots_of(batch) * std::uint64_t{batch.samples});
     }
   }
+  count();
   return true;
 }
 
@@ -318,14 +322,16 @@ bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t sa
       batch.samples = 1;
       batch.photon_radius = static_cast<float>(traced_radius_);
       const Buffers buffers = buffers_of(i);
-      device_.submit([&](const vk::raii::CommandBuffer& commands) {
+      device_.record([&](const vk::raii::CommandBuffer& commands) {
         const Recording recording{commands, batch, buffers};
         if (trace_photons) record_photons(recording, max_depth);
         record_batch(recording, batch, max_depth);
       });
+      device_.submissions().add_work(slots_of(batch));
       trace_photons = false;
     }
   }
+  count();
   return true;
 }
 
@@ -339,7 +345,7 @@ void Wavefront::use_camera(const std::vector<glm::vec4>& plate) {
   const Buffers buffers = buffers_of(0);
   std::vector<gpu::GpuBatch> parts;
   for (const Tile& tile : tiles_) parts.push_back(tile.batch);
-  device_.submit(
+  device_.record(
       [&](const vk::raii::CommandBuffer& commands) { camera_.record(commands, parts, buffers); });
 }
 
@@ -386,8 +392,14 @@ void Wavefront::put_back(const KeptSums& kept) {
   }
 }
 
-gpu::GpuControl Wavefront::control() const {
-  return download<gpu::GpuControl>(device_, control_, 1).front();
+// What was counted comes down with what is recorded next, so that control() need not ask for it.
+void Wavefront::count() {
+  counted_down_.add(device_, control_, std::as_writable_bytes(std::span(&counted_, 1)));
+}
+
+gpu::GpuControl Wavefront::control() {
+  counted_down_.finish();
+  return counted_;
 }
 
 }  // namespace previz::render

@@ -67,7 +67,7 @@ class Wavefront {
   // Puts kept sums in the place of the picture's, of which they must have the size; with the
   // features that they were kept with. The next samples are to be preceded by a clear().
   void put_back(const KeptSums& kept);
-  gpu::GpuControl control() const;  // counters since the last clear
+  gpu::GpuControl control();  // counters since the last clear
 
  private:
   struct Tile {
@@ -86,6 +86,7 @@ class Wavefront {
   double share_of(std::uint32_t sample) const;
   bool render_with_photons(std::uint32_t first_sample, std::uint32_t samples,
                            std::uint32_t max_depth, const std::function<bool()>& cancelled);
+  void count();
   void record_extension(const Recording& recording);
   void record_photons(const Recording& recording, std::uint32_t max_depth);
   void record_batch(const Recording& recording, const gpu::GpuBatch& batch,
@@ -111,6 +112,8 @@ class Wavefront {
   Buffer ray_origin_, ray_direction_, throughput_, receivers_, hits_, queue_, shadow_rays_,
       sample_mixed_, sample_real_, sample_landed_, sample_aov_, sample_albedo_, sample_caustic_,
       limits_, control_;
+  gpu::GpuControl counted_{};  // what control_ was after the last samples, once it is here
+  Downloads counted_down_;
 };
 
 }  // namespace previz::render

@@ -4,11 +4,11 @@
 #include <cstdio>
 #include <vector>
 
+#include "daemon/bench/shapes.hpp"
 #include "daemon/render/renderer.hpp"
 #include "drivers/error.hpp"
 #include "tests/bench/frames_after_change.hpp"
 #include "tests/bench/program.hpp"
-#include "tests/bench/tracers/shapes.hpp"
 #include "tests/support/figure.hpp"
 
 namespace previz::bench {

@@ -5,12 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "daemon/bench/shapes.hpp"
 #include "daemon/render/renderer.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/bench/measure.hpp"
 #include "tests/bench/program.hpp"
-#include "tests/bench/tracers/shapes.hpp"
 
 namespace previz::bench {
 namespace {

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "daemon/bench/shapes.hpp"
 #include "tests/bench/measure.hpp"
 #include "tests/bench/program.hpp"
 #include "tests/bench/tracers/embree_tracer.hpp"
 #include "tests/bench/tracers/gpu_tracer.hpp"
-#include "tests/bench/tracers/shapes.hpp"
 
 namespace previz::bench {
 namespace {

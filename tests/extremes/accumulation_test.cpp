@@ -37,7 +37,7 @@ class Accumulator {
         {"sample_landed", &landed_}, {"sample_aov", &aov_},       {"sample_albedo", &albedo_},
         {"control", &control_},      {"pixels", &pixels_},        {"limits", &limits_},
         {"sample_caustic", &mixed_}, {"pixel_caustics", &pixels_}};  // not used without photons
-    device_.submit([&](const vk::raii::CommandBuffer& commands) {
+    device_.record([&](const vk::raii::CommandBuffer& commands) {
       kernel_.dispatch({commands, batch, buffers}, 1);
     });
   }

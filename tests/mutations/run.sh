@@ -49,7 +49,9 @@ compile() { nice -n 10 cmake --build "$build" --parallel "$(nproc)" --target "te
 # crashes are left out.
 run() {
   local binary
-  binary=$(realpath "$(find "$build/tests" -name "test_${program[$1]}" -type f)")
+  # The newest: an older one is of a time when its tests lay in another folder.
+  binary=$(find "$build/tests" -name "test_${program[$1]}" -type f -printf '%T@ %p\n' | sort -n)
+  binary=$(realpath "${binary##* }")
   { (cd "$tree" && GTEST_FILTER=${tests[$1]} timeout -k 5 "$2" "$binary") >"$log" 2>&1; } 2>/dev/null
 }
 

@@ -117,7 +117,7 @@ inline void denoise(render::Denoiser& denoiser, render::Layers& layers,
     upload(denoiser.real(), input.real);
     const std::vector<std::uint16_t> no_albedo(4 * (bottom - top), 0x3c00);  // halves of 1
     render::upload_bytes(device, denoiser.albedo(), std::as_bytes(std::span(no_albedo)));
-    device.submit([&](const vk::raii::CommandBuffer& commands) {
+    device.record([&](const vk::raii::CommandBuffer& commands) {
       denoiser.record(commands, layers.width, band.bottom - band.top, layers.samples < 2);
     });
     denoiser.read(band, layers, plate, rule);

@@ -10,7 +10,8 @@ namespace previz::test {
 
 // One device a test program; every test ends by asking it for validation messages.
 inline const std::shared_ptr<render::Device>& shared_device() {
-  static const auto device = render::open_device({.validation = true, .name = ""});
+  static const auto device = render::open_device(
+      {.validation = true, .name = "", .as_gpu = std::getenv("PREVIZ_AS_GPU") != nullptr});
   return device;
 }
 

@@ -55,7 +55,7 @@ void GpuTracer::set_rays(std::span<const Ray> rays) {
   render::upload_texels(device_, rays_, std::vector<Ray>(rays.begin(), rays.end()),
                         vk::Format::eR32G32B32A32Sfloat);
   const vk::DeviceSize size = rays.size() * sizeof(TracedHit);
-  if (!*results_.buffer || results_.size < size)
+  if (!results_.buffer || results_.size < size)
     results_ = render::create_storage_buffer(device_, size);
 }
 
@@ -66,9 +66,10 @@ void GpuTracer::dispatch(render::Kernel& pass, std::uint32_t worlds) {
                                 {"distances", &results_},
                                 {"blocked", &results_}};
   const Batch batch{count_, worlds};
-  device_.submit([&](const vk::raii::CommandBuffer& commands) {
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
     pass.dispatch({commands, batch, buffers}, count_);
   });
+  device_.submissions().finish();
 }
 
 void GpuTracer::dispatch_distances(std::uint32_t worlds) {

@@ -70,7 +70,7 @@ TEST(AsGpu, HasThePicturesOfACpuBitForBit) {
   EXPECT_TRUE(found.offline.diff == expected.offline.diff);
   EXPECT_TRUE(found.offline.variance == expected.offline.variance);
   EXPECT_TRUE(found.offline.depth == expected.offline.depth);
-  EXPECT_GT(as_gpu->submissions(), 0u);
+  EXPECT_GT(render::work_of(*as_gpu).submissions, 0u);
 }
 
 std::shared_ptr<render::Device> hazards_heard() {

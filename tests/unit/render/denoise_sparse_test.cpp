@@ -26,7 +26,7 @@ std::vector<glm::vec4> denoised_by_hand(int side, const std::vector<glm::vec4>& 
   for (std::size_t i = 3; i < albedos.size(); i += 4) albedos[i] = 0;  // no ray has found a cover
   upload(denoiser.albedo(), albedos);
   if (!caustics.empty()) upload(denoiser.caustic(), caustics);
-  device.submit([&](const vk::raii::CommandBuffer& commands) {
+  device.record([&](const vk::raii::CommandBuffer& commands) {
     denoiser.record(commands, side, static_cast<int>(signals.size()) / side, !has_history,
                     has_history);
   });

@@ -33,7 +33,7 @@ std::uint32_t groups_in(const Buffer& buffer, Device& device = *shared_device())
 void submit(Kernel& kernel, const Buffers& buffers, std::uint32_t invocations = 1,
             Device& device = *shared_device()) {
   const gpu::GpuBatch batch{};
-  device.submit([&](const vk::raii::CommandBuffer& commands) {
+  device.record([&](const vk::raii::CommandBuffer& commands) {
     kernel.dispatch({commands, batch, buffers}, invocations);
   });
 }
@@ -76,7 +76,7 @@ TEST(Kernel, DispatchesOfOneSubmissionKeepTheirOwnBuffers) {
     std::vector<Buffer> controls;
     for (std::uint32_t i = 0; i < used; ++i)
       controls.push_back(control_with((i + used) * gpu::WORKGROUP_SIZE));
-    shared_device()->submit([&](const vk::raii::CommandBuffer& commands) {
+    shared_device()->record([&](const vk::raii::CommandBuffer& commands) {
       for (int twice : {0, 1}) {
         static_cast<void>(twice);
         for (const Buffer& control : controls) {

@@ -1,23 +1,10 @@
 // The GPU goes away in the middle of a take (lose_device_layer.cpp): reopening it, pictures
 // come back, and the take has every frame.
+#include "tests/support/environment_variable.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::rig::device_lost_test {
-
-// Environment variables of this process while it lives.
-class Variable {
- public:
-  Variable(const char* name, const std::filesystem::path& value) : name_(name) {
-    setenv(name, value.c_str(), 1);
-  }
-  ~Variable() { unsetenv(name_); }
-  Variable(const Variable&) = delete;
-  Variable& operator=(const Variable&) = delete;
-
- private:
-  const char* name_;
-};
 
 // A rig whose GPU can be taken away and given back, for which only a CPU device is left meanwhile.
 class RigWithoutItsGpu : public test::RigLive {
@@ -41,8 +28,8 @@ class RigWithoutItsGpu : public test::RigLive {
   }
 
   const std::filesystem::path lose_ = directory_ / "lose", hidden_ = directory_ / "hidden";
-  const Variable lose_variable_{"PREVIZ_LOSE_DEVICE", lose_};
-  const Variable hide_variable_{"PREVIZ_HIDE_GPU", hidden_};
+  const test::EnvironmentVariable lose_variable_{"PREVIZ_LOSE_DEVICE", lose_};
+  const test::EnvironmentVariable hide_variable_{"PREVIZ_HIDE_GPU", hidden_};
 };
 
 TEST_F(RigWithoutItsGpu, ShowsPlatesAndRecordsUntilItIsBackAndTakesNoCpu) {
@@ -68,7 +55,7 @@ TEST_F(RigWithoutItsGpu, ShowsPlatesAndRecordsUntilItIsBackAndTakesNoCpu) {
 // A driver may hang where the device is opened anew. That is no time in which it is waited for.
 TEST_F(RigWithoutItsGpu, IsKnownToHangWhereItHangsAsItIsOpened) {
   const std::filesystem::path hang = directory_ / "hang";
-  const Variable variable("PREVIZ_HANG_DEVICE", hang);
+  const test::EnvironmentVariable variable("PREVIZ_HANG_DEVICE", hang);
   options_.patience.render = std::chrono::seconds(4);
   run([&] {
     until_rendered(2);
@@ -107,7 +94,7 @@ TEST_F(RigWithCpuInstead, DrawsOnTheCpuBecauseTheSetSaysSo) {
 // What the rig had is remembered: after a crash, and when the GPU's module comes later than the
 // service at boot.
 TEST_F(RigWithoutItsGpu, StartsWithoutItAndWaitsForItIfItHadOneBefore) {
-  const Variable state("STATE_DIRECTORY", directory_.path());
+  const test::EnvironmentVariable state("STATE_DIRECTORY", directory_.path());
   run([&] { until_rendered(1); });
   EXPECT_TRUE(std::filesystem::exists(directory_ / "graphics-device"));
   hide_gpu();
@@ -122,7 +109,7 @@ TEST_F(RigWithoutItsGpu, StartsWithoutItAndWaitsForItIfItHadOneBefore) {
 
 // A service may not open a card whose module came after it: it is started again, but in no take.
 TEST_F(RigWithoutItsGpu, StartsAgainWhereTheModuleOfItsCardCameLaterThanItself) {
-  const Variable state("STATE_DIRECTORY", directory_.path());
+  const test::EnvironmentVariable state("STATE_DIRECTORY", directory_.path());
   run([&] { until_rendered(1); });
   hide_gpu();
   std::atomic<bool> has_new_devices = false;
@@ -147,7 +134,7 @@ TEST_F(RigWithoutItsGpu, GoesOnThoughTheKernelHasNewDevicesWhereItsCardIsOpen) {
 }
 
 TEST_F(RigWithoutItsGpu, StartsOnTheCpuIfItNeverHadOne) {
-  const Variable state("STATE_DIRECTORY", directory_.path());
+  const test::EnvironmentVariable state("STATE_DIRECTORY", directory_.path());
   hide_gpu();
   run([&] { until_rendered(1); });
   EXPECT_THAT(log_.text(), HasSubstr("live on llvmpipe (CPU)"));
@@ -156,8 +143,9 @@ TEST_F(RigWithoutItsGpu, StartsOnTheCpuIfItNeverHadOne) {
 
 // A box whose driver is not installed, or is being upgraded.
 TEST_F(RigWithoutItsGpu, RecordsWithoutAnyDriverAndDrawsOnceThereIsOne) {
-  const Variable state("STATE_DIRECTORY", directory_.path());
-  std::optional<Variable> no_driver(std::in_place, "VK_ICD_FILENAMES", directory_ / "none");
+  const test::EnvironmentVariable state("STATE_DIRECTORY", directory_.path());
+  std::optional<test::EnvironmentVariable> no_driver(std::in_place, "VK_ICD_FILENAMES",
+                                                     directory_ / "none");
   run([&] {
     until_plates(1);
     press("record");

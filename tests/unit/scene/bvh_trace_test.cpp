@@ -1,9 +1,9 @@
 // The traversal in the shader against Embree, ray by ray, and against brute force, world by world.
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "daemon/bench/shapes.hpp"
 #include "tests/bench/tracers/embree_tracer.hpp"
 #include "tests/bench/tracers/gpu_tracer.hpp"
-#include "tests/bench/tracers/shapes.hpp"
 #include "tests/support/bvh_precision.hpp"
 #include "tests/support/test.hpp"
 

@@ -1,4 +1,4 @@
-#include "tests/bench/tracers/shapes.hpp"
+#include "daemon/bench/shapes.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,159 @@
+#include "daemon/bench/bench.hpp"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include <ctime>
+#include <fstream>
+#include <ostream>
+#include <string>
+#include <thread>
+
+#include "daemon/bench/frames.hpp"
+#include "daemon/bench/page.hpp"
+#include "daemon/scene/load.hpp"
+#include "daemon/trade/path_timer.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int widths[] = {640, 1280, 1920, 3840};  // of pictures of 16:9
+constexpr int sample_counts[] = {2, 4, 8};
+constexpr std::size_t triangle_counts[] = {100'000, 600'000, 1'000'000};
+
+std::string processor() {
+  std::ifstream file("/proc/cpuinfo");
+  for (std::string line; std::getline(file, line);)
+    if (line.starts_with("model name"))
+      if (const std::size_t at = line.find(": "); at != std::string::npos)
+        return line.substr(at + 2);
+  return "unknown processor";
+}
+
+class Bench {
+ public:
+  Bench(const BenchOptions& options, std::ostream& out) : options_(options), out_(out) {}
+
+  BenchReport run() {
+    begin();
+    copies();
+    Frames frames(device_);
+    report_.start_s = frames.start_s();
+    render::keep_programs(*device_);
+    for (const int width : widths)
+      measure(frames, {.width = width, .height = width * 9 / 16}, report_.by_size);
+    // The largest size that is quick enough to be measured many times.
+    FrameWish wish{.width = 640, .height = 360};
+    if (report_.by_size.size() >= 2 && report_.by_size[1].ms < 200) wish = {};
+    for (const int samples : sample_counts) {
+      FrameWish more = wish;
+      more.samples = samples;
+      measure(frames, more, report_.by_samples);
+    }
+    for (const std::size_t triangles : triangle_counts) {
+      FrameWish more = wish;
+      more.triangles = triangles;
+      measure(frames, more, report_.by_triangles);
+    }
+    if (options_.set_or_session) measure_set();
+    report_.took_s = since_start();
+    report_.interrupted = options_.stop.stop_requested();
+    return std::move(report_);
+  }
+
+ private:
+  double since_start() const {
+    return std::chrono::duration<double>(Clock::now() - start_).count();
+  }
+
+  void begin() {
+    report_.date = fmt::format("{:%Y-%m-%d %H:%M}", fmt::localtime(std::time(nullptr)));
+    report_.version = PREVIZ_VERSION;
+    report_.processor = processor();
+    report_.cores = std::thread::hardware_concurrency();
+    render::DeviceOptions wanted = options_.device;
+    wanted.times_passes = true;
+    try {
+      device_ = render::open_device(wanted);
+    } catch (const Error&) {
+      device_ = render::open_device(options_.device);  // its passes cannot be timed
+      report_.left_out.push_back({"the passes of a frame", "the device has no clock for them"});
+    }
+    report_.device = render::facts_of(*device_);
+    out_ << "measuring " << report_.device.name << ", for at most "
+         << static_cast<int>(options_.seconds) << " s" << std::endl;
+  }
+
+  void copies() {
+    if (const std::optional<render::CopySpeed> speed = render::copy_speed(*device_)) {
+      report_.up_bytes_s = speed->up_bytes_s;
+      report_.down_bytes_s = speed->down_bytes_s;
+    }
+  }
+
+  void measure(Frames& frames, const FrameWish& wish, std::vector<FrameFigures>& to) {
+    if (options_.stop.stop_requested()) return;
+    const std::string what =
+        fmt::format("{}x{}, {} sample{}, {} triangles", wish.width, wish.height, wish.samples,
+                    wish.samples == 1 ? "" : "s", wish.triangles);
+    const double expected_s = frames.expected_s(wish);
+    if (since_start() + expected_s > options_.seconds) {
+      report_.left_out.push_back({what, fmt::format("it would take about {:.0f} s", expected_s)});
+      return;
+    }
+    try {
+      to.push_back(frames.measure(wish));
+      out_ << fmt::format("{}: {:.1f} ms a frame", what, to.back().ms) << std::endl;
+    } catch (const render::DeviceLost&) {
+      throw;
+    } catch (const Error& error) {  // it is too large for the device
+      report_.left_out.push_back({what, error.what()});
+    }
+  }
+
+  void measure_set() {
+    if (options_.stop.stop_requested()) return;
+    trade::TradeFrame frame({.set_or_session = *options_.set_or_session}, std::nullopt);
+    const set::Set& set = frame.set();
+    const scene::Scene scene = scene::load_scene(set);
+    trade::TradeSettings settings;
+    settings.estimation = set.estimation;
+    settings.lighting = set.lighting;
+    settings.lens = frame.calibration().lens;
+    settings.denoise = set.quality.denoise;
+    trade::PathTimer timer(device_, frame, scene, settings);
+    const PinholeIntrinsics& lens = frame.calibration().intrinsics;
+    const double scale = set.quality.scale;
+    report_.set = {.set = options_.set_or_session->string(),
+                   .width = static_cast<int>(lens.width * scale),
+                   .height = static_cast<int>(lens.height * scale),
+                   .samples = set.quality.samples,
+                   .ms = 1e3 * timer.live({.samples = set.quality.samples,
+                                           .scale = scale,
+                                           .denoise = set.quality.denoise}),
+                   .fps = set.quality.fps,
+                   .camera_fps = frame.take_fps()};
+  }
+
+  const BenchOptions& options_;
+  std::ostream& out_;
+  const Clock::time_point start_ = Clock::now();
+  std::shared_ptr<render::Device> device_;
+  BenchReport report_{};
+};
+
+}  // namespace
+
+BenchReport run_bench(const BenchOptions& options, std::ostream& out) {
+  BenchReport report = Bench(options, out).run();
+  if (options.json) session::replace_file(*options.json, bench_json(report));
+  if (options.page) session::replace_file(*options.page, bench_page(report));
+  return report;
+}
+
+}  // namespace previz::bench

@@ -1,0 +1,70 @@
+// What `previzd bench` measures, and how it says it: as a table for a terminal and as JSON.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/render/gpu.hpp"
+
+namespace previz::bench {
+
+// A live frame, as `previzd run` makes it: averaged with those before it, denoised, and brought
+// down into the computer's memory. All times are means over `frames` frames.
+struct FrameFigures {
+  int width = 0, height = 0, samples = 0;
+  std::size_t triangles = 0;
+  int frames = 0;
+  double ms = 0;         // of the whole frame, on the clock
+  double begin_ms = 0;   // of these, until the plate and the scene are on their way up
+  double record_ms = 0;  // until all commands are recorded
+  double show_ms = 0;    // until the picture is there, waiting for the device included
+  double waited_ms = 0;  // of this, waiting for the device
+  double cpu_ms = 0;     // of all the computer's cores
+  // Of the device, by its own clock, the longest first; empty: it has none.
+  std::vector<render::DeviceTimes::Pass> passes;
+  std::uint64_t rays = 0, shadow_rays = 0;  // a frame
+  render::DeviceWork work;                  // a frame's, rounded up
+
+  double rate() const { return ms > 0 ? 1000 / ms : 0; }
+  double passes_ms() const;
+  double ms_of(const std::string& pass) const;  // 0: it did not run
+};
+
+// Why something was not measured.
+struct LeftOut {
+  std::string what, why;
+};
+
+struct SetFigures {
+  std::string set;
+  int width = 0, height = 0, samples = 0;
+  double ms = 0;      // of a frame of the set, from the camera's bytes to the picture
+  double fps = 0;     // that the set asks for (quality.fps); 0: for none
+  double camera_fps;  // of its take
+};
+
+struct BenchReport {
+  std::string date, version;
+  render::DeviceFacts device;
+  std::string processor;
+  unsigned cores = 0;
+  double start_s = 0;  // until the first picture: the passes were compiled, or taken from a cache
+  std::optional<double> up_bytes_s, down_bytes_s;  // of a copy; absent: the memory is shared
+  std::vector<FrameFigures> by_size, by_samples, by_triangles;
+  std::optional<SetFigures> set;
+  std::vector<LeftOut> left_out;
+  double took_s = 0;
+  bool interrupted = false;
+
+  // The frame that stands for the device: the largest of those of one sample up to 1920x1080.
+  const FrameFigures* typical() const;
+};
+
+std::string bench_table(const BenchReport& report);
+std::string bench_json(const BenchReport& report);
+
+}  // namespace previz::bench

@@ -1,0 +1,164 @@
+#include "daemon/bench/page.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "daemon/report/page_style.hpp"
+#include "daemon/trade/chart.hpp"
+
+namespace previz::bench {
+namespace {
+
+using trade::escaped;
+
+constexpr const char* bar_style = R"(
+td.bar { width: 55%; } td.bar div { height: .8rem; min-width: 1px; background: var(--s1); border-radius: 2px; }
+.host td.bar div { background: var(--s2); }
+)";
+
+std::string number(double value) {
+  if (value >= 100) return fmt::format("{:.0f}", value);
+  return value >= 10 ? fmt::format("{:.1f}", value) : fmt::format("{:.2f}", value);
+}
+
+std::string row(const std::string& name, const std::string& value) {
+  return "<tr><td>" + escaped(name) + "</td><td class=\"n\">" + escaped(value) + "</td></tr>\n";
+}
+
+std::string bar(const std::string& name, double ms, double longest, const char* kind) {
+  return fmt::format(
+      "<tr class=\"{}\"><td>{}</td><td class=\"n\">{} ms</td><td class=\"bar\"><div "
+      "style=\"width:{:.1f}%\"></div></td></tr>\n",
+      kind, escaped(name), number(ms), longest > 0 ? 100 * ms / longest : 0);
+}
+
+std::string frames_table(const std::vector<FrameFigures>& frames) {
+  std::string html =
+      "<table><tr><th>picture</th><th class=\"n\">samples</th><th class=\"n\">triangles</th>"
+      "<th class=\"n\">a frame</th><th class=\"n\">frames per second</th><th class=\"n\">graphics "
+      "card</th><th class=\"n\">all cores</th></tr>\n";
+  for (const FrameFigures& frame : frames)
+    html += fmt::format(
+        "<tr><td>{}x{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{} ms</td>"
+        "<td class=\"n\">{}</td><td class=\"n\">{} ms</td><td class=\"n\">{} ms</td></tr>\n",
+        frame.width, frame.height, frame.samples, frame.triangles, number(frame.ms),
+        number(frame.rate()), number(frame.passes_ms()), number(frame.cpu_ms));
+  return html + "</table>\n";
+}
+
+std::string section(const char* title, const std::vector<FrameFigures>& frames) {
+  if (frames.empty()) return {};
+  return std::string("<h2>") + title + "</h2>\n" + frames_table(frames);
+}
+
+// Where the time of the frame goes: the device's passes, longest first, then the computer's part.
+std::string parts(const FrameFigures& frame) {
+  constexpr double least_share = 0.01;  // of the device's time; what is shorter is summed up
+  const double all = frame.passes_ms();
+  std::vector<std::pair<std::string, double>> passes;
+  double rest = 0;
+  for (const render::DeviceTimes::Pass& pass : frame.passes)
+    if (pass.ms >= least_share * all)
+      passes.emplace_back(pass.name, pass.ms);
+    else
+      rest += pass.ms;
+  if (rest > 0) passes.emplace_back("all others", rest);
+  const std::pair<const char*, double> host[] = {
+      {"placing the frame", frame.begin_ms},
+      {"recording commands", frame.record_ms},
+      {"having the picture, without waiting", std::max(frame.show_ms - frame.waited_ms, 0.0)}};
+  double longest = 0;
+  for (const auto& [name, ms] : passes) longest = std::max(longest, ms);
+  for (const auto& [name, ms] : host) longest = std::max(longest, ms);
+  std::string html =
+      fmt::format("<h2>Where a frame of {}x{} goes</h2>\n<table>\n", frame.width, frame.height);
+  for (const auto& [name, ms] : passes) html += bar(name, ms, longest, "device");
+  for (const auto& [name, ms] : host) html += bar(name, ms, longest, "host");
+  const render::DeviceWork& work = frame.work;
+  return html + "</table>\n" +
+         fmt::format(
+             "<p class=\"soft\">Blue: passes of the graphics card, by its own clock{}. Brown: "
+             "the "
+             "computer, which waits for the device for {} ms. A frame is handed over in {} "
+             "submissions, with {} waits, {} allocations and {} barriers; {:.1f} MB go up and "
+             "{:.1f} MB come down.</p>\n",
+             frame.passes.empty() ? " (it has none)" : "", number(frame.waited_ms),
+             work.submissions, work.waits, work.allocations, work.barriers,
+             static_cast<double>(work.bytes_up) / 1e6, static_cast<double>(work.bytes_down) / 1e6);
+}
+
+std::string machine(const BenchReport& report) {
+  const auto speed = [](double bytes_s) { return fmt::format("{:.1f} GB/s", bytes_s / 1e9); };
+  std::string html = "<h2>The machine</h2>\n<table>\n";
+  html += row("graphics card", report.device.name + (report.device.is_gpu ? "" : " (a CPU)"));
+  html += row("driver", report.device.driver);
+  html += row("its memory",
+              fmt::format("{:.1f} GB", static_cast<double>(report.device.memory_bytes) / 1e9));
+  html += row("processor", fmt::format("{}, {} cores", report.processor, report.cores));
+  html += row("first picture", fmt::format("after {:.1f} s", report.start_s));
+  if (report.up_bytes_s) html += row("copies up", speed(*report.up_bytes_s));
+  if (report.down_bytes_s) html += row("copies down", speed(*report.down_bytes_s));
+  if (const FrameFigures* frame = report.typical()) {
+    const auto rays = [](std::uint64_t count, double ms) {
+      return fmt::format("{:.1f} million per second", 1e-3 * static_cast<double>(count) / ms);
+    };
+    if (const double ms = frame->ms_of("extend"); ms > 0)
+      html += row("rays", rays(frame->rays, ms));
+    if (const double ms = frame->ms_of("shadow"); ms > 0)
+      html += row("shadow rays", rays(frame->shadow_rays, ms));
+  }
+  return html + "</table>\n";
+}
+
+std::string verdict(const BenchReport& report) {
+  std::string html;
+  if (!report.device.is_gpu)
+    html +=
+        "<p>There is no graphics card, or none that Vulkan finds: the processor draws, slowly. "
+        "README says which drivers a card needs.</p>\n";
+  if (report.set) {
+    const SetFigures& set = *report.set;
+    html += fmt::format(
+        "<p>{} takes {} ms a frame of {}x{} with {} samples: {} frames per second{}"
+        "</p>\n",
+        escaped(set.set), number(set.ms), set.width, set.height, set.samples, number(1000 / set.ms),
+        set.fps > 0 ? fmt::format(", and it asks for {:g}.", set.fps) : ".");
+  }
+  return html;
+}
+
+}  // namespace
+
+std::string bench_page(const BenchReport& report) {
+  const FrameFigures* typical = report.typical();
+  std::string title = "Nothing was measured";
+  if (typical)
+    title = fmt::format("{} frames per second at {}x{}", number(typical->rate()), typical->width,
+                        typical->height);
+  std::string html = fmt::format(
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
+      "content=\"width=device-width\">\n<title>{0}: {1}</title><style>{2}{3}</style></head><body>\n"
+      "<h1>{1}</h1>\n<p class=\"soft\">{0}, measured by previzd {4} on {5}. A live frame has one "
+      "sample a pixel, is averaged with those before it and denoised; it shows a glass ball among "
+      "solid ones under a sky.</p>\n",
+      escaped(report.device.name), title, report::page_style, bar_style, report.version,
+      report.date);
+  html += verdict(report);
+  html += section("Over the size of the picture", report.by_size);
+  if (typical) html += parts(*typical);
+  html += section("Over the samples of a pixel", report.by_samples);
+  html += section("Over the triangles of the scene", report.by_triangles);
+  html += machine(report);
+  if (!report.left_out.empty()) {
+    html += "<h2>Not measured</h2>\n<table>\n";
+    for (const LeftOut& left : report.left_out)
+      html += "<tr><td>" + escaped(left.what) + "</td><td>" + escaped(left.why) + "</td></tr>\n";
+    html += "</table>\n";
+  }
+  return html + "</body></html>\n";
+}
+
+}  // namespace previz::bench

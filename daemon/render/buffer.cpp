@@ -1,0 +1,275 @@
+#include "daemon/render/buffer.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstring>
+#include <utility>
+
+#include "drivers/error.hpp"
+
+namespace previz::render {
+namespace {
+
+// Throws previz::Error where the device does not allow so large a buffer.
+void check_buffer(const Device& device, const BufferNeed& need) {
+  if (const auto past = past_limits(device.allows(), need))
+    throw Error("Vulkan: the scene or the picture needs a buffer of " + past->asked + ", but " +
+                device.name() + " allows " + std::to_string(past->allowed) +
+                ". Fewer triangles, smaller textures or a smaller picture need less");
+}
+
+std::uint64_t next_id() {
+  static std::atomic<std::uint64_t> last = 0;
+  return ++last;
+}
+
+Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage,
+                     vk::MemoryPropertyFlags wanted, vk::MemoryPropertyFlags preferred) {
+  using Usage = vk::BufferUsageFlagBits;
+  device.submissions().finish();  // what is no longer needed is freed first
+  Buffer result;
+  result.size = std::max<vk::DeviceSize>((size + 15) / 16 * 16, 16);
+  result.parts = {new Buffer::Parts, Retire<Buffer::Parts>{&device}};
+  usage |= Usage::eTransferSrc | Usage::eTransferDst;
+  try {
+    Buffer::Parts& parts = *result.parts;
+    parts.buffer = vk::raii::Buffer(device.vk(), {{}, result.size, usage});
+    const auto requirements = parts.buffer.getMemoryRequirements();
+    const auto type = device.memory_type(requirements.memoryTypeBits, wanted, preferred);
+    parts.memory = vk::raii::DeviceMemory(device.vk(), {requirements.size, type});
+    parts.buffer.bindMemory(*parts.memory, 0);
+    if (wanted & vk::MemoryPropertyFlagBits::eHostVisible)
+      result.mapped = parts.memory.mapMemory(0, VK_WHOLE_SIZE);
+  } catch (const vk::DeviceLostError&) {
+    throw;
+  } catch (const vk::SystemError& error) {
+    const bool is_full = error.code() == vk::Result::eErrorOutOfDeviceMemory;
+    throw Error("Vulkan: " + device.name() + (is_full ? " is out of memory" : " has no room") +
+                " for a buffer of " + std::to_string(result.size) + " bytes" +
+                (is_full ? "" : std::string(": ") + error.what()));
+  }
+  ++device.submissions().work.allocations;
+  result.buffer = *result.parts->buffer;
+  result.id = next_id();
+  return result;
+}
+
+using Memory = vk::MemoryPropertyFlagBits;
+
+// Where the host works in the device's memory, it is mapped and no staging is needed.
+Buffer create_device_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage) {
+  device.count_buffer();
+  const vk::MemoryPropertyFlags host = Memory::eHostVisible | Memory::eHostCoherent;
+  return device.shares_host_memory()
+             ? create_buffer(device, size, usage, host, Memory::eDeviceLocal)
+             : create_buffer(device, size, usage, Memory::eDeviceLocal, {});
+}
+
+Buffer create_staging_buffer(Device& device, vk::DeviceSize size,
+                             vk::MemoryPropertyFlags preferred) {
+  return create_buffer(device, size, {}, Memory::eHostVisible | Memory::eHostCoherent, preferred);
+}
+
+vk::DeviceSize texel_bytes_of(vk::Format format) {
+  switch (format) {
+    case vk::Format::eR32Sfloat:
+      return 4;
+    case vk::Format::eR32G32Sfloat:
+    case vk::Format::eR32G32Uint:
+    case vk::Format::eR16G16B16A16Sfloat:
+      return 8;
+    case vk::Format::eR32G32B32A32Sfloat:
+    case vk::Format::eR32G32B32A32Uint:
+      return 16;
+    default:
+      throw Error("Vulkan: no texel buffer of format " + vk::to_string(format));
+  }
+}
+
+Staging& staging_of(Device& device) {
+  if (!device.staging()) device.staging() = std::make_shared<Staging>(device);
+  return *device.staging();
+}
+
+// Copies down, and makes what was copied visible to the host. What the device writes next waits
+// until it was read.
+void record_copy_down(Device& device, const Buffer& from, const Buffer& to, vk::DeviceSize size) {
+  device.record([&](const vk::raii::CommandBuffer& commands) {
+    device.clock().start(commands, "copy down");
+    commands.copyBuffer(from.buffer, to.buffer, vk::BufferCopy(0, 0, size));
+    device.clock().stop(commands);
+    using Stage = vk::PipelineStageFlagBits2;
+    const vk::MemoryBarrier2 to_host(
+        Stage::eCopy, vk::AccessFlagBits2::eTransferWrite,
+        Stage::eHost | Stage::eComputeShader | Stage::eCopy | Stage::eClear,
+        vk::AccessFlagBits2::eHostRead | vk::AccessFlagBits2::eTransferWrite);
+    commands.pipelineBarrier2(vk::DependencyInfo({}, to_host));
+  });
+  DeviceWork& work = device.submissions().work;
+  ++work.barriers;
+  work.bytes_down += size;
+}
+
+}  // namespace
+
+Buffer create_storage_buffer(Device& device, vk::DeviceSize size) {
+  check_buffer(device, {size, 0, true});
+  return create_device_buffer(device, size, vk::BufferUsageFlagBits::eStorageBuffer);
+}
+
+Buffer create_indirect_buffer(Device& device, vk::DeviceSize size) {
+  return create_device_buffer(
+      device, size,
+      vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eIndirectBuffer);
+}
+
+Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format,
+                           bool is_storage) {
+  using Usage = vk::BufferUsageFlagBits;
+  check_buffer(device, {size, size / texel_bytes_of(format), is_storage});
+  Buffer result =
+      create_device_buffer(device, size, Usage::eUniformTexelBuffer | Usage::eStorageBuffer);
+  result.parts->view =
+      vk::raii::BufferView(device.vk(), {{}, result.buffer, format, 0, VK_WHOLE_SIZE});
+  result.view = *result.parts->view;
+  return result;
+}
+
+// Three frames of 1920x1080 with 16 bits a channel are under way, and what else they need.
+constexpr vk::DeviceSize ring_bytes = vk::DeviceSize{64} << 20;
+// What is lent for a copy down is kept for the next one if it is no larger: a picture of 3840x2160.
+constexpr vk::DeviceSize most_kept = vk::DeviceSize{64} << 20;
+
+Staging::Staging(Device& device)
+    : device_(device), ring_(create_staging_buffer(device, ring_bytes, {})) {}
+
+Staging::Place Staging::take(vk::DeviceSize size) {
+  size = (size + 15) / 16 * 16;
+  vk::DeviceSize first = head_;
+  if (first % ring_bytes + size > ring_bytes) first += ring_bytes - first % ring_bytes;
+  Submissions& submissions = device_.submissions();
+  for (; first + size - tail_ > ring_bytes; spans_.pop_front()) {
+    submissions.wait(spans_.front().submission);
+    tail_ = spans_.front().end;
+  }
+  head_ = first + size;
+  if (spans_.empty() || spans_.back().submission != submissions.next())
+    spans_.push_back({submissions.next(), head_});
+  spans_.back().end = head_;
+  const vk::DeviceSize offset = first % ring_bytes;
+  return {ring_.buffer, offset, static_cast<std::byte*>(ring_.mapped) + offset};
+}
+
+Buffer Staging::lend(vk::DeviceSize size) {
+  const auto fits = [&](const Buffer& buffer) { return buffer.size >= size; };
+  const auto found = std::ranges::find_if(lent_, fits);
+  if (found == lent_.end()) return create_staging_buffer(device_, size, Memory::eHostCached);
+  Buffer buffer = std::move(*found);
+  lent_.erase(found);
+  return buffer;
+}
+
+void Staging::give_back(Buffer buffer) {
+  if (buffer.size > most_kept) return;
+  const auto larger =
+      std::ranges::find_if(lent_, [&](const Buffer& other) { return other.size > buffer.size; });
+  lent_.insert(larger, std::move(buffer));
+}
+
+void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> bytes,
+                  vk::DeviceSize offset) {
+  if (bytes.empty()) return;
+  if (offset + bytes.size() > buffer.size) throw Error("Vulkan: upload past a buffer's end");
+  device.submissions().work.bytes_up += bytes.size();
+  if (buffer.mapped) {
+    std::memcpy(static_cast<std::byte*>(buffer.mapped) + offset, bytes.data(), bytes.size());
+    return;
+  }
+  for (std::size_t done = 0; done < bytes.size(); done += Staging::most_at_once) {
+    const std::span part =
+        bytes.subspan(done, std::min<std::size_t>(Staging::most_at_once, bytes.size() - done));
+    const Staging::Place place = staging_of(device).take(part.size());
+    std::memcpy(place.bytes, part.data(), part.size());
+    device.record([&](const vk::raii::CommandBuffer& commands) {
+      device.clock().start(commands, "copy up");
+      commands.copyBuffer(place.buffer, buffer.buffer,
+                          vk::BufferCopy(place.offset, offset + done, part.size()));
+      device.clock().stop(commands);
+      device.submissions().barrier(commands);
+    });
+  }
+}
+
+void read_bytes(Device& device, const Buffer& buffer, vk::DeviceSize size,
+                const std::function<void(const std::byte*)>& visit) {
+  if (size == 0) return;
+  if (buffer.mapped) {
+    device.submissions().work.bytes_down += size;
+    visit(static_cast<const std::byte*>(buffer.mapped));
+    return;
+  }
+  Buffer staging = staging_of(device).lend(size);
+  record_copy_down(device, buffer, staging, size);
+  device.submissions().finish();
+  visit(static_cast<const std::byte*>(staging.mapped));
+  staging_of(device).give_back(std::move(staging));
+}
+
+void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> bytes) {
+  read_bytes(device, buffer, bytes.size(),
+             [&](const std::byte* from) { std::memcpy(bytes.data(), from, bytes.size()); });
+}
+
+void Downloads::add(Device& device, const Buffer& buffer, std::span<std::byte> to) {
+  if (buffer.mapped) return download_bytes(device, buffer, to);
+  const auto same =
+      std::ranges::find(copies_, to.data(), [](const Copy& copy) { return copy.to.data(); });
+  Copy& copy = same != copies_.end()
+                   ? *same
+                   : copies_.emplace_back(Copy{staging_of(device).lend(to.size()), to});
+  record_copy_down(device, buffer, copy.staging, to.size());
+  device_ = &device;
+  submission_ = device.submissions().next();
+}
+
+void Downloads::finish() {
+  if (copies_.empty()) return;
+  device_->submissions().wait(submission_);
+  for (Copy& copy : copies_) {
+    std::memcpy(copy.to.data(), copy.staging.mapped, copy.to.size());
+    staging_of(*device_).give_back(std::move(copy.staging));
+  }
+  copies_.clear();
+}
+
+void record_clear(Device& device, const vk::raii::CommandBuffer& commands,
+                  std::initializer_list<const Buffer*> buffers) {
+  for (const Buffer* buffer : buffers) commands.fillBuffer(buffer->buffer, 0, VK_WHOLE_SIZE, 0);
+  device.submissions().barrier(commands);
+}
+
+void record_clear(Device& device, const vk::raii::CommandBuffer& commands, const Buffer& buffer,
+                  vk::DeviceSize bytes) {
+  commands.fillBuffer(buffer.buffer, 0, bytes, 0);
+  device.submissions().barrier(commands);
+}
+
+std::optional<CopySpeed> copy_speed(Device& device) {
+  if (device.shares_host_memory()) return std::nullopt;
+  std::vector<std::byte> bytes(std::size_t{64} << 20);
+  Buffer buffer = create_storage_buffer(device, bytes.size());
+  const auto bytes_a_second = [&](const auto& copy) {
+    copy();  // makes the staging memory
+    const auto start = std::chrono::steady_clock::now();
+    constexpr int copies = 4;
+    for (int i = 0; i < copies; ++i) copy();
+    device.submissions().finish();
+    return copies * static_cast<double>(bytes.size()) /
+           std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  };
+  return CopySpeed{.up_bytes_s = bytes_a_second([&] { upload_bytes(device, buffer, bytes); }),
+                   .down_bytes_s = bytes_a_second([&] { download_bytes(device, buffer, bytes); })};
+}
+
+}  // namespace previz::render

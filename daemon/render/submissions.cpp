@@ -1,0 +1,147 @@
+#include "daemon/render/submissions.hpp"
+
+#include <algorithm>
+#include <chrono>
+
+namespace previz::render {
+namespace {
+
+// Ten minutes; a batch on a slow CPU device takes seconds.
+constexpr std::uint64_t timeout_ns = 600'000'000'000;
+
+// The watchdog of amdgpu ends what takes ten seconds, others less. A submission that takes a second
+// is therefore halved, and one that takes a quarter of it may be larger.
+constexpr double long_ms = 1000, short_ms = 250;
+constexpr std::uint64_t least_work = 1u << 16, most_work_ever = 1u << 25;
+
+template <typename F>
+void named(const std::string& device, const F& call) {
+  try {
+    call();
+  } catch (const vk::DeviceLostError& error) {
+    throw DeviceLost("Vulkan: " + device + " is lost: " + error.what());
+  } catch (const vk::SystemError& error) {
+    throw Error("Vulkan: " + device + ": " + error.what());
+  }
+}
+
+}  // namespace
+
+Submissions::Submissions(const vk::raii::PhysicalDevice& physical, const vk::raii::Device& device,
+                         std::uint32_t queue_family, Options options)
+    : device_(device), options_(std::move(options)), queue_(device, queue_family, 0) {
+  const vk::SemaphoreTypeCreateInfo timeline(vk::SemaphoreType::eTimeline, 0);
+  vk::SemaphoreCreateInfo semaphore;
+  semaphore.pNext = &timeline;
+  timeline_ = vk::raii::Semaphore(device, semaphore);
+  pool_ = vk::raii::CommandPool(device,
+                                {vk::CommandPoolCreateFlagBits::eResetCommandBuffer, queue_family});
+  vk::raii::CommandBuffers commands(device, {*pool_, vk::CommandBufferLevel::ePrimary,
+                                             static_cast<std::uint32_t>(slots_.size())});
+  for (std::size_t i = 0; i < slots_.size(); ++i) slots_[i].commands = std::move(commands[i]);
+  if (options_.times_passes)
+    clock_ = PassClock(physical, device, queue_family, options_.name, slots_.size());
+}
+
+Submissions::~Submissions() {
+  try {
+    await(next_ - 1);
+  } catch (const vk::SystemError&) {  // it is lost: nothing is under way
+  } catch (const Error&) {            // it hangs, and there is no way to stop it
+  }
+}
+
+const vk::raii::CommandBuffer& Submissions::recording() {
+  Slot& slot = slot_of(next_);
+  if (is_recording_) return slot.commands;
+  if (slot.submission > done_) wait(slot.submission);
+  named(options_.name, [&] {
+    slot.commands.reset();
+    slot.commands.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
+    clock_.begin(slot.commands, next_);
+  });
+  slot.work = 0;
+  is_recording_ = true;
+  return slot.commands;
+}
+
+void Submissions::flush() {
+  if (!is_recording_) return;
+  Slot& slot = slot_of(next_);
+  is_recording_ = false;  // even if it fails: it is not tried again
+  named(options_.name, [&] {
+    slot.commands.end();
+    const vk::CommandBuffer commands = *slot.commands;
+    const vk::TimelineSemaphoreSubmitInfo values({}, next_);
+    vk::SubmitInfo info({}, {}, commands, *timeline_);
+    info.pNext = &values;
+    queue_.submit(info);
+  });
+  ++work.submissions;
+  slot.submission = next_++;
+}
+
+void Submissions::await(std::uint64_t submission) {
+  if (device_.waitSemaphores({{}, *timeline_, submission}, timeout_ns) != vk::Result::eSuccess)
+    throw Error("Vulkan: " + options_.name + " did not finish within ten minutes");
+}
+
+void Submissions::wait(std::uint64_t submission) {
+  if (submission == next_) {
+    flush();
+    submission = next_ - 1;
+  }
+  if (submission <= done_) return;
+  const auto start = std::chrono::steady_clock::now();
+  std::uint64_t done = 0;
+  named(options_.name, [&] {
+    await(submission);
+    done = timeline_.getCounterValue();
+  });
+  ++work.waits;
+  collect(
+      done,
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+}
+
+void Submissions::collect(std::uint64_t done, double waited_ms) {
+  clock_.add_wait(waited_ms);
+  for (std::uint64_t submission = done_ + 1; submission <= done; ++submission)
+    adapt(slot_of(submission), clock_.collect(submission));
+  done_ = done;
+  while (!kept_.empty() && kept_.front().first <= done_) kept_.pop_front();
+}
+
+void Submissions::adapt(const Slot& slot, double ms) {
+  if (!options_.adapts || slot.work == 0) return;
+  if (ms > long_ms)
+    options_.most_work = std::max(slot.work / 2, least_work);
+  else if (ms > 0 && ms < short_ms && slot.work >= options_.most_work)
+    options_.most_work = std::min(2 * options_.most_work, most_work_ever);
+}
+
+void Submissions::add_work(std::uint64_t samples) {
+  if (!is_recording_) return;
+  Slot& slot = slot_of(next_);
+  slot.work += samples;
+  if (slot.work >= options_.most_work) flush();
+}
+
+void Submissions::keep(std::shared_ptr<const void> what) {
+  if (!is_idle()) kept_.emplace_back(is_recording_ ? next_ : next_ - 1, std::move(what));
+}
+
+void Submissions::barrier(const vk::raii::CommandBuffer& commands) {
+  using Stage = vk::PipelineStageFlagBits2;
+  using Access = vk::AccessFlagBits2;
+  const vk::MemoryBarrier2 everything(
+      Stage::eComputeShader | Stage::eCopy | Stage::eClear,
+      Access::eShaderWrite | Access::eTransferWrite,
+      Stage::eComputeShader | Stage::eDrawIndirect | Stage::eCopy | Stage::eClear,
+      Access::eShaderRead | Access::eShaderWrite | Access::eIndirectCommandRead |
+          Access::eTransferRead | Access::eTransferWrite);
+  commands.pipelineBarrier2(vk::DependencyInfo({}, everything));
+  ++work.barriers;
+}
+
+}  // namespace previz::render

@@ -1,0 +1,75 @@
+// What a live frame costs a graphics card beside its passes: how often work is handed over and
+// waited for, what is allocated, and what is copied. A CPU device stands in for the card.
+#include "daemon/render/device.hpp"
+#include "tests/support/pixels_by_hand.hpp"
+
+namespace previz::test::live_budget_test {
+
+constexpr int width = 1920, height = 1080;
+constexpr std::uint64_t pixels = std::uint64_t{width} * height;
+
+// A glass ball above a floor, so that there are photons.
+View ball_above_floor() {
+  View view = empty_view({0, -0.8, 1}, {0, 0, 0.05}, pinhole(width, height, 0.8), glm::vec3(0.1f));
+  add(view.scene, rectangle_mesh({2, 2}), diffuse(glm::vec3(0.5f)));
+  add(view.scene, icosphere_mesh(0.2, 1), glass(1.5f), at({0, 0, 0.25}), scene::world_mixed);
+  view.scene.lights.push_back(sphere_lamp({0.3, 0, 1}, 0.1, glm::dvec3(2)));
+  return view;
+}
+
+class LiveBudget : public ::testing::Test {
+ protected:
+  LiveBudget()
+      : device_(render::open_device({.validation = false, .name = "", .as_gpu = true})),
+        renderer_(ball_above_floor(), {.max_depth = 1}, set::LightSampling::importance, device_) {}
+
+  // A frame that is averaged with those before, denoised and shown. Returns what it cost.
+  render::DeviceWork frame(int samples) {
+    const render::DeviceWork before = render::work_of(*device_);
+    ++frames_;
+    renderer_.begin({.plate = plate_,
+                     .exposure = 0.5,
+                     .world_from_camera = look_at({0.004 * frames_, -0.8, 1}, {0, 0, 0.05}),
+                     .accumulates = true});
+    renderer_.render(samples);
+    renderer_.show(true);
+    expect_clean(renderer_.counters());
+    const render::DeviceWork after = render::work_of(*device_);
+    return {.submissions = after.submissions - before.submissions,
+            .waits = after.waits - before.waits,
+            .allocations = after.allocations - before.allocations,
+            .bytes_up = after.bytes_up - before.bytes_up,
+            .bytes_down = after.bytes_down - before.bytes_down};
+  }
+
+  void expect_within_budget(const render::DeviceWork& work) {
+    EXPECT_LE(work.submissions, 2u);
+    EXPECT_LE(work.waits, 1u) << "for the picture";
+    EXPECT_EQ(work.allocations, 0u);
+    // A plate has 16 bits a channel, and a picture that comes down, too. What else a frame needs,
+    // lamps, instances and constants, is small.
+    constexpr std::uint64_t picture_bytes = 6 * pixels, small = 1u << 16;
+    EXPECT_LE(work.bytes_up, picture_bytes + small);
+    EXPECT_LE(work.bytes_down, picture_bytes + small);
+  }
+
+  std::shared_ptr<render::Device> device_;
+  SetRenderer renderer_;
+  PlatePtr plate_ = std::make_shared<const Plate>(random_plate(width, height, 8));
+  int frames_ = 0;
+};
+
+TEST_F(LiveBudget, OfAFrameIsTwoSubmissionsAndOneWait) {
+  // Both sides of what is averaged are made in the first two frames. A card is given more at once
+  // once it has shown how fast it is.
+  for (int i = 0; i < 2; ++i) frame(1);
+  for (int i = 0; i < 8 && !device_->is_cpu(); ++i) frame(4);
+  {
+    SCOPED_TRACE("one sample");
+    expect_within_budget(frame(1));
+  }
+  SCOPED_TRACE("four samples");
+  expect_within_budget(frame(4));
+}
+
+}  // namespace previz::test::live_budget_test
