@@ -59,6 +59,8 @@ previzd check desk.toml: Lists every mistake in a set file, or what its scene as
 previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the rest.
 previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Run again, it continues where it stopped.
 previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
+previzd bench --page bench.html: Measures what this machine can do, in two minutes at most, and writes a page about it. The first thing to run on a new machine.
+previzd bench desk.toml --json bench.json: Also measures the frames of a set, whose newest take is used, and writes all figures as JSON.
 previzd trade desk.toml --axes estimator,depth: Measures the cost and benefit of the estimator and the number of bounces on this set.
 previzd trade takes/12A_take003 --set desk.toml --fps 25 --error 2% --out trade: Finds the settings that hold 25 frames per second with the least error, and those that reach an error of 2 % in the least time.
 previzd trade takes/12A_take003 --set desk.toml --out trade --minutes 20: Continues the previous run of `previzd trade` in that folder, with more time.
