@@ -82,6 +82,7 @@ Json json_of(const FrameFigures& frame) {
           {"triangles", frame.triangles},
           {"frames", frame.frames},
           {"ms", frame.ms},
+          {"interval_ms", frame.interval_ms},
           {"frames_per_s", frame.rate()},
           {"begin_ms", frame.begin_ms},
           {"record_ms", frame.record_ms},

@@ -18,7 +18,10 @@ struct FrameFigures {
   int width = 0, height = 0, samples = 0;
   std::size_t triangles = 0;
   int frames = 0;
-  double ms = 0;         // of the whole frame, on the clock
+  double ms = 0;         // of the whole frame, on the clock, from the plate to its picture
+  // From one picture to the next where frames follow at once: the next one is begun before the
+  // picture of the last one is there.
+  double interval_ms = 0;
   double begin_ms = 0;   // of these, until the plate and the scene are on their way up
   double record_ms = 0;  // until all commands are recorded
   double show_ms = 0;    // until the picture is there, waiting for the device included
@@ -29,7 +32,7 @@ struct FrameFigures {
   std::uint64_t rays = 0, shadow_rays = 0;  // a frame
   render::DeviceWork work;                  // a frame's, rounded up
 
-  double rate() const { return ms > 0 ? 1000 / ms : 0; }
+  double rate() const { return interval_ms > 0 ? 1000 / interval_ms : 0; }
   double passes_ms() const;
   double ms_of(const std::string& pass) const;  // 0: it did not run
 };

@@ -138,17 +138,38 @@ void Frames::make_stage(const FrameWish& wish) {
             std::vector<std::uint16_t>(std::size_t{3} * wish.width * wish.height, 128)});
 }
 
+void Frames::begin() {
+  Stage& stage = *stage_;
+  ++stage.frames;
+  stage.renderer->begin({.plate = stage.plate,
+                         .world_from_camera = glm::translate(
+                             stage.view, glm::dvec3(0.002 * (stage.frames % 16), 0, 0)),
+                         .accumulates = true,
+                         .dithers = true});
+}
+
+// Renders frames as `previzd run` does where the next one waits already.
+double Frames::interval_ms(int samples, int frames) {
+  std::optional<render::Showing> last;
+  Clock::time_point start;
+  for (int i = 0; i <= frames; ++i) {
+    begin();
+    stage_->renderer->render(samples);
+    render::Showing showing = stage_->renderer->show_later(true);
+    if (last) last->finish();
+    if (i == 1) start = Clock::now();
+    last = std::move(showing);
+  }
+  last->finish();
+  return 1e3 * seconds_between(start, Clock::now()) / frames;
+}
+
 // Renders a frame, and adds its times to the sums.
 void Frames::frame(int samples) {
   Stage& stage = *stage_;
   render::Renderer& renderer = *stage.renderer;
   const Clock::time_point start = Clock::now();
-  ++stage.frames;
-  renderer.begin({.plate = stage.plate,
-                  .world_from_camera =
-                      glm::translate(stage.view, glm::dvec3(0.002 * (stage.frames % 16), 0, 0)),
-                  .accumulates = true,
-                  .dithers = true});
+  begin();
   const Clock::time_point begun = Clock::now();
   renderer.render(samples);
   const Clock::time_point recorded = Clock::now();
@@ -199,6 +220,9 @@ FrameFigures Frames::measure(const FrameWish& wish) {
                   .barriers = share(before.barriers, after.barriers, frames),
                   .bytes_up = share(before.bytes_up, after.bytes_up, frames),
                   .bytes_down = share(before.bytes_down, after.bytes_down, frames)};
+  figures.interval_ms = render::facts_of(*device_).shares_host_memory
+                            ? figures.ms
+                            : interval_ms(wish.samples, frames);
   const double pixels = static_cast<double>(wish.width) * wish.height;
   const double rest = 1e-3 * figures.ms / pixels - wish.samples * s_a_sample_;
   if (rest > 0)

@@ -31,6 +31,8 @@ class Frames {
  private:
   struct Stage;
   void make_stage(const FrameWish& wish);
+  void begin();
+  double interval_ms(int samples, int frames);
   void frame(int samples);
 
   std::shared_ptr<render::Device> device_;

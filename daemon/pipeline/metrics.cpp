@@ -61,6 +61,15 @@ void Metrics::shown(double latency_s) {
   }
 }
 
+void Metrics::passes_ran(const render::DeviceTimes& times) {
+  const std::lock_guard lock(mutex_);
+  for (const render::DeviceTimes::Pass& pass : times.passes) {
+    PassMetrics& all = passes_[pass.name];
+    all.runs += pass.count;
+    all.busy_s += 1e-3 * pass.ms;
+  }
+}
+
 Metrics::Watch::Watch(Metrics& metrics, std::string stage, std::function<Waiting()> waiting)
     : metrics_(metrics), stage_(std::move(stage)), waiting_(std::move(waiting)) {
   const std::lock_guard lock(metrics_.watched_mutex_);
@@ -80,6 +89,7 @@ MetricsSnapshot Metrics::snapshot(double seconds) const {
     snapshot.stages = stages_;
     snapshot.counts = counts_;
     snapshot.devices = devices_;
+    snapshot.passes = passes_;
     snapshot.latency_p50_s = quantile(latencies_s_, 0.50);
     snapshot.latency_p99_s = quantile(latencies_s_, 0.99);
   }
@@ -110,6 +120,8 @@ std::string to_json(const MetricsSnapshot& snapshot) {
   }
   json["counts"] = snapshot.counts;
   json["devices"] = snapshot.devices;
+  for (const auto& [name, pass] : snapshot.passes)
+    json["passes"][name] = {{"runs", pass.runs}, {"busy_s", pass.busy_s}};
   json["latency_s"] = {{"p50", snapshot.latency_p50_s}, {"p99", snapshot.latency_p99_s}};
   // A device's name, or what a tracker has read, need not be UTF-8.
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";

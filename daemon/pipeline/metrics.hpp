@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "daemon/pipeline/channel.hpp"
+#include "daemon/render/gpu.hpp"
 #include "drivers/device.hpp"
 
 namespace previz::pipeline {
@@ -24,11 +25,18 @@ struct StageMetrics {
   Waiting waiting;                               // in front of the stage
 };
 
+// A pass of the graphics device.
+struct PassMetrics {
+  std::uint64_t runs = 0;
+  double busy_s = 0;  // by the device's own clock
+};
+
 struct MetricsSnapshot {
   double seconds = 0;  // since the start
   std::map<std::string, StageMetrics> stages;
   std::map<std::string, std::uint64_t> counts;    // events that are no drops: "pose lost"
   std::map<std::string, DeviceCounters> devices;  // the drivers' own counters, by device
+  std::map<std::string, PassMetrics> passes;      // by name; empty: the device does not time them
   double latency_p50_s = 0;  // capture to display, over the last frames; 0: none was shown
   double latency_p99_s = 0;
 };
@@ -45,6 +53,8 @@ class Metrics {
   void count(const std::string& event, std::uint64_t times = 1);
   // Adds what the device has counted since the last call for this device.
   void device_counted(const std::string& device, const DeviceCounters& more);
+  // Adds how long the passes of the device have taken since the last call.
+  void passes_ran(const render::DeviceTimes& times);
   void shown(double latency_s);
 
   // While it lives, every snapshot asks a queue what waits in it.
@@ -75,6 +85,7 @@ class Metrics {
   std::map<std::string, StageMetrics> stages_;
   std::map<std::string, std::uint64_t> counts_;
   std::map<std::string, DeviceCounters> devices_;
+  std::map<std::string, PassMetrics> passes_;
   std::vector<double> latencies_s_;  // a ring once full
   std::size_t next_latency_ = 0;
   mutable std::mutex watched_mutex_;  // the owners' locks come after it, mutex_ after those
@@ -130,8 +141,8 @@ class DeviceCounts {
 // {"seconds": ..., "stages": {"render": {"frames": ..., "frames_per_second": ...,
 //  "busy_fraction": ..., "waiting": {"values": ..., "oldest_s": ..., "bytes": ...},
 //  "dropped": {"newer frame": ...}}}, "counts": {...},
-//  "devices": {"observer": {"lost": ..., "stream missing packets": ...}}, "latency_s": {"p50": ...,
-//  "p99": ...}}
+//  "devices": {"observer": {"lost": ..., "stream missing packets": ...}},
+//  "passes": {"extend": {"runs": ..., "busy_s": ...}}, "latency_s": {"p50": ..., "p99": ...}}
 std::string to_json(const MetricsSnapshot& snapshot);
 
 // Returns the smallest value that at least `fraction` (0..1) of the values do not exceed; 0 if

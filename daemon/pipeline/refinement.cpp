@@ -87,6 +87,7 @@ Refined refine(render::Renderer& renderer, const set::Quality& quality,
     for (int done = 0; done < samples && !late();) {
       const int now = std::min(batch, samples - done);
       renderer.render(now, cancelled);
+      if (quality.seconds > 0) renderer.wait();
       if (cancelled && cancelled()) return false;
       done += now;
       refined.samples += now;

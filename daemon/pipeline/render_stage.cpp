@@ -87,6 +87,28 @@ void RenderStage::operator()(Shot& shot) {
   shot.render_s = seconds_from(start);
 }
 
+ShotUnderWay RenderStage::start(Shot shot) {
+  ShotUnderWay result{std::move(shot), std::nullopt, std::chrono::steady_clock::now()};
+  if (view_ != render::View::composite || options_.layers) {
+    (*this)(result.shot);
+  } else if (begin(result.shot, options_.is_live) && sample(result.shot)) {
+    result.showing = renderer_->show_later(set_.quality.denoise);
+  }
+  return result;
+}
+
+Shot RenderStage::finish(ShotUnderWay under_way) const {
+  Shot& shot = under_way.shot;
+  if (under_way.showing) {
+    render::Showing::Shown shown = under_way.showing->finish();
+    shot.picture = std::make_shared<const Plate>(std::move(shown.picture));
+    shot.counters = shown.counters;
+    shot.whole = true;
+    shot.render_s = seconds_from(under_way.begin);
+  }
+  return std::move(under_way.shot);
+}
+
 // Returns false if it was cancelled.
 bool RenderStage::sample(Shot& shot) {
   const Refined refined = refine(
@@ -163,6 +185,7 @@ bool RenderStage::begin(Shot& shot, bool is_live) {
 
 bool RenderStage::add_samples(int samples) {
   renderer_->render(samples, [&] { return cancelled(); });
+  renderer_->wait();  // how many come next depends on the time that these take
   return !cancelled();
 }
 

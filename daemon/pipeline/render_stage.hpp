@@ -45,6 +45,15 @@ struct KeptShot {
   std::shared_ptr<render::Layers> layers;  // of the shot's samples; null: none are wanted
 };
 
+// A shot that is being rendered.
+struct ShotUnderWay {
+  Shot shot;
+  std::optional<render::Showing> showing;  // none: the shot is finished as it is
+  std::chrono::steady_clock::time_point begin;
+
+  bool is_here() const { return !showing || showing->is_here(); }
+};
+
 class RenderStage {
  public:
   // Keeps only the instances and lamps of the scene and what moves them; the rest goes to the
@@ -57,6 +66,11 @@ class RenderStage {
   // unless frames are averaged, live or with their neighbours.
   // This is begin(), the samples that the set's quality asks for, and finish().
   void operator()(Shot& shot);
+  // The same in two parts, between which the next shot can be started: the device goes on with that
+  // one while the computer has the first one's picture. Shots are finished in the order in which
+  // they were started, and before the stage goes.
+  ShotUnderWay start(Shot shot);
+  Shot finish(ShotUnderWay under_way) const;
 
   // keep() and show_among() do the same in two parts, for shots of a take that are averaged with
   // their neighbours. keep() is begin() and the samples; a shot that it finishes (it is untouched)

@@ -96,10 +96,10 @@ fs::path cache_folder() {
 }
 
 PipelineCache::PipelineCache(const vk::raii::PhysicalDevice& physical,
-                             const vk::raii::Device& device, fs::path folder) {
+                             const vk::raii::Device& device, const fs::path& folder) {
   std::string known;
   if (!folder.empty()) {
-    file_ = std::move(folder) / name_of(physical.getProperties());
+    file_ = folder / name_of(physical.getProperties());
     try {
       known = read_cache(file_);
     } catch (const Error& error) {

@@ -15,7 +15,7 @@ class PipelineCache {
   // Takes up the device's file, if `folder` has it. A file that is damaged is left out, and
   // replaced later; what goes wrong with files is logged and no error.
   PipelineCache(const vk::raii::PhysicalDevice& physical, const vk::raii::Device& device,
-                std::filesystem::path folder);
+                const std::filesystem::path& folder);
   ~PipelineCache();  // waits for a save() that is under way
   PipelineCache(PipelineCache&&) noexcept = default;
   PipelineCache& operator=(PipelineCache&&) noexcept = default;

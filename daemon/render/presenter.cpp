@@ -157,10 +157,17 @@ void Presenter::read(const Denoiser::Band& band, Layers& layers) const {
 
 Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
                          const std::function<void(const Denoiser::Band&)>& after_band) {
+  Downloads down;
+  Plate picture = present_later(what, denoiser, down, after_band);
+  down.finish();
+  return picture;
+}
+
+Plate Presenter::present_later(const ToPresent& what, Denoiser& denoiser, Downloads& down,
+                               const std::function<void(const Denoiser::Band&)>& after_band) {
   const auto width = static_cast<std::size_t>(what.width);
   Plate picture{what.width, what.height, bits_,
                 std::vector<std::uint16_t>(3 * width * static_cast<std::size_t>(what.height))};
-  Downloads down;
   for (const Denoiser::Band& band : denoiser.bands(what.width, what.height)) {
     const std::size_t top = static_cast<std::size_t>(band.top) * width;
     const std::size_t first = static_cast<std::size_t>(band.first) * width;
@@ -191,7 +198,6 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
              std::as_writable_bytes(std::span(picture.samples).subspan(3 * first, 3 * count)));
     if (what.denoise && after_band) after_band(band);
   }
-  down.finish();
   return picture;
 }
 

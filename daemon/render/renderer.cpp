@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "daemon/lighting/response.hpp"
@@ -21,6 +22,35 @@
 
 namespace previz::render {
 namespace {
+
+// Every frame is looked at as a whole unless it clips: in a form that compilers make wide
+// instructions of.
+bool is_any_at_least(std::span<const std::uint16_t> codes, std::uint32_t least) {
+  constexpr std::size_t at_once = 4096;
+  for (std::size_t first = 0; first < codes.size(); first += at_once) {
+    unsigned found = 0;
+    for (const std::uint16_t code : codes.subspan(first, std::min(at_once, codes.size() - first)))
+      found |= code >= least ? 1u : 0u;
+    if (found != 0) return true;
+  }
+  return false;
+}
+
+// Adds what a frame counted on the device.
+Counters with(Counters counters, const gpu::GpuControl& control) {
+  const auto wide = [](std::uint32_t high, std::uint32_t low) {
+    return static_cast<std::uint64_t>(high) << 32 | low;
+  };
+  counters.rays = wide(control.rays_high, control.rays_low);
+  counters.shadow_rays = wide(control.shadow_rays_high, control.shadow_rays_low);
+  counters.dropped_not_finite = control.dropped_not_finite;
+  counters.dropped_negative = control.dropped_negative;
+  counters.stopped_in_layers = control.stopped_in_layers;
+  counters.unfinished = control.unfinished;
+  counters.measured = wide(control.measured_high, control.measured_low);
+  counters.unmeasured = wide(control.unmeasured_high, control.unmeasured_low);
+  return counters;
+}
 
 void check_size(const Device& device, const PinholeIntrinsics& picture) {
   refuse_too_large(picture.width, picture.height, memory_of(device));
@@ -57,6 +87,7 @@ struct Renderer::Impl {
   void add_view();
   void put_back(const KeptFrame& kept);
   ToPresent to_present(bool denoise);
+  Counters host_counters() const;
 
   std::shared_ptr<Device> device;
   set::Estimation estimation;
@@ -162,7 +193,7 @@ std::vector<glm::vec4> Renderer::Impl::measured() const {
 
 void Renderer::Impl::upload_plate() {
   const std::vector<std::uint16_t>& codes = frame.plate->samples;
-  is_clipped = !codes.empty() && *std::ranges::max_element(codes) >= response->clipping().from;
+  is_clipped = is_any_at_least(codes, response->clipping().from);
   const std::size_t words = std::max<std::size_t>((codes.size() + 1) / 2, 1);
   if (plate.size < words * sizeof(std::uint32_t))
     plate = create_storage_buffer(*device, words * sizeof(std::uint32_t));
@@ -333,6 +364,10 @@ void Renderer::render(int samples, const std::function<bool()>& cancelled) {
   }
 }
 
+void Renderer::wait() {
+  impl_->device->submissions().finish();
+}
+
 std::optional<Layers> Renderer::pilot(int samples, const std::function<bool()>& cancelled) {
   Impl& r = *impl_;
   const std::optional<std::uint32_t> seed = r.frame.seed;
@@ -478,27 +513,64 @@ Plate Renderer::show_among(const std::vector<KeptFramePtr>& frames, bool denoise
   return picture;
 }
 
-Counters Renderer::counters() const {
-  const gpu::GpuControl control = impl_->wavefront->control();
-  const auto wide = [](std::uint32_t high, std::uint32_t low) {
-    return static_cast<std::uint64_t>(high) << 32 | low;
-  };
+// What is counted by the computer.
+Counters Renderer::Impl::host_counters() const {
   Counters counters;
-  counters.rays = wide(control.rays_high, control.rays_low);
-  counters.shadow_rays = wide(control.shadow_rays_high, control.shadow_rays_low);
-  counters.dropped_not_finite = control.dropped_not_finite;
-  counters.dropped_negative = control.dropped_negative;
-  counters.stopped_in_layers = control.stopped_in_layers;
-  counters.unfinished = control.unfinished;
-  counters.measured = wide(control.measured_high, control.measured_low);
-  counters.unmeasured = wide(control.unmeasured_high, control.unmeasured_low);
-  counters.rebuilt_trees = impl_->scene.rebuilt_trees() - impl_->trees_before;
-  counters.encoded_lights = impl_->scene.encoded_lights();
-  const GpuScene::Work& work = impl_->scene.work();
+  counters.rebuilt_trees = scene.rebuilt_trees() - trees_before;
+  counters.encoded_lights = scene.encoded_lights();
+  const GpuScene::Work& work = scene.work();
   counters.built_trees = work.trees;
   counters.uploaded_materials = work.materials;
   counters.uploaded_textures = work.textures;
   return counters;
+}
+
+Counters Renderer::counters() const {
+  return with(impl_->host_counters(), impl_->wavefront->control());
+}
+
+DeviceWork Renderer::work() const {
+  return work_of(*impl_->device);
+}
+
+DeviceTimes Renderer::take_times() {
+  return render::take_times(*impl_->device);
+}
+
+struct Showing::State {
+  Plate picture;
+  Counters host;
+  gpu::GpuControl control{};
+  Downloads down;
+};
+
+Showing::Showing(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Showing::~Showing() = default;
+Showing::Showing(Showing&&) noexcept = default;
+Showing& Showing::operator=(Showing&&) noexcept = default;
+
+bool Showing::is_here() const {
+  return state_->down.are_here();
+}
+
+Showing::Shown Showing::finish() {
+  state_->down.finish();
+  return {std::move(state_->picture), with(state_->host, state_->control)};
+}
+
+Showing Renderer::show_later(bool denoise) {
+  Impl& r = *impl_;
+  auto state = std::make_unique<Showing::State>();
+  ToPresent what = r.to_present(denoise);
+  if (r.frame.accumulates && r.samples > 0) {
+    r.history->find_surfaces(r.scene_buffers, r.features, r.samples);
+    what.history = &*r.history;
+  }
+  state->picture = r.presenter->present_later(what, *r.denoiser, state->down);
+  r.wavefront->count_into(state->control, state->down);
+  state->host = r.host_counters();
+  r.device->submissions().flush();
+  return Showing(std::move(state));
 }
 
 }  // namespace previz::render

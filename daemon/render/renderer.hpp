@@ -24,6 +24,29 @@ namespace previz::render {
 struct KeptFrame;
 using KeptFramePtr = std::shared_ptr<const KeptFrame>;
 
+// A picture on its way from the device, which may still be at work on it.
+class Showing {
+ public:
+  struct State;
+  explicit Showing(std::unique_ptr<State> state);
+  ~Showing();
+  Showing(Showing&&) noexcept;
+  Showing& operator=(Showing&&) noexcept;
+
+  // Returns whether finish() has nothing to wait for.
+  bool is_here() const;
+  // Waits for the picture and what was counted in its frame. May be called once. Throws as
+  // Renderer::show() does.
+  struct Shown {
+    Plate picture;
+    Counters counters;
+  };
+  Shown finish();
+
+ private:
+  std::unique_ptr<State> state_;
+};
+
 class Renderer {
  public:
   Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
@@ -68,8 +91,12 @@ class Renderer {
   // Starts a frame and clears what was accumulated.
   void begin(FrameInput frame);
   // Adds samples to every pixel of the current frame. The i-th sample of a pixel is the same
-  // however the calls split them (P8). `cancelled` is asked between batches.
+  // however the calls split them (P8). `cancelled` is asked between batches. A graphics card may
+  // still be at work on some when it returns.
   void render(int samples, const std::function<bool()>& cancelled = {});
+  // Waits until the samples so far are there, which render() need not do. Whatever asks for a
+  // result waits by itself.
+  void wait();
   // Returns layers of separate samples, with other random numbers, which are then forgotten:
   // decisions based on them bias no picture. The current frame must have no samples yet. Returns
   // nothing if `cancelled` ended it.
@@ -94,6 +121,9 @@ class Renderer {
   // of `layers`, which must be those of the same samples; their variance is then the noise left.
   // Throws previz::Error where the device has no memory for it.
   Plate show(bool denoise, Layers* layers = nullptr);
+  // Does the same without layers, and does not wait for the picture: the next frame can be begun
+  // meanwhile. The pictures of a renderer are to be finished in their order, and before it goes.
+  Showing show_later(bool denoise);
   // Returns what show_among() needs of the current frame, which must have a sample: its input, its
   // samples' sums, and how the scene stood. It takes 160 bytes of the computer's memory per pixel,
   // 16 more with photons, and the plate, which it shares with FrameInput.
@@ -125,6 +155,10 @@ class Renderer {
   // Returns what was counted since begin(). Waits for the samples, so that it costs least after
   // show().
   Counters counters() const;
+  // What the device was given to do since it was opened, and how long its passes took since the
+  // last call (take_times()); it may do work of other renderers, too.
+  DeviceWork work() const;
+  DeviceTimes take_times();
 
  private:
   struct Impl;

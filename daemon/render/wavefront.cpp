@@ -394,7 +394,11 @@ void Wavefront::put_back(const KeptSums& kept) {
 
 // What was counted comes down with what is recorded next, so that control() need not ask for it.
 void Wavefront::count() {
-  counted_down_.add(device_, control_, std::as_writable_bytes(std::span(&counted_, 1)));
+  count_into(counted_, counted_down_);
+}
+
+void Wavefront::count_into(gpu::GpuControl& counted, Downloads& down) const {
+  down.add(device_, control_, std::as_writable_bytes(std::span(&counted, 1)));
 }
 
 gpu::GpuControl Wavefront::control() {

@@ -68,6 +68,8 @@ class Wavefront {
   // features that they were kept with. The next samples are to be preceded by a clear().
   void put_back(const KeptSums& kept);
   gpu::GpuControl control();  // counters since the last clear
+  // The same as they are now, by a copy that comes down.
+  void count_into(gpu::GpuControl& counted, Downloads& down) const;
 
  private:
   struct Tile {

@@ -92,6 +92,7 @@ std::optional<Shot> LiveGraphics::next_picture() {
       shot = parts_.render.next(renew);
       if (!shot) return rendering_.had_nothing_to_do();
       begun_anew_ = 0;
+      if (render::is_open(*parts_.device)) render::keep_programs(*parts_.device);
     });
     if (!is_well) {
       drop_stage();

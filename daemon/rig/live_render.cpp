@@ -44,13 +44,15 @@ bool LiveRender::interrupted() const {
 }
 
 void LiveRender::use_none() {
+  if (under_way_) count_failed(under_way_->of_take, "failed");
+  under_way_.reset();
   stage_ = nullptr;
   refining_ = false;
   refined_.reset();
 }
 
 bool LiveRender::finished() const {
-  return channels_.tracked.finished() || (!stage_ && stop_.stop_requested());
+  return (channels_.tracked.finished() && !under_way_) || (!stage_ && stop_.stop_requested());
 }
 
 std::optional<Shot> LiveRender::next(const std::function<bool(const render::DeviceLost&)>& renew) {
@@ -71,13 +73,15 @@ std::optional<Shot> LiveRender::next_picture() {
   if (look->state.mode != Mode::refine || look->refinements != refinements_) refining_ = false;
   if (!look->of_take) good_of_take_.reset();
   refinements_ = look->refinements;
+  if (look->state.mode == Mode::refine && under_way_)
+    return complete(*std::exchange(under_way_, std::nullopt));
   return look->state.mode == Mode::refine ? refine_round(*look) : wait_for_frame(*look);
 }
 
 std::optional<Shot> LiveRender::next_plate(const std::string& untouched) {
   count_dropped();
   const std::shared_ptr<const Look> look = look_.get();
-  std::optional<Shot> shot = take_frame(*look, /*is_to_be_rendered=*/false);
+  std::optional<Shot> shot = take_frame(*look, /*is_to_be_rendered=*/false, mode_delay);
   if (!shot) return std::nullopt;
   try {
     shot->picture = plate_of(*shot);
@@ -87,13 +91,13 @@ std::optional<Shot> LiveRender::next_plate(const std::string& untouched) {
   }
   shot->untouched = untouched;
   shot->whole = true;
-  count_shown(*look);
+  count_shown(look->of_take);
   return shot;
 }
 
 // A reviewed frame was not captured now.
-void LiveRender::count_shown(const Look& look) {
-  if (look.of_take)
+void LiveRender::count_shown(bool of_take) {
+  if (of_take)
     metrics_.count("pictures reviewed");
   else
     metrics_.worked("render", 0);
@@ -170,16 +174,32 @@ void LiveRender::publish_found(const pipeline::LightPtr& light) {
   channels_.found.set(pipeline::found_lamps(*light));
 }
 
+// Where the next frame is there before the picture of the last one, the device has been given that,
+// too, while the computer has the picture.
 std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
-  std::optional<Shot> shot = take_frame(look, /*is_to_be_rendered=*/true);
-  if (!shot) return std::nullopt;
-  return render(look, *std::move(shot));
+  if (!under_way_) {
+    std::optional<Shot> shot = take_frame(look, /*is_to_be_rendered=*/true, mode_delay);
+    if (!shot) return std::nullopt;
+    start(look, *std::move(shot));
+  }
+  UnderWay first = *std::exchange(under_way_, std::nullopt);
+  if (first.picture.is_here()) return complete(std::move(first));
+  std::optional<Shot> next;
+  try {
+    next = take_frame(look, /*is_to_be_rendered=*/true, std::chrono::milliseconds(0));
+    if (next) start(look, *std::move(next));
+  } catch (...) {
+    count_failed(first.of_take, "failed");
+    throw;
+  }
+  return complete(std::move(first));
 }
 
 // A frame that came while tracking rested has neither pose nor light, and its plate all the same.
-std::optional<Shot> LiveRender::take_frame(const Look& look, bool is_to_be_rendered) {
+std::optional<Shot> LiveRender::take_frame(const Look& look, bool is_to_be_rendered,
+                                           std::chrono::milliseconds wait) {
   const bool review = look.of_take;
-  std::optional<Shot> shot = (review ? channels_.reviewed : channels_.tracked).pop_for(mode_delay);
+  std::optional<Shot> shot = (review ? channels_.reviewed : channels_.tracked).pop_for(wait);
   if (review && channels_.tracked.try_pop()) metrics_.dropped("render", "review");
   if (!shot) return std::nullopt;
   if (look.state.mode == Mode::standby) {
@@ -206,7 +226,8 @@ double LiveRender::govern(const Look& look, set::Quality& quality) const {
   return step.scale;
 }
 
-Shot LiveRender::render(const Look& look, Shot shot) {
+// Hands the shot's frame over to the device, and does not wait for the picture.
+void LiveRender::start(const Look& look, Shot shot) {
   const auto begin = Clock::now();
   set::Quality quality = set_.quality;
   quality.samples = look.samples;
@@ -218,13 +239,11 @@ Shot LiveRender::render(const Look& look, Shot shot) {
   const bool snapshot = of_live || look.refined_snapshots > refined_snapshots_;
   // A snapshot can be compared with what `previzd render` makes of its frame.
   if (snapshot && shot.track.pose) shot.shown_pose.reset();
-  // A reviewed frame was not captured now, so its loss is not counted.
-  const bool captured = !look.of_take;
   // The crew's changes go on top of what was recorded, never in its place.
   std::optional<session::SceneState> recorded;
-  if (!captured && shot.scene.variants != *channels_.recorded_variants.get())
+  if (look.of_take && shot.scene.variants != *channels_.recorded_variants.get())
     channels_.recorded_variants.set(shot.scene.variants);
-  if (!captured)
+  if (look.of_take)
     recorded = std::exchange(shot.scene, pipeline::with_edits(shot.scene, set_, look.take_edits));
   try {
     publish_found(shot.light);
@@ -233,30 +252,71 @@ Shot LiveRender::render(const Look& look, Shot shot) {
     stage_->show(look.view);
     stage_->fill_layers(snapshot);
     stage_->resize(scale);
-    (*stage_)(shot);
+    under_way_ = UnderWay{stage_->start(std::move(shot)),
+                          std::move(recorded),
+                          look.of_take,
+                          look.governed,
+                          snapshot,
+                          of_live,
+                          begin};
   } catch (const render::DeviceLost&) {
-    if (captured) metrics_.dropped("render", "device lost");
+    count_failed(look.of_take, "device lost");
     throw;
   } catch (...) {
-    if (captured) metrics_.dropped("render", "failed");
+    count_failed(look.of_take, "failed");
     throw;
   }
-  const double took = seconds_since(begin);
+}
+
+// What the computer and the device had to do with one another: each is time that no pass explains.
+void LiveRender::count_work() {
+  const render::DeviceWork work = stage_->renderer()->work();
+  if (work.submissions < counted_.submissions) counted_ = {};  // it was opened again
+  const render::DeviceWork before = std::exchange(counted_, work);
+  metrics_.device_counted("graphics", {{"submissions", work.submissions - before.submissions},
+                                       {"waits", work.waits - before.waits},
+                                       {"allocations", work.allocations - before.allocations},
+                                       {"bytes up", work.bytes_up - before.bytes_up},
+                                       {"bytes down", work.bytes_down - before.bytes_down}});
+  metrics_.passes_ran(stage_->renderer()->take_times());
+}
+
+// A reviewed frame was not captured now, so its loss is not counted.
+void LiveRender::count_failed(bool of_take, const char* cause) {
+  if (!of_take) metrics_.dropped("render", cause);
+}
+
+// Returns the picture that is under way, once it is there.
+Shot LiveRender::complete(UnderWay under_way) {
+  Shot shot;
+  try {
+    shot = stage_->finish(std::move(under_way.picture));
+  } catch (const render::DeviceLost&) {
+    count_failed(under_way.of_take, "device lost");
+    throw;
+  } catch (...) {
+    count_failed(under_way.of_take, "failed");
+    throw;
+  }
+  // Where pictures overlap, each takes as long as it is there after the one before.
+  const double took = seconds_since(std::max(under_way.begin, completed_));
+  completed_ = Clock::now();
   metrics_.busy("render", took);
-  count_shown(look);
+  count_shown(under_way.of_take);
+  count_work();
   if (!shot.whole) return shot;
   if (shot.untouched.empty()) {
-    if (shot.track.pose) keep_as_good(shot, std::move(recorded));
-    if (look.governed && governor_) {
-      if (!is_first_ && !snapshot) governor_->took(took);
+    if (shot.track.pose) keep_as_good(shot, std::move(under_way.recorded));
+    if (under_way.governed && governor_) {
+      if (!is_first_ && !under_way.snapshot) governor_->took(took);
       set::PreviewStep step = governor_->step();
       step.samples = governor_->samples();
       channels_.governed.set(step);
     }
     is_first_ = false;
   }
-  if (snapshot) {
-    ++(of_live ? snapshots_ : refined_snapshots_);
+  if (under_way.snapshot) {
+    ++(under_way.of_live ? snapshots_ : refined_snapshots_);
     save(shot);
   }
   return shot;

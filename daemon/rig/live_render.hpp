@@ -76,9 +76,20 @@ class LiveRender {
   int next_round(const Look& look);
   bool begin_refinement(const Look& look);
   std::optional<pipeline::Shot> wait_for_frame(const Look& look);
-  std::optional<pipeline::Shot> take_frame(const Look& look, bool is_to_be_rendered);
-  void count_shown(const Look& look);
-  pipeline::Shot render(const Look& look, pipeline::Shot shot);
+  std::optional<pipeline::Shot> take_frame(const Look& look, bool is_to_be_rendered,
+                                           std::chrono::milliseconds wait);
+  void count_shown(bool of_take);
+  // A picture that the device is at work on, or that is there.
+  struct UnderWay {
+    pipeline::ShotUnderWay picture;
+    std::optional<session::SceneState> recorded;  // of a take's frame: its scene
+    bool of_take, governed, snapshot, of_live;    // as the Look was
+    std::chrono::steady_clock::time_point begin;
+  };
+  void start(const Look& look, pipeline::Shot shot);
+  pipeline::Shot complete(UnderWay under_way);
+  void count_work();
+  void count_failed(bool of_take, const char* cause);
   void keep_as_good(const pipeline::Shot& shot, std::optional<session::SceneState> recorded);
   std::optional<pipeline::Shot>& good_of(const Look& look);
   // Puts what the governor has chosen into the quality, as far as the rate is held, and returns the
@@ -96,12 +107,15 @@ class LiveRender {
   const std::stop_token stop_;
   pipeline::RenderStage* stage_ = nullptr;
   std::optional<pipeline::Governor> governor_;
+  render::DeviceWork counted_;  // of the stage's device
   bool is_first_ = true;  // no picture came of the stage yet; the first one compiles its pipelines
   // The last shots with pose and light, of the rig and of the take in review: their frames only.
   std::optional<pipeline::Shot> good_, good_of_take_;
   session::SceneState recorded_;           // the scene that good_of_take_ was recorded with
   pipeline::LightPtr found_in_;            // the light that the found lamps were published of
   std::optional<pipeline::Shot> refined_;  // result of the last round, with layers
+  std::optional<UnderWay> under_way_;      // the last picture that was started
+  std::chrono::steady_clock::time_point completed_;  // when the last one was there
   bool refining_ = false;
   pipeline::Edits refined_edits_;
   double sample_s_ = 0;  // time of the last refinement's sample; 0: not known

@@ -46,6 +46,7 @@ Times measure(render::Renderer& renderer, const render::FrameInput& frame, int r
     const Times times = time_of([&] {
       renderer.begin(frame);
       renderer.render(1);
+      renderer.wait();
     });
     if (round < 0) continue;  // compiles the pipelines
     wall.push_back(times.wall_ms);

@@ -51,7 +51,10 @@ void run() {
   Plate picture;
   Step steps[] = {
       {"begin", [&] { renderer.begin(frame); }},
-      {"one sample", [&] { renderer.render(1); }},
+      {"one sample", [&] {
+         renderer.render(1);
+         renderer.wait();
+       }},
       {"layers", [&] { layers = renderer.layers(); }},
       {"picture", [&] { picture = renderer.show(false); }},
       {"picture, denoised", [&] { picture = renderer.show(true); }},

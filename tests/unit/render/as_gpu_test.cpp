@@ -45,6 +45,32 @@ std::vector<Plate> live_frames(render::Renderer& renderer, int count) {
   return shown;
 }
 
+// The same frames, each begun before the picture of the last one is there.
+std::vector<Plate> overlapping_frames(render::Renderer& renderer, int count) {
+  std::vector<Plate> shown;
+  std::optional<render::Showing> last;
+  const auto plate = std::make_shared<const Plate>(random_plate(width, height, 8));
+  const auto finish = [&] {
+    if (!last) return;
+    render::Showing::Shown there = last->finish();
+    expect_clean(there.counters);
+    EXPECT_GT(there.counters.rays, 0u);
+    shown.push_back(std::move(there.picture));
+  };
+  for (int frame = 0; frame < count; ++frame) {
+    renderer.begin({.plate = plate,
+                    .exposure = 0.5,
+                    .world_from_camera = look_at({0.004 * frame, -0.8, 1}, {0, 0, 0.05}),
+                    .accumulates = true});
+    renderer.render(2);
+    render::Showing showing = renderer.show_later(true);
+    finish();
+    last = std::move(showing);
+  }
+  finish();
+  return shown;
+}
+
 Pictures pictures_on(const std::shared_ptr<render::Device>& device) {
   const View view = ball_on_texture();
   SetRenderer renderer(view, many_photons(), set::LightSampling::importance, device);
@@ -58,6 +84,7 @@ TEST(AsGpu, HasThePicturesOfACpuBitForBit) {
   const auto as_gpu = render::open_device({.validation = true, .name = "", .as_gpu = true});
   // On a card there is no other path to compare with; every other test then runs the card's.
   if (!as_gpu->is_cpu()) GTEST_SKIP() << "the device is a graphics card";
+  if (!shared_device()->shares_host_memory()) GTEST_SKIP() << "PREVIZ_AS_GPU is set";
   EXPECT_FALSE(as_gpu->shares_host_memory());
   EXPECT_TRUE(shared_device()->shares_host_memory());
   EXPECT_FALSE(render::is_gpu(*as_gpu));
@@ -76,6 +103,18 @@ TEST(AsGpu, HasThePicturesOfACpuBitForBit) {
 std::shared_ptr<render::Device> hazards_heard() {
   return render::open_device(
       {.validation = true, .name = "", .as_gpu = true, .synchronization = true});
+}
+
+TEST(AsGpu, HasTheSamePicturesWhereFramesOverlap) {
+  const auto as_gpu = hazards_heard();
+  const View view = ball_on_texture();
+  SetRenderer one(view, many_photons(), set::LightSampling::importance, as_gpu);
+  SetRenderer other(view, many_photons(), set::LightSampling::importance, as_gpu);
+  const std::vector<Plate> alone = live_frames(one, 4), overlapping = overlapping_frames(other, 4);
+  ASSERT_EQ(overlapping.size(), alone.size());
+  for (std::size_t i = 0; i < alone.size(); ++i)
+    EXPECT_TRUE(overlapping[i].samples == alone[i].samples) << "frame " << i;
+  EXPECT_EQ(render::validation_messages(*as_gpu), 0u);
 }
 
 void two_live_frames(const std::shared_ptr<render::Device>& device) {
