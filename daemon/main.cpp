@@ -104,7 +104,6 @@ int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
 int do_bench(bench::BenchOptions& options, const StopOnSignal& stop) {
   options.stop = stop.token();
   const bench::BenchReport report = bench::run_bench(options, std::cout);
-  std::cout << "\n" << bench::bench_table(report);
   for (const auto& file : {options.json, options.page})
     if (file) std::cout << file->string() << "\n";
   std::cout << std::flush;

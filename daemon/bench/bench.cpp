@@ -60,7 +60,13 @@ class Bench {
       more.triangles = triangles;
       measure(frames, more, report_.by_triangles);
     }
-    if (options_.set_or_session) measure_set();
+    try {
+      measure_set();
+    } catch (const render::DeviceLost&) {
+      throw;
+    } catch (const Error& error) {  // it is too large for the device
+      report_.left_out.push_back({options_.set_or_session->string(), error.what()});
+    }
     report_.took_s = since_start();
     report_.interrupted = options_.stop.stop_requested();
     return std::move(report_);
@@ -72,6 +78,9 @@ class Bench {
   }
 
   void begin() {
+    // A mistake in the set is said before anything is measured.
+    if (options_.set_or_session)
+      frame_.emplace(trade::TradeSource{.set_or_session = *options_.set_or_session}, std::nullopt);
     report_.date = fmt::format("{:%Y-%m-%d %H:%M}", fmt::localtime(std::time(nullptr)));
     report_.version = PREVIZ_VERSION;
     report_.processor = processor();
@@ -117,8 +126,12 @@ class Bench {
   }
 
   void measure_set() {
-    if (options_.stop.stop_requested()) return;
-    trade::TradeFrame frame({.set_or_session = *options_.set_or_session}, std::nullopt);
+    if (!frame_ || options_.stop.stop_requested()) return;
+    if (since_start() > options_.seconds) {
+      report_.left_out.push_back({options_.set_or_session->string(), "there is no time left"});
+      return;
+    }
+    trade::TradeFrame& frame = *frame_;
     const set::Set& set = frame.set();
     const scene::Scene scene = scene::load_scene(set);
     trade::TradeSettings settings;
@@ -126,7 +139,7 @@ class Bench {
     settings.lighting = set.lighting;
     settings.lens = frame.calibration().lens;
     settings.denoise = set.quality.denoise;
-    trade::PathTimer timer(device_, frame, scene, settings);
+    trade::PathTimer timer(device_, frame, scene, settings, /*is_live=*/true);
     const PinholeIntrinsics& lens = frame.calibration().intrinsics;
     const double scale = set.quality.scale;
     report_.set = {.set = options_.set_or_session->string(),
@@ -144,6 +157,7 @@ class Bench {
   std::ostream& out_;
   const Clock::time_point start_ = Clock::now();
   std::shared_ptr<render::Device> device_;
+  std::optional<trade::TradeFrame> frame_;
   BenchReport report_{};
 };
 
@@ -151,6 +165,7 @@ class Bench {
 
 BenchReport run_bench(const BenchOptions& options, std::ostream& out) {
   BenchReport report = Bench(options, out).run();
+  out << "\n" << bench_table(report) << std::flush;
   if (options.json) session::replace_file(*options.json, bench_json(report));
   if (options.page) session::replace_file(*options.page, bench_page(report));
   return report;

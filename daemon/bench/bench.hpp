@@ -21,7 +21,7 @@ struct BenchOptions {
 };
 
 // Throws previz::Error where there is no device, or where a file cannot be read or written. What
-// is being measured goes to `out`, a line each.
+// is being measured goes to `out`, a line each, and the table before the files are written.
 BenchReport run_bench(const BenchOptions& options, std::ostream& out);
 
 }  // namespace previz::bench

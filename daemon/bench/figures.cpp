@@ -60,7 +60,7 @@ std::string passes_of(const FrameFigures& frame) {
       frame.record_ms, "having the picture", frame.show_ms, frame.waited_ms);
   const render::DeviceWork& work = frame.work;
   text += fmt::format(
-      "  {} submissions, {} waits, {} allocations, {} barriers, {:.1f} MB up, {:.1f} MB down\n",
+      "  submissions {}, waits {}, allocations {}, barriers {}, {:.1f} MB up, {:.1f} MB down\n",
       work.submissions, work.waits, work.allocations, work.barriers,
       static_cast<double>(work.bytes_up) / 1e6, static_cast<double>(work.bytes_down) / 1e6);
   const double rays = rays_a_second(frame.rays, frame.ms_of("extend"));
@@ -181,7 +181,8 @@ std::string bench_json(const BenchReport& report) {
     json["left_out"].push_back({{"what", left.what}, {"why", left.why}});
   json["took_s"] = report.took_s;
   json["interrupted"] = report.interrupted;
-  return json.dump(2) + "\n";
+  // A path or a device's name need not be UTF-8.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace previz::bench

@@ -19,14 +19,14 @@ struct FrameFigures {
   std::size_t triangles = 0;
   int frames = 0;
   double ms = 0;         // of the whole frame, on the clock, from the plate to its picture
-  // From one picture to the next where frames follow at once: the next one is begun before the
-  // picture of the last one is there.
-  double interval_ms = 0;
   double begin_ms = 0;   // of these, until the plate and the scene are on their way up
   double record_ms = 0;  // until all commands are recorded
   double show_ms = 0;    // until the picture is there, waiting for the device included
   double waited_ms = 0;  // of this, waiting for the device
   double cpu_ms = 0;     // of all the computer's cores
+  // From one picture to the next where frames follow at once: the next one is begun before the
+  // picture of the last one is there.
+  double interval_ms = 0;
   // Of the device, by its own clock, the longest first; empty: it has none.
   std::vector<render::DeviceTimes::Pass> passes;
   std::uint64_t rays = 0, shadow_rays = 0;  // a frame

@@ -106,7 +106,8 @@ Frames::~Frames() = default;
 double Frames::expected_s(const FrameWish& wish) const {
   const double pixels = static_cast<double>(wish.width) * wish.height;
   const double frame_s = pixels * (s_a_pixel_ + wish.samples * s_a_sample_);
-  const double measured = std::clamp(measured_s, frame_s, most_frames * frame_s);
+  // Frames are measured alone and, on a card, in a row.
+  const double measured = std::clamp(2 * measured_s, 2 * frame_s, 2 * most_frames * frame_s);
   const bool is_new = !stage_ || stage_->wish.triangles != wish.triangles;
   return warm_frames * frame_s + measured +
          (is_new ? s_a_triangle_ * static_cast<double>(wish.triangles) : 0);

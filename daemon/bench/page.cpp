@@ -81,10 +81,8 @@ std::string parts(const FrameFigures& frame) {
   return html + "</table>\n" +
          fmt::format(
              "<p class=\"soft\">Blue: passes of the graphics card, by its own clock{}. Brown: "
-             "the "
-             "computer, which waits for the device for {} ms. A frame is handed over in {} "
-             "submissions, with {} waits, {} allocations and {} barriers; {:.1f} MB go up and "
-             "{:.1f} MB come down.</p>\n",
+             "the computer, which then waits for the card for {} ms. Submissions: {}; waits: {}; "
+             "allocations: {}; barriers: {}. {:.1f} MB go up, and {:.1f} MB come down.</p>\n",
              frame.passes.empty() ? " (it has none)" : "", number(frame.waited_ms),
              work.submissions, work.waits, work.allocations, work.barriers,
              static_cast<double>(work.bytes_up) / 1e6, static_cast<double>(work.bytes_down) / 1e6);
@@ -143,7 +141,9 @@ std::string bench_page(const BenchReport& report) {
       "content=\"width=device-width\">\n<title>{0}: {1}</title><style>{2}{3}</style></head><body>\n"
       "<h1>{1}</h1>\n<p class=\"soft\">{0}, measured by previzd {4} on {5}. A live frame has one "
       "sample a pixel, is averaged with those before it and denoised; it shows a glass ball among "
-      "solid ones under a sky.</p>\n",
+      "solid ones under a sky. A frame lasts from the camera's picture to its own; where frames "
+      "follow at once, the next one is begun before that, so that more of them come per second."
+      "</p>\n",
       escaped(report.device.name), title, report::page_style, bar_style, report.version,
       report.date);
   html += verdict(report);

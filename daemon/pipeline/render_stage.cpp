@@ -101,7 +101,7 @@ Shot RenderStage::finish(ShotUnderWay under_way) const {
   Shot& shot = under_way.shot;
   if (under_way.showing) {
     render::Showing::Shown shown = under_way.showing->finish();
-    shot.picture = std::make_shared<const Plate>(std::move(shown.picture));
+    shot.picture = std::move(shown.picture);
     shot.counters = shown.counters;
     shot.whole = true;
     shot.render_s = seconds_from(under_way.begin);

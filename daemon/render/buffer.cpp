@@ -233,6 +233,10 @@ void Downloads::add(Device& device, const Buffer& buffer, std::span<std::byte> t
   submission_ = device.submissions().next();
 }
 
+bool Downloads::have_arrived() const {
+  return are_here() || submission_ <= device_->submissions().done();
+}
+
 void Downloads::finish() {
   if (copies_.empty()) return;
   device_->submissions().wait(submission_);

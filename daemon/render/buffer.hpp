@@ -92,6 +92,8 @@ class Downloads {
   // Waits until all copies are here.
   void finish();
   bool are_here() const { return copies_.empty(); }
+  // Returns whether finish() would not wait.
+  bool have_arrived() const;
 
  private:
   struct Copy {

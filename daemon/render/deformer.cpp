@@ -216,6 +216,7 @@ void Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh, const B
     }
     device_.submissions().barrier(commands);
   });
+  if (!costs_down_.are_here()) return;
   refitted_ = std::move(refitted);
   costs_.resize(changed.size());
   costs_down_.add(device_, roots_, std::as_writable_bytes(std::span(costs_)));
@@ -224,6 +225,7 @@ void Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh, const B
 
 // Looks at what the trees that were refitted last have come to cost.
 void Deformer::watch_last() {
+  if (!costs_down_.have_arrived()) return;  // the next shape has come before them
   costs_down_.finish();
   for (std::size_t i = 0; i < refitted_.size(); ++i) watch(meshes_[refitted_[i]], costs_[i]);
   refitted_.clear();

@@ -77,6 +77,20 @@ std::string lacks(const vk::raii::PhysicalDevice& physical) {
   return {};
 }
 
+// Returns the family whose queues compute and do not draw, if there is one: the display's pictures
+// need not wait for ours there, and some drivers let its work take longer. Otherwise one that
+// computes.
+auto compute_family(const std::vector<vk::QueueFamilyProperties>& families) {
+  using Flag = vk::QueueFlagBits;
+  const auto computes = [](const vk::QueueFamilyProperties& family) {
+    return static_cast<bool>(family.queueFlags & Flag::eCompute);
+  };
+  const auto only = std::ranges::find_if(families, [&](const vk::QueueFamilyProperties& family) {
+    return computes(family) && !(family.queueFlags & Flag::eGraphics);
+  });
+  return only != families.end() ? only : std::ranges::find_if(families, computes);
+}
+
 }  // namespace
 
 Device::Device(DeviceOptions options) : options_(std::move(options)) {
@@ -209,9 +223,7 @@ void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) 
 
 void Device::create_device() {
   const auto families = physical_.getQueueFamilyProperties();
-  const auto family = std::find_if(families.begin(), families.end(), [](const auto& properties) {
-    return static_cast<bool>(properties.queueFlags & vk::QueueFlagBits::eCompute);
-  });
+  const auto family = compute_family(families);
   if (family == families.end()) throw Error("Vulkan: " + name_ + " has no compute queue");
   queue_family_ = static_cast<std::uint32_t>(family - families.begin());
   allows_ = limits_of(physical_);

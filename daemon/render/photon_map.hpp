@@ -23,6 +23,7 @@ class PhotonMap {
   // extension, as many work groups as `groups` holds at `offset` bounce the photons off what they
   // hit; sorting makes the map. All take the buffers of the scene and of the paths, and a GpuBatch
   // whose first_sample is the pass and whose photon_radius is the radius.
+  std::uint32_t count() const { return photons_; }  // emitted a pass
   void record_emission(const Recording& recording);
   void record_bounce(const Recording& recording, const Buffer& groups, vk::DeviceSize offset);
   void record_sorting(const Recording& recording);

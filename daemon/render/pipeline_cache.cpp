@@ -118,7 +118,7 @@ void PipelineCache::finish() {
   if (saving_.valid()) saving_.wait();
 }
 
-bool PipelineCache::save() {
+bool PipelineCache::save() try {
   if (file_.empty()) return true;
   if (saving_.valid() && saving_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
     return false;
@@ -129,6 +129,9 @@ bool PipelineCache::save() {
   }
   saving_ = std::async(std::launch::async,
                        [file = file_, data = std::move(data)] { write_cache(file, data); });
+  return true;
+} catch (const std::exception& error) {  // no memory, no thread, or no device any more
+  note(std::string("what was compiled cannot be kept for the next start: ") + error.what());
   return true;
 }
 

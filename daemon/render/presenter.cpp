@@ -157,17 +157,19 @@ void Presenter::read(const Denoiser::Band& band, Layers& layers) const {
 
 Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
                          const std::function<void(const Denoiser::Band&)>& after_band) {
+  Plate picture{what.width, what.height, bits_,
+                std::vector<std::uint16_t>(std::size_t{3} * static_cast<std::size_t>(what.width) *
+                                           static_cast<std::size_t>(what.height))};
   Downloads down;
-  Plate picture = present_later(what, denoiser, down, after_band);
+  present_later(what, denoiser, picture, down, after_band);
   down.finish();
   return picture;
 }
 
-Plate Presenter::present_later(const ToPresent& what, Denoiser& denoiser, Downloads& down,
-                               const std::function<void(const Denoiser::Band&)>& after_band) {
+void Presenter::present_later(const ToPresent& what, Denoiser& denoiser, Plate& picture,
+                              Downloads& down,
+                              const std::function<void(const Denoiser::Band&)>& after_band) {
   const auto width = static_cast<std::size_t>(what.width);
-  Plate picture{what.width, what.height, bits_,
-                std::vector<std::uint16_t>(3 * width * static_cast<std::size_t>(what.height))};
   for (const Denoiser::Band& band : denoiser.bands(what.width, what.height)) {
     const std::size_t top = static_cast<std::size_t>(band.top) * width;
     const std::size_t first = static_cast<std::size_t>(band.first) * width;
@@ -198,7 +200,6 @@ Plate Presenter::present_later(const ToPresent& what, Denoiser& denoiser, Downlo
              std::as_writable_bytes(std::span(picture.samples).subspan(3 * first, 3 * count)));
     if (what.denoise && after_band) after_band(band);
   }
-  return picture;
 }
 
 }  // namespace previz::render

@@ -41,9 +41,10 @@ class Presenter {
   // `after_band` is called with each band that the denoiser's passes have run over.
   Plate present(const ToPresent& what, Denoiser& denoiser,
                 const std::function<void(const Denoiser::Band&)>& after_band = {});
-  // The same, but the picture's samples are there only once `down` is finished.
-  Plate present_later(const ToPresent& what, Denoiser& denoiser, Downloads& down,
-                      const std::function<void(const Denoiser::Band&)>& after_band = {});
+  // The same into a picture of the right size, whose samples are there only once `down` is
+  // finished.
+  void present_later(const ToPresent& what, Denoiser& denoiser, Plate& picture, Downloads& down,
+                     const std::function<void(const Denoiser::Band&)>& after_band = {});
   // Adds a frame to its history, which it must have, and makes no picture.
   void add_to_history(const ToPresent& what, Denoiser& denoiser);
   // Replaces the composite and the mask in the band's rows by those that present() has made of the

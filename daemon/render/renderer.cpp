@@ -16,6 +16,7 @@
 #include "daemon/render/kept_frame.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
+#include "daemon/render/plate_pool.hpp"
 #include "daemon/render/presenter.hpp"
 #include "daemon/render/wavefront.hpp"
 #include "drivers/error.hpp"
@@ -95,6 +96,7 @@ struct Renderer::Impl {
   GpuScene scene;
   std::optional<Wavefront> wavefront;
   std::optional<Denoiser> denoiser;    // made when a picture is first shown
+  PlatePool pictures;                  // of show_later()
   std::optional<Presenter> presenter;  // likewise; made for the response
   std::optional<History> history;      // made when a frame first accumulates, or is shown among
                                        // others
@@ -538,7 +540,8 @@ DeviceTimes Renderer::take_times() {
 }
 
 struct Showing::State {
-  Plate picture;
+  std::shared_ptr<Device> device;  // goes last
+  std::shared_ptr<Plate> picture;
   Counters host;
   gpu::GpuControl control{};
   Downloads down;
@@ -561,12 +564,14 @@ Showing::Shown Showing::finish() {
 Showing Renderer::show_later(bool denoise) {
   Impl& r = *impl_;
   auto state = std::make_unique<Showing::State>();
+  state->device = r.device;
   ToPresent what = r.to_present(denoise);
   if (r.frame.accumulates && r.samples > 0) {
     r.history->find_surfaces(r.scene_buffers, r.features, r.samples);
     what.history = &*r.history;
   }
-  state->picture = r.presenter->present_later(what, *r.denoiser, state->down);
+  state->picture = r.pictures.lend(what.width, what.height, r.response->bits());
+  r.presenter->present_later(what, *r.denoiser, *state->picture, state->down);
   r.wavefront->count_into(state->control, state->down);
   state->host = r.host_counters();
   r.device->submissions().flush();

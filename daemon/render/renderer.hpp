@@ -38,7 +38,7 @@ class Showing {
   // Waits for the picture and what was counted in its frame. May be called once. Throws as
   // Renderer::show() does.
   struct Shown {
-    Plate picture;
+    PlatePtr picture;
     Counters counters;
   };
   Shown finish();

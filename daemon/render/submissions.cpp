@@ -54,6 +54,7 @@ Submissions::~Submissions() {
 const vk::raii::CommandBuffer& Submissions::recording() {
   Slot& slot = slot_of(next_);
   if (is_recording_) return slot.commands;
+  refuse_after_failure();
   if (slot.submission > done_) wait(slot.submission);
   named(options_.name, [&] {
     slot.commands.reset();
@@ -68,7 +69,8 @@ const vk::raii::CommandBuffer& Submissions::recording() {
 void Submissions::flush() {
   if (!is_recording_) return;
   Slot& slot = slot_of(next_);
-  is_recording_ = false;  // even if it fails: it is not tried again
+  is_recording_ = false;
+  has_failed_ = true;  // unless all of this goes well: what was recorded is lost otherwise
   named(options_.name, [&] {
     slot.commands.end();
     const vk::CommandBuffer commands = *slot.commands;
@@ -77,8 +79,14 @@ void Submissions::flush() {
     info.pNext = &values;
     queue_.submit(info);
   });
+  has_failed_ = false;
   ++work.submissions;
   slot.submission = next_++;
+}
+
+void Submissions::refuse_after_failure() const {
+  if (has_failed_)
+    throw Error("Vulkan: " + options_.name + " did not take what it was given to do");
 }
 
 void Submissions::await(std::uint64_t submission) {
@@ -89,19 +97,18 @@ void Submissions::await(std::uint64_t submission) {
 void Submissions::wait(std::uint64_t submission) {
   if (submission == next_) {
     flush();
+    refuse_after_failure();
     submission = next_ - 1;
   }
   if (submission <= done_) return;
-  const auto start = std::chrono::steady_clock::now();
-  std::uint64_t done = 0;
-  named(options_.name, [&] {
-    await(submission);
-    done = timeline_.getCounterValue();
-  });
   ++work.waits;
-  collect(
-      done,
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+  named(options_.name, [&] {
+    const auto start = std::chrono::steady_clock::now();
+    await(submission);
+    const std::chrono::duration<double, std::milli> waited =
+        std::chrono::steady_clock::now() - start;
+    collect(timeline_.getCounterValue(), waited.count());
+  });
 }
 
 void Submissions::collect(std::uint64_t done, double waited_ms) {
@@ -116,7 +123,7 @@ void Submissions::adapt(const Slot& slot, double ms) {
   if (!options_.adapts || slot.work == 0) return;
   if (ms > long_ms)
     options_.most_work = std::max(slot.work / 2, least_work);
-  else if (ms > 0 && ms < short_ms && slot.work >= options_.most_work)
+  else if (ms > 0 && ms < short_ms && clock_.untimed() == 0 && slot.work >= options_.most_work)
     options_.most_work = std::min(2 * options_.most_work, most_work_ever);
 }
 

@@ -71,6 +71,7 @@ class Submissions {
     std::uint64_t work = 0;
   };
   Slot& slot_of(std::uint64_t submission) { return slots_[submission % slots_.size()]; }
+  void refuse_after_failure() const;
   void await(std::uint64_t submission);
   void collect(std::uint64_t done, double waited_ms);
   void adapt(const Slot& slot, double ms);
@@ -83,6 +84,7 @@ class Submissions {
   std::array<Slot, 3> slots_;
   PassClock clock_;
   bool is_recording_ = false;
+  bool has_failed_ = false;  // a submission was not taken: what comes next would lack it
   std::uint64_t next_ = 1, done_ = 0;
   std::deque<std::pair<std::uint64_t, std::shared_ptr<const void>>> kept_;  // by submission
 };

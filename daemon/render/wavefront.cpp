@@ -327,7 +327,8 @@ bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t sa
         if (trace_photons) record_photons(recording, max_depth);
         record_batch(recording, batch, max_depth);
       });
-      device_.submissions().add_work(slots_of(batch));
+      device_.submissions().add_work(slots_of(batch) +
+                                     (trace_photons ? std::uint64_t{photons_.count()} : 0));
       trace_photons = false;
     }
   }

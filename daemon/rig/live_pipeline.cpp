@@ -89,6 +89,7 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       failure = std::current_exception();
     }
     render.count_dropped();
+    render.drop_under_way("stopped");
     if (tracked.try_pop()) parts.kept.metrics.dropped("render", "stopped");
     parts.inbox.finish(failure != nullptr);
   });

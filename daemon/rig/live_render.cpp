@@ -43,23 +43,34 @@ bool LiveRender::interrupted() const {
   return stop_.stop_requested() || (refining_ && look_.get()->state.mode != Mode::refine);
 }
 
-void LiveRender::use_none() {
-  if (under_way_) count_failed(under_way_->of_take, "failed");
-  under_way_.reset();
+void LiveRender::use(pipeline::RenderStage& stage) {
+  stage_ = &stage;
+  is_first_ = true;
+  counted_ = stage.renderer()->work();
+}
+
+void LiveRender::drop_under_way(const char* cause) {
+  for (const UnderWay& picture : under_way_) count_failed(picture.of_take, cause);
+  under_way_.clear();
+}
+
+void LiveRender::use_none(const char* cause) {
+  drop_under_way(cause);
   stage_ = nullptr;
   refining_ = false;
   refined_.reset();
 }
 
 bool LiveRender::finished() const {
-  return (channels_.tracked.finished() && !under_way_) || (!stage_ && stop_.stop_requested());
+  return (channels_.tracked.finished() && under_way_.empty()) ||
+         (!stage_ && stop_.stop_requested());
 }
 
 std::optional<Shot> LiveRender::next(const std::function<bool(const render::DeviceLost&)>& renew) {
   try {
     return next_picture();
   } catch (const render::DeviceLost& lost) {
-    use_none();
+    use_none("device lost");
     renew(lost);
     return std::nullopt;
   }
@@ -73,8 +84,7 @@ std::optional<Shot> LiveRender::next_picture() {
   if (look->state.mode != Mode::refine || look->refinements != refinements_) refining_ = false;
   if (!look->of_take) good_of_take_.reset();
   refinements_ = look->refinements;
-  if (look->state.mode == Mode::refine && under_way_)
-    return complete(*std::exchange(under_way_, std::nullopt));
+  if (look->state.mode == Mode::refine && !under_way_.empty()) return complete();
   return look->state.mode == Mode::refine ? refine_round(*look) : wait_for_frame(*look);
 }
 
@@ -174,25 +184,27 @@ void LiveRender::publish_found(const pipeline::LightPtr& light) {
   channels_.found.set(pipeline::found_lamps(*light));
 }
 
-// Where the next frame is there before the picture of the last one, the device has been given that,
-// too, while the computer has the picture.
+// If the next frame is already waiting, it is handed to the device before the last one's picture is
+// fetched, so that the device does not idle meanwhile. A snapshot, or a layer in place of the
+// composite, is rendered to its end as soon as it is started, and would hold up the last picture.
 std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
-  if (!under_way_) {
+  if (under_way_.empty()) {
     std::optional<Shot> shot = take_frame(look, /*is_to_be_rendered=*/true, mode_delay);
     if (!shot) return std::nullopt;
     start(look, *std::move(shot));
   }
-  UnderWay first = *std::exchange(under_way_, std::nullopt);
-  if (first.picture.is_here()) return complete(std::move(first));
-  std::optional<Shot> next;
-  try {
-    next = take_frame(look, /*is_to_be_rendered=*/true, std::chrono::milliseconds(0));
-    if (next) start(look, *std::move(next));
-  } catch (...) {
-    count_failed(first.of_take, "failed");
-    throw;
-  }
-  return complete(std::move(first));
+  const bool can_overlap = !wants_snapshot(look) && look.view == render::View::composite;
+  if (can_overlap && !under_way_.front().picture.is_here())
+    if (std::optional<Shot> next =
+            take_frame(look, /*is_to_be_rendered=*/true, std::chrono::milliseconds(0))) {
+      metrics_.count("begun before the last picture was there");
+      start(look, *std::move(next));
+    }
+  return complete();
+}
+
+bool LiveRender::wants_snapshot(const Look& look) const {
+  return look.snapshots > snapshots_ || look.refined_snapshots > refined_snapshots_;
 }
 
 // A frame that came while tracking rested has neither pose nor light, and its plate all the same.
@@ -235,8 +247,7 @@ void LiveRender::start(const Look& look, Shot shot) {
   quality.accumulate = look.accumulates;
   const double scale = govern(look, quality);
   // If a refinement ended before its first round, this picture is the only one to save for it.
-  const bool of_live = look.snapshots > snapshots_;
-  const bool snapshot = of_live || look.refined_snapshots > refined_snapshots_;
+  const bool snapshot = wants_snapshot(look);
   // A snapshot can be compared with what `previzd render` makes of its frame.
   if (snapshot && shot.track.pose) shot.shown_pose.reset();
   // The crew's changes go on top of what was recorded, never in its place.
@@ -252,13 +263,15 @@ void LiveRender::start(const Look& look, Shot shot) {
     stage_->show(look.view);
     stage_->fill_layers(snapshot);
     stage_->resize(scale);
-    under_way_ = UnderWay{stage_->start(std::move(shot)),
-                          std::move(recorded),
-                          look.of_take,
-                          look.governed,
-                          snapshot,
-                          of_live,
-                          begin};
+    under_way_.push_back({.picture = stage_->start(std::move(shot)),
+                          .recorded = std::move(recorded),
+                          .of_take = look.of_take,
+                          .governed = look.governed,
+                          .snapshot = snapshot,
+                          .of_live = look.snapshots > snapshots_,
+                          .samples = governor_ ? governor_->samples() : 0,
+                          .step = governor_ ? governor_->step() : set::PreviewStep{},
+                          .begin = begin});
   } catch (const render::DeviceLost&) {
     count_failed(look.of_take, "device lost");
     throw;
@@ -271,7 +284,6 @@ void LiveRender::start(const Look& look, Shot shot) {
 // What the computer and the device had to do with one another: each is time that no pass explains.
 void LiveRender::count_work() {
   const render::DeviceWork work = stage_->renderer()->work();
-  if (work.submissions < counted_.submissions) counted_ = {};  // it was opened again
   const render::DeviceWork before = std::exchange(counted_, work);
   metrics_.device_counted("graphics", {{"submissions", work.submissions - before.submissions},
                                        {"waits", work.waits - before.waits},
@@ -286,8 +298,10 @@ void LiveRender::count_failed(bool of_take, const char* cause) {
   if (!of_take) metrics_.dropped("render", cause);
 }
 
-// Returns the picture that is under way, once it is there.
-Shot LiveRender::complete(UnderWay under_way) {
+// Returns the picture that has been under way for longest, once it is there.
+Shot LiveRender::complete() {
+  UnderWay under_way = std::move(under_way_.front());
+  under_way_.pop_front();
   Shot shot;
   try {
     shot = stage_->finish(std::move(under_way.picture));
@@ -301,6 +315,7 @@ Shot LiveRender::complete(UnderWay under_way) {
   // Where pictures overlap, each takes as long as it is there after the one before.
   const double took = seconds_since(std::max(under_way.begin, completed_));
   completed_ = Clock::now();
+  if (shot.render_s > 0) shot.render_s = took;
   metrics_.busy("render", took);
   count_shown(under_way.of_take);
   count_work();
@@ -308,7 +323,10 @@ Shot LiveRender::complete(UnderWay under_way) {
   if (shot.untouched.empty()) {
     if (shot.track.pose) keep_as_good(shot, std::move(under_way.recorded));
     if (under_way.governed && governor_) {
-      if (!is_first_ && !under_way.snapshot) governor_->took(took);
+      // The governor may have changed its mind since the frame was started.
+      const bool is_as_governed =
+          under_way.samples == governor_->samples() && under_way.step == governor_->step();
+      if (!is_first_ && !under_way.snapshot && is_as_governed) governor_->took(took);
       set::PreviewStep step = governor_->step();
       step.samples = governor_->samples();
       channels_.governed.set(step);

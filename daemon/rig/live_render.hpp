@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <map>
 #include <optional>
@@ -38,12 +39,11 @@ class LiveRender {
              pipeline::Metrics& metrics, report::Reports& reports, Channels channels,
              std::stop_token stop);
 
-  void use(pipeline::RenderStage& stage) {
-    stage_ = &stage;
-    is_first_ = true;
-  }
+  void use(pipeline::RenderStage& stage);
   // Forgets a stage that has failed, and the refinement that it was at; there is none until use().
-  void use_none();
+  // What was under way is counted as dropped for this cause.
+  void use_none(const char* cause = "failed");
+  void drop_under_way(const char* cause);
 
   // Returns the next picture to show, or nothing if none came within a moment. There must be a
   // stage to use(). If the device is lost, `renew` is called; it returns true once there is another
@@ -84,10 +84,13 @@ class LiveRender {
     pipeline::ShotUnderWay picture;
     std::optional<session::SceneState> recorded;  // of a take's frame: its scene
     bool of_take, governed, snapshot, of_live;    // as the Look was
+    int samples;                                  // the governor's
+    set::PreviewStep step;                        // likewise
     std::chrono::steady_clock::time_point begin;
   };
   void start(const Look& look, pipeline::Shot shot);
-  pipeline::Shot complete(UnderWay under_way);
+  pipeline::Shot complete();
+  bool wants_snapshot(const Look& look) const;
   void count_work();
   void count_failed(bool of_take, const char* cause);
   void keep_as_good(const pipeline::Shot& shot, std::optional<session::SceneState> recorded);
@@ -114,7 +117,7 @@ class LiveRender {
   session::SceneState recorded_;           // the scene that good_of_take_ was recorded with
   pipeline::LightPtr found_in_;            // the light that the found lamps were published of
   std::optional<pipeline::Shot> refined_;  // result of the last round, with layers
-  std::optional<UnderWay> under_way_;      // the last picture that was started
+  std::deque<UnderWay> under_way_;         // pictures that were started, at most two
   std::chrono::steady_clock::time_point completed_;  // when the last one was there
   bool refining_ = false;
   pipeline::Edits refined_edits_;

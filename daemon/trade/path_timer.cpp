@@ -29,14 +29,20 @@ ObserverCalibration with_lens(ObserverCalibration calibration, const TradeSettin
   return calibration;
 }
 
+pipeline::RenderStageOptions live_options(bool is_live) {
+  pipeline::RenderStageOptions options;
+  options.is_live = is_live;
+  return options;
+}
+
 }  // namespace
 
 PathTimer::PathTimer(const std::shared_ptr<render::Device>& device, TradeFrame& frame,
-                     const scene::Scene& scene, const TradeSettings& settings)
+                     const scene::Scene& scene, const TradeSettings& settings, bool is_live)
     : shot_(frame.shot(settings.lighting, scene)),
       quality_(with_settings(frame.set(), settings).quality),
       stage_(device, with_settings(frame.set(), settings), with_lens(frame.calibration(), settings),
-             scene, {}) {}
+             scene, live_options(is_live)) {}
 
 double PathTimer::time_of_a_frame() {
   pipeline::Shot shot = shot_;

@@ -23,8 +23,9 @@ struct Making {
 
 class PathTimer {
  public:
+  // With `is_live` frames follow one another, and are averaged where the set's quality asks for it.
   PathTimer(const std::shared_ptr<render::Device>& device, TradeFrame& frame,
-            const scene::Scene& scene, const TradeSettings& settings);
+            const scene::Scene& scene, const TradeSettings& settings, bool is_live = false);
 
   // Both return seconds: the median of a few frames, or of one that takes long, after one of a
   // single sample that warms up. Tracking and the screen have threads of their own and are not in

@@ -1,10 +1,10 @@
 // A Vulkan layer for tests: once the file named by PREVIZ_LOSE_DEVICE is there, the device that
-// next submits work is lost, as by its driver (Vulkan 1.3, 5.2.3): from then on it answers every
-// submit and every wait with VK_ERROR_DEVICE_LOST. The file is taken away; a device made after that
-// works. Where PREVIZ_HIDE_GPU names a file, the devices of the driver, whatever they are, say that
-// they are GPUs, and CPU devices while the file is there: as if a GPU were gone and only the CPU's
-// driver were left. While PREVIZ_HANG_DEVICE names a file that is there, no device is made, and who
-// asks for one waits. Loader and layer interface, version 2.
+// next submits work, or is waited for, is lost, as by its driver (Vulkan 1.3, 5.2.3): from then on
+// it answers every submit and every wait with VK_ERROR_DEVICE_LOST. The file is taken away; a
+// device made after that works. Where PREVIZ_HIDE_GPU names a file, the devices of the driver,
+// whatever they are, say that they are GPUs, and CPU devices while the file is there: as if a GPU
+// were gone and only the CPU's driver were left. While PREVIZ_HANG_DEVICE names a file that is
+// there, no device is made, and who asks for one waits. Loader and layer interface, version 2.
 #include <unistd.h>
 #include <vulkan/vk_layer.h>
 #include <vulkan/vulkan.h>
@@ -112,12 +112,11 @@ VKAPI_ATTR VkResult VKAPI_CALL queue_submit(VkQueue queue, std::uint32_t count,
   return below<PFN_vkQueueSubmit>(link, "vkQueueSubmit")(queue, count, submits, fence);
 }
 
-VKAPI_ATTR VkResult VKAPI_CALL wait_for_fences(VkDevice device, std::uint32_t count,
-                                               const VkFence* fences, VkBool32 all,
+VKAPI_ATTR VkResult VKAPI_CALL wait_semaphores(VkDevice device, const VkSemaphoreWaitInfo* info,
                                                std::uint64_t timeout) {
-  const Below link = below_of(device, false);
+  const Below link = below_of(device, true);
   if (link.is_lost) return VK_ERROR_DEVICE_LOST;
-  return below<PFN_vkWaitForFences>(link, "vkWaitForFences")(device, count, fences, all, timeout);
+  return below<PFN_vkWaitSemaphores>(link, "vkWaitSemaphores")(device, info, timeout);
 }
 
 void disguise(VkPhysicalDeviceProperties& properties) {
@@ -161,7 +160,7 @@ PFN_vkVoidFunction own(const char* name) {
       {"vkGetPhysicalDeviceProperties2", reinterpret_cast<PFN_vkVoidFunction>(device_properties2)},
       {"vkCreateDevice", reinterpret_cast<PFN_vkVoidFunction>(create_device)},
       {"vkQueueSubmit", reinterpret_cast<PFN_vkVoidFunction>(queue_submit)},
-      {"vkWaitForFences", reinterpret_cast<PFN_vkVoidFunction>(wait_for_fences)}};
+      {"vkWaitSemaphores", reinterpret_cast<PFN_vkVoidFunction>(wait_semaphores)}};
   const auto found = functions.find(name);
   return found == functions.end() ? nullptr : found->second;
 }

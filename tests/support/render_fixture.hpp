@@ -8,7 +8,8 @@
 
 namespace previz::test {
 
-// One device a test program; every test ends by asking it for validation messages.
+// One device a test program; every test ends by asking it for validation messages. With
+// PREVIZ_AS_GPU in the environment a CPU device is treated as a graphics card.
 inline const std::shared_ptr<render::Device>& shared_device() {
   static const auto device = render::open_device(
       {.validation = true, .name = "", .as_gpu = std::getenv("PREVIZ_AS_GPU") != nullptr});

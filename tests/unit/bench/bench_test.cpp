@@ -70,7 +70,7 @@ TEST(BenchReport, SaysInJsonWhatTheTableSays) {
   for (const char* words :
        {"Card <A>, driver Driver 1.2, 8.0 GB of memory", "copies: 12.0 GB/s up, 11.0 GB/s down",
         "2000.0 million rays per second, 500.0 million shadow rays per second",
-        "1 submissions, 1 waits, 0 allocations", "20.0 frames per second; the set asks for 25",
+        "submissions 1, waits 1, allocations 0", "20.0 frames per second; the set asks for 25",
         "not measured: 1280x720, 8 samples, 5000 triangles, it would take about 30 s"})
     EXPECT_THAT(table, HasSubstr(words));
 }

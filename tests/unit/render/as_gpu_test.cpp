@@ -55,7 +55,7 @@ std::vector<Plate> overlapping_frames(render::Renderer& renderer, int count) {
     render::Showing::Shown there = last->finish();
     expect_clean(there.counters);
     EXPECT_GT(there.counters.rays, 0u);
-    shown.push_back(std::move(there.picture));
+    shown.push_back(*there.picture);
   };
   for (int frame = 0; frame < count; ++frame) {
     renderer.begin({.plate = plate,
