@@ -161,21 +161,26 @@ TEST_F(RigWithoutItsGpu, RecordsWithoutAnyDriverAndDrawsOnceThereIsOne) {
 class RigDeviceLost : public RigWithoutItsGpu {
  protected:
   void SetUp() override { write_set("composite = true\n"); }
+
+  // Loses the device twice in a take.
+  void lose_it_in_a_take() {
+    run([&] {
+      begin_take();
+      for (int times = 0; times < 2; ++times) {
+        until_rendered(3);
+        lose_device();
+        while (std::filesystem::exists(lose_)) until_rendered(1);
+      }
+      until_rendered(4);
+    });
+    expect_losses(2);
+    EXPECT_THAT(log_.text(), HasSubstr("ErrorDeviceLost"));
+    EXPECT_GT(test::unbroken(take_folder()).size(), 8u);
+  }
 };
 
 TEST_F(RigDeviceLost, PicturesComeBackAndTheTakeLacksNothing) {
-  run([&] {
-    begin_take();
-    for (int times = 0; times < 2; ++times) {  // and again
-      until_rendered(3);
-      lose_device();
-      while (std::filesystem::exists(lose_)) until_rendered(1);
-    }
-    until_rendered(4);
-  });
-  expect_losses(2);
-  EXPECT_THAT(log_.text(), HasSubstr("ErrorDeviceLost"));
-  EXPECT_GT(test::unbroken(take_folder()).size(), 8u);
+  lose_it_in_a_take();
 
   // recording.composite: what was shown in the meantime.
   session::Session take = session::open_session(take_folder());
@@ -184,6 +189,13 @@ TEST_F(RigDeviceLost, PicturesComeBackAndTheTakeLacksNothing) {
   ASSERT_GE(shown->records().size(), 8u);
   EXPECT_EQ(shown->width(), 48);
   EXPECT_EQ(shown->read(0)->format, PixelFormat::rgb8);
+}
+
+// Two frames are lost with the device: the one whose picture is waited for, and the next one.
+TEST_F(RigDeviceLost, CountsBothFramesThatItWasAtWorkOn) {
+  options_.device.as_gpu = true;
+  lose_it_in_a_take();
+  EXPECT_FALSE(metrics_.stages.at("render").dropped.contains("failed"));
 }
 
 }  // namespace previz::rig::device_lost_test
