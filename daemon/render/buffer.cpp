@@ -233,8 +233,9 @@ void Downloads::add(Device& device, const Buffer& buffer, std::span<std::byte> t
   submission_ = device.submissions().next();
 }
 
-bool Downloads::have_arrived() const {
-  return are_here() || submission_ <= device_->submissions().done();
+bool Downloads::are_under_way() const {
+  return !are_here() && submission_ > device_->submissions().done() &&
+         submission_ < device_->submissions().next();
 }
 
 void Downloads::finish() {

@@ -92,8 +92,9 @@ class Downloads {
   // Waits until all copies are here.
   void finish();
   bool are_here() const { return copies_.empty(); }
-  // Returns whether finish() would not wait.
-  bool have_arrived() const;
+  // Returns whether they were handed over and are not known to be done: finish() would wait for all
+  // that was handed over with them.
+  bool are_under_way() const;
 
  private:
   struct Copy {

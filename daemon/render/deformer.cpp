@@ -225,7 +225,7 @@ void Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh, const B
 
 // Looks at what the trees that were refitted last have come to cost.
 void Deformer::watch_last() {
-  if (!costs_down_.have_arrived()) return;  // the next shape has come before them
+  if (costs_down_.are_under_way()) return;  // the next frame has come before them
   costs_down_.finish();
   for (std::size_t i = 0; i < refitted_.size(); ++i) watch(meshes_[refitted_[i]], costs_[i]);
   refitted_.clear();

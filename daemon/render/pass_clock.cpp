@@ -9,6 +9,11 @@ namespace {
 // Passes that find no room are counted as not timed.
 constexpr std::uint32_t most_passes = 8192;
 
+// Timestamps are reset when they are needed, so many at once: most submissions have few passes, and
+// the validation layer keeps account of every one.
+constexpr std::uint32_t reset_at_once = 128;
+static_assert(2 * most_passes % reset_at_once == 0);
+
 }  // namespace
 
 PassClock::PassClock(const vk::raii::PhysicalDevice& physical, const vk::raii::Device& device,
@@ -23,12 +28,11 @@ PassClock::PassClock(const vk::raii::PhysicalDevice& physical, const vk::raii::D
         {vk::raii::QueryPool(device, {{}, vk::QueryType::eTimestamp, 2 * most_passes}), {}});
 }
 
-void PassClock::begin(const vk::raii::CommandBuffer& commands, std::uint64_t submission) {
+void PassClock::begin(std::uint64_t submission) {
   if (!is_on()) return;
   recorded_ = submission % under_way_.size();
   under_way_[recorded_].passes.clear();
   is_open_ = false;
-  commands.resetQueryPool(*under_way_[recorded_].pool, 0, 2 * most_passes);
 }
 
 void PassClock::start(const vk::raii::CommandBuffer& commands, const std::string& pass) {
@@ -38,10 +42,11 @@ void PassClock::start(const vk::raii::CommandBuffer& commands, const std::string
     ++sums_.untimed;
     return;
   }
+  const auto query = static_cast<std::uint32_t>(2 * passes.size());
+  if (query % reset_at_once == 0) commands.resetQueryPool(*pool, query, reset_at_once);
   const auto [place, is_new] = places_.try_emplace(pass, sums_.passes.size());
   if (is_new) sums_.passes.push_back({pass, 0, 0});
-  commands.writeTimestamp2(vk::PipelineStageFlagBits2::eAllCommands, *pool,
-                           static_cast<std::uint32_t>(2 * passes.size()));
+  commands.writeTimestamp2(vk::PipelineStageFlagBits2::eAllCommands, *pool, query);
   passes.push_back(place->second);
   is_open_ = true;
 }

@@ -24,7 +24,7 @@ class PassClock {
 
   // begin() comes first in the recording of a submission, which has this number; start() and stop()
   // are for the last one that was begun.
-  void begin(const vk::raii::CommandBuffer& commands, std::uint64_t submission);
+  void begin(std::uint64_t submission);
   void start(const vk::raii::CommandBuffer& commands, const std::string& pass);
   void stop(const vk::raii::CommandBuffer& commands);
   // Adds a submission that is done. Returns how long its passes took.

@@ -59,7 +59,7 @@ const vk::raii::CommandBuffer& Submissions::recording() {
   named(options_.name, [&] {
     slot.commands.reset();
     slot.commands.begin({vk::CommandBufferUsageFlagBits::eOneTimeSubmit});
-    clock_.begin(slot.commands, next_);
+    clock_.begin(next_);
   });
   slot.work = 0;
   is_recording_ = true;
