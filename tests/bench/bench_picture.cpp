@@ -51,7 +51,8 @@ void run() {
   Plate picture;
   Step steps[] = {
       {"begin", [&] { renderer.begin(frame); }},
-      {"one sample", [&] {
+      {"one sample",
+       [&] {
          renderer.render(1);
          renderer.wait();
        }},
