@@ -1,4 +1,4 @@
-// What `previzd bench` measures, and how it says it: as a table for a terminal and as JSON.
+// Holds what `previzd bench` measures, and writes it as a table for a terminal and as JSON.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,7 @@ struct FrameFigures {
   // From one picture to the next where frames follow at once: the next one is begun before the
   // picture of the last one is there.
   double interval_ms = 0;
-  // Of the device, by its own clock, the longest first; empty: it has none.
+  // Passes of the device, timed by its own clock, the longest first; empty: it has none.
   std::vector<render::DeviceTimes::Pass> passes;
   std::uint64_t rays = 0, shadow_rays = 0;  // a frame
   render::DeviceWork work;                  // a frame's, rounded up

@@ -10,8 +10,8 @@
 
 namespace previz::bench {
 
-// What is measured: a virtual glass ball among many real spheres under a sky, seen by a camera that
-// moves a little from frame to frame.
+// Describes what is measured: a virtual glass ball among many real spheres under a sky, seen by a
+// camera that moves a little from frame to frame.
 struct FrameWish {
   int width = 1280, height = 720, samples = 1;
   std::size_t triangles = 5'000;  // about so many

@@ -49,7 +49,7 @@ struct DeviceTimes {
   std::uint64_t untimed = 0;  // passes, of submissions with too many of them
 };
 
-// What a device is.
+// Names a device and says what it has.
 struct DeviceFacts {
   std::string name, driver;  // "NVIDIA H100", "NVIDIA 580.159.04"
   bool is_gpu = false;
@@ -57,7 +57,7 @@ struct DeviceFacts {
   bool shares_host_memory = false;  // nothing is copied to it
 };
 
-// What a device was given to do since it was opened.
+// Counts what a device was given to do since it was opened.
 struct DeviceWork {
   std::uint64_t submissions = 0;
   std::uint64_t waits = 0;        // of the computer, for the device

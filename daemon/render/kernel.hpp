@@ -73,7 +73,7 @@ class Kernel {
     vk::raii::DescriptorSet set{nullptr};
     std::uint64_t submission = 0;  // the last one that uses it
   };
-  // What the device works with.
+  // Kept until the device is done with it.
   struct State {
     std::shared_ptr<const Program> program;
     std::vector<BoundSet> sets;  // for the buffers of the last dispatches

@@ -515,7 +515,7 @@ Plate Renderer::show_among(const std::vector<KeptFramePtr>& frames, bool denoise
   return picture;
 }
 
-// What is counted by the computer.
+// Returns what the computer counts; the device counts the rest.
 Counters Renderer::Impl::host_counters() const {
   Counters counters;
   counters.rebuilt_trees = scene.rebuilt_trees() - trees_before;

@@ -155,8 +155,8 @@ class Renderer {
   // Returns what was counted since begin(). Waits for the samples, so that it costs least after
   // show().
   Counters counters() const;
-  // What the device was given to do since it was opened, and how long its passes took since the
-  // last call (take_times()); it may do work of other renderers, too.
+  // Return what the device was given to do since it was opened, and how long its passes took since
+  // the last call. Work of other renderers on the same device counts, too.
   DeviceWork work() const;
   DeviceTimes take_times();
 

@@ -256,7 +256,7 @@ void LiveRender::start(const Look& look, Shot shot) {
     channels_.recorded_variants.set(shot.scene.variants);
   if (look.of_take)
     recorded = std::exchange(shot.scene, pipeline::with_edits(shot.scene, set_, look.take_edits));
-  try {
+  counting_failure(look.of_take, [&] {
     publish_found(shot.light);
     stage_->use(quality);
     stage_->use(look.estimator);
@@ -272,16 +272,11 @@ void LiveRender::start(const Look& look, Shot shot) {
                           .samples = governor_ ? governor_->samples() : 0,
                           .step = governor_ ? governor_->step() : set::PreviewStep{},
                           .begin = begin});
-  } catch (const render::DeviceLost&) {
-    count_failed(look.of_take, "device lost");
-    throw;
-  } catch (...) {
-    count_failed(look.of_take, "failed");
-    throw;
-  }
+  });
 }
 
-// What the computer and the device had to do with one another: each is time that no pass explains.
+// Counts the hand-overs, waits and copies between the computer and the device, which take time that
+// no pass explains.
 void LiveRender::count_work() {
   const render::DeviceWork work = stage_->renderer()->work();
   const render::DeviceWork before = std::exchange(counted_, work);
@@ -298,20 +293,25 @@ void LiveRender::count_failed(bool of_take, const char* cause) {
   if (!of_take) metrics_.dropped("render", cause);
 }
 
+// Does the work for a frame; if that fails, counts the frame and passes the exception on.
+void LiveRender::counting_failure(bool of_take, const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const render::DeviceLost&) {
+    count_failed(of_take, "device lost");
+    throw;
+  } catch (...) {
+    count_failed(of_take, "failed");
+    throw;
+  }
+}
+
 // Returns the picture that has been under way for longest, once it is there.
 Shot LiveRender::complete() {
   UnderWay under_way = std::move(under_way_.front());
   under_way_.pop_front();
   Shot shot;
-  try {
-    shot = stage_->finish(std::move(under_way.picture));
-  } catch (const render::DeviceLost&) {
-    count_failed(under_way.of_take, "device lost");
-    throw;
-  } catch (...) {
-    count_failed(under_way.of_take, "failed");
-    throw;
-  }
+  counting_failure(under_way.of_take, [&] { shot = stage_->finish(std::move(under_way.picture)); });
   // Where pictures overlap, each takes as long as it is there after the one before.
   const double took = seconds_since(std::max(under_way.begin, completed_));
   completed_ = Clock::now();

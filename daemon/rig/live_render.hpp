@@ -93,6 +93,7 @@ class LiveRender {
   bool wants_snapshot(const Look& look) const;
   void count_work();
   void count_failed(bool of_take, const char* cause);
+  void counting_failure(bool of_take, const std::function<void()>& work);
   void keep_as_good(const pipeline::Shot& shot, std::optional<session::SceneState> recorded);
   std::optional<pipeline::Shot>& good_of(const Look& look);
   // Puts what the governor has chosen into the quality, as far as the rate is held, and returns the

@@ -32,8 +32,8 @@ PlatePtr grey(int width, int height) {
       Plate{width, height, 8, std::vector<std::uint16_t>(std::size_t{3} * width * height, 100)});
 }
 
-// Of all measured frames, on the computer's clock: placing the frame, recording its samples, and
-// having its picture, which waits for the device.
+// Sums over all measured frames, on the computer's clock: placing the frame, recording its samples,
+// and having its picture, which waits for the device.
 struct Spent {
   double begin_ms = 0, render_ms = 0, show_ms = 0, cpu_ms = 0;
 };

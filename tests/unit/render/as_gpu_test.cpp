@@ -29,16 +29,21 @@ struct Pictures {
   render::Layers offline;
 };
 
+// Begins a live frame that is averaged with those before it, and gives it its samples.
+void render_live(render::Renderer& renderer, const PlatePtr& plate, int frame) {
+  renderer.begin({.plate = plate,
+                  .exposure = 0.5,
+                  .world_from_camera = look_at({0.004 * frame, -0.8, 1}, {0, 0, 0.05}),
+                  .accumulates = true});
+  renderer.render(2);
+}
+
 // Renders live frames that are averaged and denoised, through a camera that moves a little.
 std::vector<Plate> live_frames(render::Renderer& renderer, int count) {
   std::vector<Plate> shown;
   const auto plate = std::make_shared<const Plate>(random_plate(width, height, 8));
   for (int frame = 0; frame < count; ++frame) {
-    renderer.begin({.plate = plate,
-                    .exposure = 0.5,
-                    .world_from_camera = look_at({0.004 * frame, -0.8, 1}, {0, 0, 0.05}),
-                    .accumulates = true});
-    renderer.render(2);
+    render_live(renderer, plate, frame);
     expect_clean(renderer.counters());
     shown.push_back(renderer.show(true));
   }
@@ -58,11 +63,7 @@ std::vector<Plate> overlapping_frames(render::Renderer& renderer, int count) {
     shown.push_back(*there.picture);
   };
   for (int frame = 0; frame < count; ++frame) {
-    renderer.begin({.plate = plate,
-                    .exposure = 0.5,
-                    .world_from_camera = look_at({0.004 * frame, -0.8, 1}, {0, 0, 0.05}),
-                    .accumulates = true});
-    renderer.render(2);
+    render_live(renderer, plate, frame);
     render::Showing showing = renderer.show_later(true);
     finish();
     last = std::move(showing);

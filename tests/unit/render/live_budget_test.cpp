@@ -1,5 +1,5 @@
-// What a live frame costs a graphics card beside its passes: how often work is handed over and
-// waited for, what is allocated, and what is copied. A CPU device stands in for the card.
+// A live frame's cost on a graphics card beside its passes is bounded: how often work is handed
+// over and waited for, what is allocated, and what is copied. A CPU device stands in for the card.
 #include "daemon/render/device.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 

@@ -1,5 +1,5 @@
-// What the driver has compiled is kept in a file, and a file that is of no use costs nothing but
-// the time to compile.
+// Whatever the driver has compiled is kept in a file, and a file that is of no use costs nothing
+// but the time to compile.
 #include "daemon/render/device.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/environment_variable.hpp"

@@ -1,16 +1,12 @@
 // tests/COVERAGE.md names only what there is: cases of the test programs, and files of the tests.
-#include "tests/support/test.hpp"
+#include "tests/unit/structure/source_text.hpp"
 
 namespace previz::coverage_test {
 
 namespace fs = std::filesystem;
 
-const fs::path source = PREVIZ_SOURCE_DIR;
-
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
+using test::source;
+using test::text_of;
 
 // All that a regular expression finds in a text.
 std::vector<std::smatch> matches(const std::string& text, const std::regex& expression) {

@@ -1,17 +1,13 @@
 // Every case that needs data from outside the repository has its row in tests/skips.txt. Where that
 // data is at hand the gate skips none of them, and would not notice that a row is missing.
-#include "tests/support/test.hpp"
+#include "tests/unit/structure/source_text.hpp"
 
 namespace previz::skips_test {
 
 namespace fs = std::filesystem;
 
-const fs::path source = PREVIZ_SOURCE_DIR;
-
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
+using test::source;
+using test::text_of;
 
 // The suites of a file in which a case, or the fixture of all its cases, asks for such data.
 std::set<std::string> suites_that_need_data(const std::string& text) {
