@@ -96,25 +96,36 @@ VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
   return result;
 }
 
-// What is below a queue or device; `may_lose`: unless it is lost by now.
-Below below_of(const void* handle, bool may_lose) {
+// What is below an instance, a device or what belongs to it.
+Below below_of(const void* handle) {
+  const std::lock_guard lock(mutex);
+  return known.at(key_of(handle));
+}
+
+// The same of a device or its queue, which is lost now if the file is there. A lost device does no
+// more work, so that what it works with may be destroyed: the driver, which knows of no loss, ends
+// it before.
+Below below_unless_lost(const void* handle) {
+  const char* order = std::getenv("PREVIZ_LOSE_DEVICE");
+  const bool is_lost_now = order != nullptr && unlink(order) == 0;
   const std::lock_guard lock(mutex);
   Below& link = known.at(key_of(handle));
-  const char* order = std::getenv("PREVIZ_LOSE_DEVICE");
-  if (may_lose && order != nullptr && unlink(order) == 0) link.is_lost = true;
+  if (!is_lost_now) return link;
+  link.is_lost = true;
+  below<PFN_vkDeviceWaitIdle>(link, "vkDeviceWaitIdle")(link.device);
   return link;
 }
 
 VKAPI_ATTR VkResult VKAPI_CALL queue_submit(VkQueue queue, std::uint32_t count,
                                             const VkSubmitInfo* submits, VkFence fence) {
-  const Below link = below_of(queue, true);
+  const Below link = below_unless_lost(queue);
   if (link.is_lost) return VK_ERROR_DEVICE_LOST;
   return below<PFN_vkQueueSubmit>(link, "vkQueueSubmit")(queue, count, submits, fence);
 }
 
 VKAPI_ATTR VkResult VKAPI_CALL wait_semaphores(VkDevice device, const VkSemaphoreWaitInfo* info,
                                                std::uint64_t timeout) {
-  const Below link = below_of(device, true);
+  const Below link = below_unless_lost(device);
   if (link.is_lost) return VK_ERROR_DEVICE_LOST;
   return below<PFN_vkWaitSemaphores>(link, "vkWaitSemaphores")(device, info, timeout);
 }
@@ -128,13 +139,13 @@ void disguise(VkPhysicalDeviceProperties& properties) {
 
 VKAPI_ATTR void VKAPI_CALL device_properties(VkPhysicalDevice physical,
                                              VkPhysicalDeviceProperties* properties) {
-  below_of(physical, false).properties(physical, properties);
+  below_of(physical).properties(physical, properties);
   disguise(*properties);
 }
 
 VKAPI_ATTR void VKAPI_CALL device_properties2(VkPhysicalDevice physical,
                                               VkPhysicalDeviceProperties2* properties) {
-  below_of(physical, false).properties2(physical, properties);
+  below_of(physical).properties2(physical, properties);
   disguise(properties->properties);
 }
 
@@ -142,13 +153,13 @@ PFN_vkVoidFunction own(const char* name);
 
 VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL device_address(VkDevice device, const char* name) {
   if (const PFN_vkVoidFunction mine = own(name)) return mine;
-  return below_of(device, false).device_address(device, name);
+  return below_of(device).device_address(device, name);
 }
 
 VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL instance_address(VkInstance instance, const char* name) {
   if (const PFN_vkVoidFunction mine = own(name)) return mine;
   if (instance == VK_NULL_HANDLE) return nullptr;
-  return below_of(instance, false).instance_address(instance, name);
+  return below_of(instance).instance_address(instance, name);
 }
 
 PFN_vkVoidFunction own(const char* name) {
