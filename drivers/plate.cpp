@@ -35,7 +35,7 @@ std::vector<std::uint16_t> yuv422_to_rgb(const Frame& frame) {
   const std::uint8_t* luma = frame.bytes.data();
   const std::uint8_t* cb = luma + width * height;
   const std::uint8_t* cr = cb + chroma_width * height;
-  static const convert::YuvToRgb to_rgb(convert::YuvMatrix::bt709, convert::YuvRange::limited);
+  const convert::YuvToRgb& to_rgb = yuv_of_plates();
   std::vector<std::uint8_t> rgb(3 * width * height);
   for (std::size_t y = 0; y < height; ++y) {
     for (std::size_t x = 0; x < width; ++x) {
@@ -48,6 +48,17 @@ std::vector<std::uint16_t> yuv422_to_rgb(const Frame& frame) {
   return widen(rgb);
 }
 
+std::vector<std::uint8_t> colours_of(const Frame& frame) {
+  return convert::demosaic(frame.bayer, frame.format == PixelFormat::gray16, frame.width,
+                           frame.height, frame.bytes);
+}
+
+}  // namespace
+
+int plate_bits(PixelFormat format) {
+  return format == PixelFormat::rgb16 || format == PixelFormat::gray16 ? 16 : 8;
+}
+
 void check_size(const Frame& frame) {
   if (frame.bytes.size() != frame_bytes(frame.format, frame.width, frame.height))
     throw Error("frame " + std::to_string(frame.sequence) + " of " + frame.source + " holds " +
@@ -56,12 +67,10 @@ void check_size(const Frame& frame) {
                 std::to_string(frame_bytes(frame.format, frame.width, frame.height)));
 }
 
-std::vector<std::uint8_t> colours_of(const Frame& frame) {
-  return convert::demosaic(frame.bayer, frame.format == PixelFormat::gray16, frame.width,
-                           frame.height, frame.bytes);
+const convert::YuvToRgb& yuv_of_plates() {
+  static const convert::YuvToRgb to_rgb(convert::YuvMatrix::bt709, convert::YuvRange::limited);
+  return to_rgb;
 }
-
-}  // namespace
 
 FramePtr demosaiced(const FramePtr& frame) {
   if (frame->bayer == BayerPattern::none) return frame;
@@ -75,7 +84,7 @@ FramePtr demosaiced(const FramePtr& frame) {
 
 Plate to_plate(const Frame& frame) {
   check_size(frame);
-  Plate plate{frame.width, frame.height, 8, {}};
+  Plate plate{frame.width, frame.height, plate_bits(frame.format), {}};
   switch (frame.format) {
     case PixelFormat::rgb8:
       plate.samples = widen(frame.bytes);
@@ -88,11 +97,9 @@ Plate to_plate(const Frame& frame) {
       plate.samples = yuv422_to_rgb(frame);
       break;
     case PixelFormat::rgb16:
-      plate.bits = 16;
       plate.samples = samples_of_16_bit(frame.bytes);
       break;
     case PixelFormat::gray16:
-      plate.bits = 16;
       plate.samples = frame.bayer == BayerPattern::none
                           ? repeat_three_times(samples_of_16_bit(frame.bytes))
                           : samples_of_16_bit(colours_of(frame));

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "drivers/convert/yuv.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz {
@@ -24,10 +25,18 @@ struct Plate {
 
 using PlatePtr = std::shared_ptr<const Plate>;
 
+// Returns the significant bits of a sample, 8 or 16, in the plate of such a frame.
+int plate_bits(PixelFormat format);
+
+// Throws previz::Error if `bytes` has not the length of its format and size.
+void check_size(const Frame& frame);
+
 // Converts a frame to its RGB plate. Bayer is demosaiced(), other gray repeats the sample; yuv422p8
 // is BT.709 limited range (ITU-R BT.709-6), chroma sited on the even columns and linear between
-// them, rounded to nearest, clipped to 0..255. Throws previz::Error if `bytes` has not the length
-// of its format and size.
+// them, rounded to nearest, clipped to 0..255. Throws as check_size().
 Plate to_plate(const Frame& frame);
+
+// Returns what converts yuv422p8.
+const convert::YuvToRgb& yuv_of_plates();
 
 }  // namespace previz

@@ -151,15 +151,13 @@ bool RenderStage::begin(Shot& shot) {
 
 bool RenderStage::begin(Shot& shot, bool is_live) {
   shot.whole = false;
-  PlatePtr plate = plate_of(shot);
-  if (!response_ || response_->bits() != plate->bits)
-    response_.emplace(calibration_.response, plate->bits);
+  const int bits = plate_bits(shot.frame->format);
+  if (!response_ || response_->bits() != bits) response_.emplace(calibration_.response, bits);
   if (options_.passes_other_sizes)
-    if (std::optional<std::string> why = why_other_size(*plate))
-      return pass_through(shot, std::move(plate), *std::move(why)), false;
-  plate = sized(std::move(plate));
+    if (std::optional<std::string> why = why_other_size(*shot.frame))
+      return pass_through(shot, plate_of(shot), *std::move(why)), false;
   const auto untouched = [&](std::string reason) {
-    pass_through(shot, std::move(plate), std::move(reason));
+    pass_through(shot, sized(shot), std::move(reason));
     return false;
   };
   const glm::dmat4* const camera = world_from_camera(shot);
@@ -171,7 +169,8 @@ bool RenderStage::begin(Shot& shot, bool is_live) {
   stands_elsewhere_ = false;
   // A shot with layers can be compared with what is rendered from a take, so it stands alone.
   const bool is_shown_live = is_live && !options_.layers;
-  renderer_->begin({.plate = std::move(plate),
+  const bool is_whole = options_.scale == 1;  // the device then makes the plate
+  renderer_->begin({.plate = is_whole ? nullptr : sized(shot),
                     .exposure = exposure_of(shot),
                     .world_from_camera = *camera,
                     .seed = options_.seeds_shots
@@ -179,7 +178,8 @@ bool RenderStage::begin(Shot& shot, bool is_live) {
                                 : std::nullopt,
                     .accumulates = is_shown_live && set_.quality.accumulate,
                     .stands_aside = is_live && set_.quality.accumulate,
-                    .dithers = is_shown_live});
+                    .dithers = is_shown_live,
+                    .camera = is_whole ? shot.frame : nullptr});
   return true;
 }
 
@@ -252,18 +252,19 @@ void RenderStage::place(const session::SceneState& state) {
   is_measured_anew_ = false;
 }
 
-std::optional<std::string> RenderStage::why_other_size(const Plate& plate) const {
+std::optional<std::string> RenderStage::why_other_size(const Frame& frame) const {
   const PinholeIntrinsics& lens = calibration_.intrinsics;
-  if (plate.width == lens.width && plate.height == lens.height) return std::nullopt;
-  return "observer: a frame of " + std::to_string(plate.width) + "x" +
-         std::to_string(plate.height) + " does not fit the calibration's " +
+  if (frame.width == lens.width && frame.height == lens.height) return std::nullopt;
+  return "observer: a frame of " + std::to_string(frame.width) + "x" +
+         std::to_string(frame.height) + " does not fit the calibration's " +
          std::to_string(lens.width) + "x" + std::to_string(lens.height);
 }
 
-PlatePtr RenderStage::sized(PlatePtr plate) const {
-  if (options_.scale == 1) return plate;
-  if (const std::optional<std::string> why = why_other_size(*plate)) throw Error(*why);
-  return std::make_shared<const Plate>(scaled(*plate, options_.scale, *response_));
+// Returns the shot's plate at the size that shots get.
+PlatePtr RenderStage::sized(Shot& shot) const {
+  if (options_.scale == 1) return plate_of(shot);
+  if (const std::optional<std::string> why = why_other_size(*shot.frame)) throw Error(*why);
+  return std::make_shared<const Plate>(scaled(*plate_of(shot), options_.scale, *response_));
 }
 
 void RenderStage::pass_through(Shot& shot, PlatePtr plate, std::string reason) const {

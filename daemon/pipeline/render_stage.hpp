@@ -113,8 +113,8 @@ class RenderStage {
   double exposure_of(const Shot& shot) const;
   void light(const Shot& shot);
   void place(const session::SceneState& state);
-  std::optional<std::string> why_other_size(const Plate& plate) const;
-  PlatePtr sized(PlatePtr plate) const;
+  std::optional<std::string> why_other_size(const Frame& frame) const;
+  PlatePtr sized(Shot& shot) const;
   void pass_through(Shot& shot, PlatePtr plate, std::string reason) const;
 
   set::Set set_;

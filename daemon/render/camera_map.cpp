@@ -1,6 +1,7 @@
 #include "daemon/render/camera_map.hpp"
 
 #include "shaders/camera_depth.spv.h"
+#include "shaders/camera_measured.spv.h"
 #include "shaders/camera_usable.spv.h"
 
 namespace previz::render {
@@ -14,22 +15,28 @@ void CameraMap::resize(std::uint32_t pixels) {
 }
 
 void CameraMap::create_kernels(std::uint32_t features) {
+  measured_ = Kernel(device_, "camera_measured", camera_measured_spv);
   depth_ = Kernel(device_, "camera_depth", camera_depth_spv, {features});
   usable_ = Kernel(device_, "camera_usable", camera_usable_spv, {features});
 }
 
 void CameraMap::add_to(Buffers& buffers) const {
-  buffers.insert({{"seen_radiance", &plate_}, {"plate", &plate_}, {"seen", &seen_}});
+  buffers.insert({{"seen_radiance", &plate_},
+                  {"plate", &plate_},
+                  {"seen", &seen_},
+                  {"radiance_of", &radiance_of_}});
 }
 
-void CameraMap::upload(const std::vector<glm::vec4>& plate) {
-  resize(static_cast<std::uint32_t>(plate.size()));
-  upload_bytes(device_, plate_, std::as_bytes(std::span(plate)));
+void CameraMap::use(std::uint32_t pixels, const std::vector<float>& radiance_of_codes) {
+  resize(pixels);
+  if (radiance_ == radiance_of_codes) return;
+  upload_storage(device_, radiance_of_, radiance_of_codes);
+  radiance_ = radiance_of_codes;
 }
 
 void CameraMap::record(const vk::raii::CommandBuffer& commands,
                        const std::vector<gpu::GpuBatch>& parts, const Buffers& buffers) {
-  for (Kernel* pass : {&depth_, &usable_})
+  for (Kernel* pass : {&measured_, &depth_, &usable_})
     for (const gpu::GpuBatch& part : parts)
       pass->dispatch({commands, part, buffers}, part.width * part.height);
 }

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <glm/vec4.hpp>
 #include <vector>
 
 #include "daemon/render/kernel.hpp"
@@ -20,11 +19,10 @@ class CameraMap {
   void create_kernels(std::uint32_t features);
   // Adds the map's buffers, for the passes that read the map and for record().
   void add_to(Buffers& buffers) const;
-  // Takes the plate: row-major, linear radiance; w is 1 where a pixel may be used, 0 where it is
-  // clipped.
-  void upload(const std::vector<glm::vec4>& plate);
-  // Makes the map from the plate that was uploaded. `parts` are whole rows that together make up
-  // the picture; `buffers` hold the scene and the map.
+  // Makes room for a picture of so many pixels, of which each code stands for this radiance.
+  void use(std::uint32_t pixels, const std::vector<float>& radiance_of_codes);
+  // Makes the map. `parts` are whole rows that together make up the picture; `buffers` hold the
+  // scene with the plate, and the map.
   void record(const vk::raii::CommandBuffer& commands, const std::vector<gpu::GpuBatch>& parts,
               const Buffers& buffers);
 
@@ -32,9 +30,10 @@ class CameraMap {
   void resize(std::uint32_t pixels);
 
   Device& device_;
-  Kernel depth_, usable_;
+  Kernel measured_, depth_, usable_;
   std::uint32_t pixels_ = 0;
-  Buffer plate_, seen_;
+  std::vector<float> radiance_;  // as in radiance_of_
+  Buffer radiance_of_, plate_, seen_;
 };
 
 }  // namespace previz::render

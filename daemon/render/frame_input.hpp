@@ -5,12 +5,13 @@
 #include <glm/mat4x4.hpp>
 #include <optional>
 
+#include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
 
 namespace previz::render {
 
 struct FrameInput {
-  PlatePtr plate;                          // samples as captured; null: composite over black
+  PlatePtr plate = {};                     // samples as captured; or `camera`
   double exposure = 1.0;                   // absolute, of this frame
   glm::dmat4 world_from_camera{1.0};       // OpenCV camera axes
   std::optional<std::uint32_t> seed = {};  // absent: the set's, the same in every frame (P8)
@@ -22,6 +23,9 @@ struct FrameInput {
   // show() dithers the codes where the worlds differ, by a pattern that stands still, so that the
   // mean over a few pixels is right to a fraction of a code.
   bool dithers = false;
+  // The frame as the camera gave it, in place of `plate`, which the device then makes of it. If
+  // both are null, the composite is over black.
+  FramePtr camera = {};
 };
 
 }  // namespace previz::render

@@ -25,6 +25,9 @@ constexpr std::uint64_t sum_bytes = sizeof(gpu::GpuPixel) + 4 * sizeof(float);
 // A pixel of the plate and of the shown picture is three samples.
 constexpr std::uint64_t plate_bytes = 3 * sizeof(std::uint16_t);
 
+// And so many bytes does the camera give a pixel, where they are not the plate's codes.
+constexpr std::uint64_t camera_bytes = 3;
+
 // A pixel of a band takes twelve arrays of four floats and one of four halves in the denoiser,
 // two of them for the light of photons (denoiser.hpp), one of four floats in the presenter
 // (presenter.hpp), a word of flags, and its part of the shown picture.
@@ -53,7 +56,7 @@ std::string gigabytes(std::uint64_t bytes) {
 
 std::uint64_t picture_bytes(int width, int height, bool read_back) {
   const std::uint64_t pixels = pixels_of(width, height);
-  const std::uint64_t device = pixels * (sum_bytes + plate_bytes) +
+  const std::uint64_t device = pixels * (sum_bytes + plate_bytes + camera_bytes) +
                                rays_of(width, height) * sizeof(glm::vec2) +
                                std::min<std::uint64_t>(pixels, most_band_pixels) * band_bytes;
   return read_back ? device + pixels * layer_bytes : device;

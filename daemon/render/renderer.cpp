@@ -10,6 +10,7 @@
 #include "daemon/render/composite.hpp"
 #include "daemon/render/corner_rays.hpp"
 #include "daemon/render/denoiser.hpp"
+#include "daemon/render/device_plate.hpp"
 #include "daemon/render/feature.hpp"
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/history.hpp"
@@ -23,19 +24,6 @@
 
 namespace previz::render {
 namespace {
-
-// Every frame is looked at as a whole unless it clips: in a form that compilers make wide
-// instructions of.
-bool is_any_at_least(std::span<const std::uint16_t> codes, std::uint32_t least) {
-  constexpr std::size_t at_once = 4096;
-  for (std::size_t first = 0; first < codes.size(); first += at_once) {
-    unsigned found = 0;
-    for (const std::uint16_t code : codes.subspan(first, std::min(at_once, codes.size() - first)))
-      found |= code >= least ? 1u : 0u;
-    if (found != 0) return true;
-  }
-  return false;
-}
 
 // Adds what a frame counted on the device.
 Counters with(Counters counters, const gpu::GpuControl& control) {
@@ -53,6 +41,18 @@ Counters with(Counters counters, const gpu::GpuControl& control) {
   return counters;
 }
 
+struct PlateSize {
+  int width = 0, height = 0, bits = 8;  // without a plate: no pixel
+};
+
+PlateSize size_of(const FrameInput& input) {
+  if (input.camera)
+    return {input.camera->width, input.camera->height, plate_bits(input.camera->format)};
+  if (input.plate && !input.plate->samples.empty())
+    return {input.plate->width, input.plate->height, input.plate->bits};
+  return {};
+}
+
 void check_size(const Device& device, const PinholeIntrinsics& picture) {
   refuse_too_large(picture.width, picture.height, memory_of(device));
 }
@@ -65,7 +65,8 @@ struct Renderer::Impl {
       : device(std::move(the_device)),
         estimation(the_estimation),
         calibration(the_calibration),
-        scene(*device) {
+        scene(*device),
+        plate(*device) {
     make_wavefront();
   }
 
@@ -79,8 +80,12 @@ struct Renderer::Impl {
     return {estimation.composite, estimation.composite_floor / frame.exposure};
   }
   std::int64_t sampled() const { return std::max<std::int64_t>(samples, 1); }
-  // Returns the plate as linear radiance; w is 0 where a channel is clipped.
-  std::vector<glm::vec4> measured() const;
+  std::vector<float> radiance_of_codes() const;
+  bool has_plate() const { return frame.camera || (frame.plate && !frame.plate->samples.empty()); }
+  const Plate& codes();
+  PlateRadiance plate_radiance() {
+    return render::plate_radiance(codes(), *response, frame.exposure);
+  }
   void upload_plate();
   void take(FrameInput input);
   void place();
@@ -107,7 +112,7 @@ struct Renderer::Impl {
   Buffers scene_buffers;               // of the current frame
   std::uint32_t features = 0;          // of the current frame
   Buffer rays, frame_buffer;
-  Buffer plate;               // the camera's codes (shaders/lib/plate.glsl)
+  DevicePlate plate;
   bool is_clipped = false;    // some code of the plate may mean "at least so much light"
   std::uint32_t carried = 0;  // FEATURE_* bits
   bool has_scene = false, has_environment = false;
@@ -175,31 +180,35 @@ std::uint32_t Renderer::Impl::photons() const {
 std::uint32_t Renderer::Impl::needed() const {
   Demand demand = scene.demand(estimation);
   demand.has_aperture = calibration.lens.has_value();
-  demand.has_plate = frame.plate && !frame.plate->samples.empty();
+  demand.has_plate = has_plate();
   return needed_bits(demand);
 }
 
-std::vector<glm::vec4> Renderer::Impl::measured() const {
-  const std::vector<double>& radiance = response->inverse();
-  const std::uint32_t clipped_from = response->clipping().from;
-  std::vector<glm::vec4> result;
-  result.reserve(frame.plate->samples.size() / 3);
-  for (std::size_t i = 0; i < frame.plate->samples.size(); i += 3) {
-    const std::uint16_t* rgb = &frame.plate->samples[i];
-    const bool clipped = std::max({rgb[0], rgb[1], rgb[2]}) >= clipped_from;
-    const glm::dvec3 signal(radiance[rgb[0]], radiance[rgb[1]], radiance[rgb[2]]);
-    result.emplace_back(glm::vec3(signal / frame.exposure), clipped ? 0.0f : 1.0f);
-  }
+// Returns the linear radiance that each code of the plate stands for.
+std::vector<float> Renderer::Impl::radiance_of_codes() const {
+  std::vector<float> result;
+  result.reserve(response->inverse().size());
+  for (const double signal : response->inverse())
+    result.push_back(static_cast<float>(signal / frame.exposure));
   return result;
 }
 
 void Renderer::Impl::upload_plate() {
-  const std::vector<std::uint16_t>& codes = frame.plate->samples;
-  is_clipped = is_any_at_least(codes, response->clipping().from);
-  const std::size_t words = std::max<std::size_t>((codes.size() + 1) / 2, 1);
-  if (plate.size < words * sizeof(std::uint32_t))
-    plate = create_storage_buffer(*device, words * sizeof(std::uint32_t));
-  if (!codes.empty()) upload_bytes(*device, plate, std::as_bytes(std::span(codes)));
+  const std::uint32_t clipped = response->clipping().from;
+  if (frame.camera) {
+    is_clipped = has_at_least(*frame.camera, clipped);
+    plate.take(*frame.camera);
+  } else {
+    is_clipped = has_at_least(*frame.plate, clipped);
+    plate.take(*frame.plate);
+  }
+}
+
+// Returns the plate in the computer's memory.
+const Plate& Renderer::Impl::codes() {
+  if (!frame.plate)
+    frame.plate = std::make_shared<const Plate>(frame.camera ? to_plate(*frame.camera) : Plate());
+  return *frame.plate;
 }
 
 void Renderer::Impl::begin_accumulating() {
@@ -310,12 +319,12 @@ std::uint32_t Renderer::needed() const {
 // Makes this the current frame. Throws if its plate does not fit the calibration.
 void Renderer::Impl::take(FrameInput input) {
   const PinholeIntrinsics& lens = calibration.intrinsics;
-  if (!input.plate) input.plate = std::make_shared<const Plate>();
-  const Plate& taken = *input.plate;
-  if (!taken.samples.empty() && (taken.width != lens.width || taken.height != lens.height))
+  const PlateSize taken = size_of(input);
+  if (taken.width > 0 && (taken.width != lens.width || taken.height != lens.height))
     throw Error("observer: a frame of " + std::to_string(taken.width) + "x" +
                 std::to_string(taken.height) + " does not fit the calibration's " +
                 std::to_string(lens.width) + "x" + std::to_string(lens.height));
+  if (!input.camera && !input.plate) input.plate = std::make_shared<const Plate>();
   frame = std::move(input);
   if (!response || response->bits() != taken.bits) {
     response.emplace(calibration.response, taken.bits);
@@ -331,7 +340,7 @@ void Renderer::Impl::place() {
   scene_buffers = scene.buffers();
   scene_buffers["corner_rays"] = &rays;
   scene_buffers["frame"] = &frame_buffer;
-  scene_buffers["plate_samples"] = &plate;
+  scene_buffers["plate_samples"] = &plate.codes();
 }
 
 void Renderer::begin(FrameInput frame) {
@@ -349,7 +358,7 @@ void Renderer::begin(FrameInput frame) {
     r.wavefront->use_photons(r.photons(),
                              r.estimation.photon_radius_px / r.calibration.intrinsics.fx);
   r.wavefront->use_scene(r.scene_buffers, features);
-  if ((features & gpu::FEATURE_CAMERA) != 0) r.wavefront->use_camera(r.measured());
+  if ((features & gpu::FEATURE_CAMERA) != 0) r.wavefront->use_camera(r.radiance_of_codes());
   r.wavefront->clear();
 }
 
@@ -402,9 +411,9 @@ void Renderer::separate_parts() {
 }
 
 Layers Renderer::layers() const {
-  const Impl& r = *impl_;
+  Impl& r = *impl_;
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
-  const PlateRadiance plate = plate_radiance(*r.frame.plate, *r.response, r.frame.exposure);
+  const PlateRadiance plate = r.plate_radiance();
   Layers layers = make_layers(lens.width, lens.height, r.sampled());
   layers.white = 1 / r.frame.exposure;
   for (const Wavefront::Sums& tile : r.wavefront->sums()) {
@@ -421,9 +430,8 @@ ToPresent Renderer::Impl::to_present(bool denoise) {
   if (!denoiser) denoiser.emplace(*device);
   if (!presenter) presenter.emplace(*device, *response);
   const PinholeIntrinsics& lens = calibration.intrinsics;
-  return {wavefront->sums(), lens.width,     lens.height, plate,     !frame.plate->samples.empty(),
-          is_clipped,        frame.exposure, rule(),      sampled(), denoise,
-          frame.dithers};
+  return {wavefront->sums(), lens.width, lens.height, plate.codes(), has_plate(),  is_clipped,
+          frame.exposure,    rule(),     sampled(),   denoise,       frame.dithers};
 }
 
 Plate Renderer::show(bool denoise, Layers* layers) {
@@ -438,7 +446,7 @@ Plate Renderer::show(bool denoise, Layers* layers) {
   }
   if (!denoise || !layers)
     return accumulated ? *std::move(accumulated) : r.presenter->present(what, *r.denoiser);
-  const PlateRadiance plate = plate_radiance(*r.frame.plate, *r.response, r.frame.exposure);
+  const PlateRadiance plate = r.plate_radiance();
   Plate picture = r.presenter->present(what, *r.denoiser, [&](const Denoiser::Band& band) {
     r.denoiser->read(band, *layers, plate, r.rule());
   });
@@ -504,7 +512,7 @@ Plate Renderer::show_among(const std::vector<KeptFramePtr>& frames, bool denoise
   const ToPresent what = add(*frames.back());
   const bool fills = denoise && layers;
   PlateRadiance plate;
-  if (fills) plate = plate_radiance(*r.frame.plate, *r.response, r.frame.exposure);
+  if (fills) plate = r.plate_radiance();
   Plate picture = r.presenter->present(what, *r.denoiser, [&](const Denoiser::Band& band) {
     if (!fills) return;
     r.presenter->read(band, *layers);

@@ -341,8 +341,9 @@ void Wavefront::use_photons(std::uint32_t count, double radius) {
   photon_radius_ = std::min(radius, most_photon_radius);
 }
 
-void Wavefront::use_camera(const std::vector<glm::vec4>& plate) {
-  camera_.upload(plate);
+void Wavefront::use_camera(const std::vector<float>& radiance_of_codes) {
+  camera_.use(static_cast<std::uint32_t>(width_) * static_cast<std::uint32_t>(height_),
+              radiance_of_codes);
   const Buffers buffers = buffers_of(0);
   std::vector<gpu::GpuBatch> parts;
   for (const Tile& tile : tiles_) parts.push_back(tile.batch);

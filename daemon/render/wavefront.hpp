@@ -35,9 +35,9 @@ class Wavefront {
   // used where `features` has FEATURE_PHOTONS.
   void use_photons(std::uint32_t count, double radius);
   std::uint32_t most_photons() const { return most_photons_; }
-  // Sets the camera's measurement, row-major (CameraMap::upload); used where `features` has
-  // FEATURE_CAMERA.
-  void use_camera(const std::vector<glm::vec4>& plate);
+  // Takes the scene's plate as the camera's measurement, each code of which stands for this linear
+  // radiance; used where `features` has FEATURE_CAMERA.
+  void use_camera(const std::vector<float>& radiance_of_codes);
   // Limits the number of samples for the pixels of each of the SAMPLED_PARTS of each block of
   // SAMPLED_BLOCK^2: blocks are row-major, and so are the parts of one.
   void limit_samples(const std::vector<std::uint32_t>& limits);

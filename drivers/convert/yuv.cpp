@@ -23,4 +23,11 @@ YuvToRgb::YuvToRgb(YuvMatrix matrix, YuvRange range) {
   }
 }
 
+std::vector<float> YuvToRgb::terms() const {
+  std::vector<float> result(luma_.begin(), luma_.end());
+  for (const ChromaTable* table : {&red_of_cr_, &green_of_cb_, &green_of_cr_, &blue_of_cb_})
+    result.insert(result.end(), table->begin(), table->end());
+  return result;
+}
+
 }  // namespace previz::convert

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <vector>
 
 namespace previz::convert {
 
@@ -23,8 +24,13 @@ class YuvToRgb {
     rgb[2] = to_code(luma + blue_of_cb_[cb]);
   }
 
+  static constexpr std::size_t luma_codes = 256, chroma_codes = 8 * 255 + 1;
+  // Returns the tables for a graphics card that does the same: what is added up in codes, of the
+  // luma_codes of luma, then of the chroma_codes of Cr for red, of Cb and of Cr for green, and of
+  // Cb for blue.
+  std::vector<float> terms() const;
+
  private:
-  static constexpr std::size_t chroma_codes = 8 * 255 + 1;
   using ChromaTable = std::array<float, chroma_codes>;
 
   static std::uint8_t to_code(float value) {
@@ -33,7 +39,7 @@ class YuvToRgb {
     return value >= 255 ? 255 : static_cast<std::uint8_t>(half_up);
   }
 
-  std::array<float, 256> luma_{};  // R' = G' = B' of grey, in codes 0..255
+  std::array<float, luma_codes> luma_{};  // R' = G' = B' of grey, in codes 0..255
   ChromaTable red_of_cr_{}, green_of_cb_{}, green_of_cr_{}, blue_of_cb_{};
 };
 

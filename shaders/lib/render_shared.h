@@ -386,6 +386,21 @@ struct GpuRefitBox {
   vec3 high;
 };
 
+// How the camera's samples lie in its bytes (drivers/frame.hpp), row by row.
+PREVIZ_CONST uint CAMERA_RGB = 0u;     // three 8-bit samples a pixel
+PREVIZ_CONST uint CAMERA_GRAY = 1u;    // one sample a pixel
+PREVIZ_CONST uint CAMERA_BAYER = 2u;   // one sample a pixel, behind colour filters
+PREVIZ_CONST uint CAMERA_YUV422 = 3u;  // planes of 8-bit Y, Cb and Cr, the last two half as wide
+
+// Push constants of the pass that makes the plate's codes of the camera's bytes.
+struct GpuCameraFrame {
+  uint width, height;  // pixels
+  uint first;          // pair of pixels to begin with
+  uint arrangement;    // CAMERA_*
+  uint is_deep;        // 1: gray and Bayer samples have 16 bits
+  uint red_x, red_y;   // column and row, modulo 2, of the red filters
+};
+
 // Push constants of the passes that make the shown picture.
 struct GpuShow {
   uint count;          // pixels to work on

@@ -1,0 +1,122 @@
+#include "daemon/render/device_plate.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+#include <vector>
+
+#include "shaders/lib/render_shared.h"
+#include "shaders/plate_codes.spv.h"
+
+namespace previz::render {
+namespace {
+
+// Devices may allow no more than 65535 work groups at once.
+constexpr std::uint32_t most_pairs = 1u << 21;
+
+gpu::GpuCameraFrame constants_of(const Frame& frame) {
+  gpu::GpuCameraFrame constants{};
+  constants.width = static_cast<std::uint32_t>(frame.width);
+  constants.height = static_cast<std::uint32_t>(frame.height);
+  constants.is_deep = frame.format == PixelFormat::gray16 ? 1 : 0;
+  const BayerPattern pattern = frame.bayer;
+  constants.red_x = pattern == BayerPattern::grbg || pattern == BayerPattern::bggr ? 1 : 0;
+  constants.red_y = pattern == BayerPattern::gbrg || pattern == BayerPattern::bggr ? 1 : 0;
+  if (frame.format == PixelFormat::yuv422p8)
+    constants.arrangement = gpu::CAMERA_YUV422;
+  else if (frame.format == PixelFormat::rgb8)
+    constants.arrangement = gpu::CAMERA_RGB;
+  else
+    constants.arrangement = pattern == BayerPattern::none ? gpu::CAMERA_GRAY : gpu::CAMERA_BAYER;
+  return constants;
+}
+
+// Every frame is looked at as a whole unless it clips: in a form that compilers make wide
+// instructions of.
+template <typename Code>
+bool is_any_at_least(std::span<const Code> codes, std::uint32_t least) {
+  constexpr std::size_t at_once = 4096;
+  for (std::size_t first = 0; first < codes.size(); first += at_once) {
+    unsigned found = 0;
+    for (const Code code : codes.subspan(first, std::min(at_once, codes.size() - first)))
+      found |= code >= least ? 1u : 0u;
+    if (found != 0) return true;
+  }
+  return false;
+}
+
+bool is_any_16_bit_at_least(std::span<const std::uint8_t> bytes, std::uint32_t least) {
+  std::vector<std::uint16_t> codes(4096);
+  for (std::size_t first = 0; first < bytes.size(); first += 2 * codes.size()) {
+    const std::size_t count = std::min(2 * codes.size(), bytes.size() - first);
+    std::memcpy(codes.data(), &bytes[first], count);
+    if (is_any_at_least<std::uint16_t>(std::span(codes).first(count / 2), least)) return true;
+  }
+  return false;
+}
+
+bool may_yuv_be_at_least(const Frame& frame, std::uint32_t least) {
+  const std::span<const std::uint8_t> bytes = frame.bytes;
+  const std::size_t luma = static_cast<std::size_t>(frame.width) * frame.height;
+  const std::size_t chroma = (bytes.size() - luma) / 2;
+  const auto [cb_low, cb_high] = std::ranges::minmax(bytes.subspan(luma, chroma));
+  const auto [cr_low, cr_high] = std::ranges::minmax(bytes.subspan(luma + chroma));
+  const int brightest = std::ranges::max(bytes.first(luma));
+  std::uint8_t of_high_chroma[3], of_low_chroma[3];
+  yuv_of_plates()(brightest, 8 * cb_high, 8 * cr_high, of_high_chroma);  // red and blue
+  yuv_of_plates()(brightest, 8 * cb_low, 8 * cr_low, of_low_chroma);     // green
+  return std::max({of_high_chroma[0], of_low_chroma[1], of_high_chroma[2]}) >= least;
+}
+
+}  // namespace
+
+DevicePlate::DevicePlate(Device& device)
+    : device_(device), kernel_(device, "plate_codes", plate_codes_spv) {
+  reserve(0);
+}
+
+void DevicePlate::reserve(std::size_t samples) {
+  // Two pixels are written at once.
+  const vk::DeviceSize size =
+      std::max<std::size_t>((samples + 5) / 6, 1) * 6 * sizeof(std::uint16_t);
+  if (codes_.size < size) codes_ = create_storage_buffer(device_, size);
+}
+
+void DevicePlate::take(const Plate& plate) {
+  reserve(plate.samples.size());
+  if (!plate.samples.empty())
+    upload_bytes(device_, codes_, std::as_bytes(std::span(plate.samples)));
+}
+
+void DevicePlate::take(const Frame& frame) {
+  check_size(frame);
+  const std::span<const std::byte> bytes = std::as_bytes(std::span(frame.bytes));
+  const std::size_t pixels = static_cast<std::size_t>(frame.width) * frame.height;
+  reserve(3 * pixels);
+  if (frame.format == PixelFormat::rgb16) return upload_bytes(device_, codes_, bytes);
+  if (!yuv_terms_.buffer) upload_storage(device_, yuv_terms_, yuv_of_plates().terms());
+  const vk::DeviceSize size = (bytes.size() + 3) / 4 * 4;
+  if (bytes_.size < size) bytes_ = create_storage_buffer(device_, size);
+  upload_bytes(device_, bytes_, bytes);
+  const Buffers buffers{
+      {"camera_bytes", &bytes_}, {"yuv_terms", &yuv_terms_}, {"plate_samples", &codes_}};
+  gpu::GpuCameraFrame constants = constants_of(frame);
+  const auto pairs = static_cast<std::uint32_t>((pixels + 1) / 2);
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
+    for (; constants.first < pairs; constants.first += most_pairs)
+      kernel_.dispatch({commands, constants, buffers},
+                       std::min(pairs - constants.first, most_pairs));
+  });
+}
+
+bool has_at_least(const Frame& frame, std::uint32_t least) {
+  if (frame.format == PixelFormat::yuv422p8) return may_yuv_be_at_least(frame, least);
+  if (plate_bits(frame.format) == 16) return is_any_16_bit_at_least(frame.bytes, least);
+  return is_any_at_least<std::uint8_t>(frame.bytes, least);
+}
+
+bool has_at_least(const Plate& plate, std::uint32_t least) {
+  return is_any_at_least<std::uint16_t>(plate.samples, least);
+}
+
+}  // namespace previz::render
