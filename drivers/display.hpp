@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "drivers/card_picture.hpp"
 #include "drivers/device.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
@@ -53,10 +54,11 @@ struct Overlay {
   std::vector<std::uint8_t> rgba;
 };
 
-// Everything that is on the screen at once. A null picture is black.
+// Everything that is on the screen at once. A null picture is black, unless there is one on a card.
 struct Screenful {
   std::shared_ptr<const Plate> picture;
   std::vector<Overlay> overlays;  // later ones above earlier ones
+  CardPicturePtr on_card = {};    // in place of `picture`
 };
 
 // The time from which the screenful is on the screen (CLOCK_MONOTONIC); if the screen scans out,
@@ -83,6 +85,9 @@ class Display {
   // after other trouble this screenful was not shown, but the next one may be. Throws previz::Error
   // if the graphics card refuses; the display is then lost as well.
   virtual DisplayEvent show(const Screenful& screenful) = 0;
+  // Returns the card whose pictures (Screenful::on_card) can be shown; nothing where there is none.
+  // The first one that OpenGL ES refuses is reported as other trouble, and none can be shown then.
+  virtual std::optional<CardIdentity> card() const { return std::nullopt; }
   // Makes the screen dark and leaves it to other programs until the next show(), which takes it
   // back.
   virtual void release() = 0;

@@ -87,12 +87,12 @@ void RenderStage::operator()(Shot& shot) {
   shot.render_s = seconds_from(start);
 }
 
-ShotUnderWay RenderStage::start(Shot shot) {
+ShotUnderWay RenderStage::start(Shot shot, const render::ShowTo& to) {
   ShotUnderWay result{std::move(shot), std::nullopt, std::chrono::steady_clock::now()};
   if (view_ != render::View::composite || options_.layers) {
     (*this)(result.shot);
   } else if (begin(result.shot, options_.is_live) && sample(result.shot)) {
-    result.showing = renderer_->show_later(set_.quality.denoise);
+    result.showing = renderer_->show_later(set_.quality.denoise, to);
   }
   return result;
 }
@@ -102,6 +102,7 @@ Shot RenderStage::finish(ShotUnderWay under_way) const {
   if (under_way.showing) {
     render::Showing::Shown shown = under_way.showing->finish();
     shot.picture = std::move(shown.picture);
+    shot.on_card = std::move(shown.on_card);
     shot.counters = shown.counters;
     shot.whole = true;
     shot.render_s = seconds_from(under_way.begin);

@@ -68,8 +68,9 @@ class RenderStage {
   void operator()(Shot& shot);
   // The same in two parts, between which the next shot can be started: the device goes on with that
   // one while the computer has the first one's picture. Shots are finished in the order in which
-  // they were started, and before the stage goes.
-  ShotUnderWay start(Shot shot);
+  // they were started, and before the stage goes. The picture goes where it is wanted, as far as it
+  // is the composite alone; others come down.
+  ShotUnderWay start(Shot shot, const render::ShowTo& to = {});
   Shot finish(ShotUnderWay under_way) const;
 
   // keep() and show_among() do the same in two parts, for shots of a take that are averaged with

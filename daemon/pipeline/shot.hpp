@@ -18,6 +18,7 @@
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/pose_filter.hpp"
 #include "daemon/tracking/tracker.hpp"
+#include "drivers/card_picture.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/session.hpp"
@@ -46,6 +47,8 @@ struct Shot {
   // rendered.
   std::string untouched;
   PlatePtr picture;
+  CardPicturePtr
+      on_card;  // the picture in a card's memory, also in place of `picture`; may be null
   std::shared_ptr<const render::Layers> layers;  // null: the pipeline only shows pictures
   render::Counters counters;
   bool whole = false;  // false: interrupted before its last sample

@@ -77,6 +77,22 @@ std::string lacks(const vk::raii::PhysicalDevice& physical) {
   return {};
 }
 
+// Returns what names the device for OpenGL ES, if images that it makes can be shared with that.
+std::optional<CardIdentity> card_of(const vk::raii::PhysicalDevice& physical) {
+  const auto extensions = physical.enumerateDeviceExtensionProperties();
+  const auto is_sharing = [](const vk::ExtensionProperties& extension) {
+    return std::string_view(extension.extensionName) == VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME;
+  };
+  if (std::ranges::none_of(extensions, is_sharing)) return std::nullopt;
+  const auto ids =
+      physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceIDProperties>()
+          .get<vk::PhysicalDeviceIDProperties>();
+  CardIdentity card;
+  std::ranges::copy(ids.deviceUUID, card.device.begin());
+  std::ranges::copy(ids.driverUUID, card.driver.begin());
+  return card;
+}
+
 // Returns the family whose queues compute and do not draw, if there is one: the display's pictures
 // need not wait for ours there, and some drivers let its work take longer. Otherwise one that
 // computes.
@@ -239,6 +255,10 @@ void Device::create_device() {
   features12.pNext = &features13;
   vk::DeviceCreateInfo info({}, queue);
   info.pNext = &features12;
+  std::vector<const char*> extensions;
+  card_ = shares_host_memory() ? std::nullopt : card_of(physical_);
+  if (card_) extensions.push_back(VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME);
+  info.setPEnabledExtensionNames(extensions);
   device_ = vk::raii::Device(physical_, info);
   pipelines_ = PipelineCache(physical_, device_, options_.cache);
   // How much a card gets at once depends on how long it takes.

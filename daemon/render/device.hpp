@@ -17,6 +17,7 @@
 #include "daemon/render/gpu.hpp"
 #include "daemon/render/pipeline_cache.hpp"
 #include "daemon/render/submissions.hpp"
+#include "drivers/card_picture.hpp"
 
 namespace previz::render {
 
@@ -42,6 +43,7 @@ class Device {
   bool is_open() const { return static_cast<bool>(*device_); }  // false after a reopen() that threw
 
   const vk::raii::Device& vk() const { return device_; }
+  std::uint32_t queue_family() const { return queue_family_; }
   const std::string& name() const { return name_; }
   std::string driver() const;  // its name and version, as it gives them
   const vk::PhysicalDeviceLimits& limits() const { return limits_; }
@@ -59,6 +61,9 @@ class Device {
     const std::lock_guard lock(drawing_mutex_);
     return drawing_;
   }
+  // Returns what names the device for displays that its pictures can be shown on; nothing where the
+  // driver shares no memory, or there is nothing to be saved because the host works in it.
+  const std::optional<CardIdentity>& card() const { return card_; }
   // Returns how many bytes all buffers together may take: the device's own memory, or the
   // computer's for a CPU device.
   std::uint64_t memory_bytes() const;
@@ -125,6 +130,7 @@ class Device {
   vk::raii::PhysicalDevice physical_{nullptr};
   std::uint32_t queue_family_ = 0;
   std::string name_;
+  std::optional<CardIdentity> card_;
   vk::PhysicalDeviceLimits limits_;
   DeviceLimits allows_{};
   bool is_cpu_ = false;

@@ -6,6 +6,7 @@
 #include "daemon/render/blue_noise.hpp"
 #include "shaders/composite.spv.h"
 #include "shaders/present.spv.h"
+#include "shaders/scan_out.spv.h"
 
 namespace previz::render {
 namespace {
@@ -58,7 +59,8 @@ Presenter::Presenter(Device& device, const lighting::Response& response)
       bits_(response.bits()),
       clipping_(response.clipping()),
       composite_(device, "composite", composite_spv),
-      present_(device, "present", present_spv) {
+      present_(device, "present", present_spv),
+      scan_out_(device, "scan_out", scan_out_spv) {
   const std::vector<double>& inverse = response.inverse();
   upload_storage(device, signal_of_, std::vector<float>(inverse.begin(), inverse.end()));
   std::vector<float> least;
@@ -161,13 +163,47 @@ Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
                 std::vector<std::uint16_t>(std::size_t{3} * static_cast<std::size_t>(what.width) *
                                            static_cast<std::size_t>(what.height))};
   Downloads down;
-  present_later(what, denoiser, picture, down, after_band);
+  present_later(what, denoiser, {.down = down, .plate = &picture, .on_card = {}}, after_band);
   down.finish();
   return picture;
 }
 
-void Presenter::present_later(const ToPresent& what, Denoiser& denoiser, Plate& picture,
-                              Downloads& down,
+// Copies the rows of the band into an image that a display reads as well. Whoever holds the picture
+// knows that its last reader is done; what was in it is forgotten with the first rows.
+void Presenter::scan_out(int width, const Denoiser::Band& band, vk::Image image, bool is_last) {
+  const auto columns = static_cast<std::uint32_t>(width);
+  const auto rows = static_cast<std::uint32_t>(band.last - band.first);
+  const gpu::GpuScanOut constants{columns * rows, bits_ > 8 ? 1u : 0u};
+  if (screen_.size < pixels_ * sizeof(std::uint32_t))
+    screen_ = create_storage_buffer(device_, pixels_ * sizeof(std::uint32_t));
+  const Buffers buffers{{"picture", &picture_}, {"screen", &screen_}};
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
+    scan_out_.dispatch({commands, constants, buffers}, constants.count);
+    using Layout = vk::ImageLayout;
+    using Stage = vk::PipelineStageFlagBits2;
+    const vk::ImageSubresourceRange whole(vk::ImageAspectFlagBits::eColor, 0, 1, 0, 1);
+    vk::ImageMemoryBarrier2 order(Stage::eCopy, vk::AccessFlagBits2::eTransferWrite, Stage::eCopy,
+                                  vk::AccessFlagBits2::eTransferWrite, Layout::eUndefined,
+                                  Layout::eGeneral, VK_QUEUE_FAMILY_IGNORED,
+                                  VK_QUEUE_FAMILY_IGNORED, image, whole);
+    if (band.first == 0) commands.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, order));
+    commands.copyBufferToImage(
+        *screen_.parts->buffer, image, Layout::eGeneral,
+        vk::BufferImageCopy(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1}, {0, band.first, 0},
+                            {columns, rows, 1}));
+    if (is_last) {
+      order.oldLayout = Layout::eGeneral;
+      order.srcQueueFamilyIndex = device_.queue_family();
+      order.dstQueueFamilyIndex = VK_QUEUE_FAMILY_EXTERNAL;
+      order.dstStageMask = Stage::eNone;
+      order.dstAccessMask = {};
+      commands.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, order));
+    }
+    device_.submissions().barrier(commands);
+  });
+}
+
+void Presenter::present_later(const ToPresent& what, Denoiser& denoiser, const Destination& to,
                               const std::function<void(const Denoiser::Band&)>& after_band) {
   const auto width = static_cast<std::size_t>(what.width);
   for (const Denoiser::Band& band : denoiser.bands(what.width, what.height)) {
@@ -196,8 +232,11 @@ void Presenter::present_later(const ToPresent& what, Denoiser& denoiser, Plate& 
                         what.history != nullptr);
       present_.dispatch({commands, constants, buffers}, (constants.count + 1) / 2);
     });
-    down.add(device_, picture_,
-             std::as_writable_bytes(std::span(picture.samples).subspan(3 * first, 3 * count)));
+    if (to.plate)
+      to.down.add(
+          device_, picture_,
+          std::as_writable_bytes(std::span(to.plate->samples).subspan(3 * first, 3 * count)));
+    if (to.on_card) scan_out(what.width, band, to.on_card, band.last == what.height);
     if (what.denoise && after_band) after_band(band);
   }
 }

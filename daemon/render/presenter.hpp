@@ -31,6 +31,13 @@ struct ToPresent {
   History* history = nullptr;  // what the frame is added to; null: it stands alone
 };
 
+// Where a picture goes.
+struct Destination {
+  Downloads& down;
+  Plate* plate = nullptr;  // of the right size; its samples are there only once `down` is finished
+  vk::Image on_card;       // null: not there (daemon/render/card_pictures.hpp)
+};
+
 class Presenter {
  public:
   // Makes pictures with this response. Where nothing virtual touches a pixel, the result is the
@@ -41,9 +48,8 @@ class Presenter {
   // `after_band` is called with each band that the denoiser's passes have run over.
   Plate present(const ToPresent& what, Denoiser& denoiser,
                 const std::function<void(const Denoiser::Band&)>& after_band = {});
-  // The same into a picture of the right size, whose samples are there only once `down` is
-  // finished.
-  void present_later(const ToPresent& what, Denoiser& denoiser, Plate& picture, Downloads& down,
+  // The same, without waiting for it.
+  void present_later(const ToPresent& what, Denoiser& denoiser, const Destination& to,
                      const std::function<void(const Denoiser::Band&)>& after_band = {});
   // Adds a frame to its history, which it must have, and makes no picture.
   void add_to_history(const ToPresent& what, Denoiser& denoiser);
@@ -56,15 +62,16 @@ class Presenter {
   void reserve(std::size_t pixels);
   void composite(const ToPresent& what, const Denoiser::Band& band, gpu::GpuShow constants,
                  Denoiser& denoiser);
+  void scan_out(int width, const Denoiser::Band& band, vk::Image image, bool is_last);
   void accumulate(const ToPresent& what, const Denoiser::Band& band, const gpu::GpuShow& constants,
                   Denoiser& denoiser);
 
   Device& device_;
   int bits_;
   lighting::Clipping clipping_;
-  Kernel composite_, present_;
+  Kernel composite_, present_, scan_out_;
   std::size_t pixels_ = 0;
-  Buffer signal_of_, least_of_, thresholds_, composites_, highlights_, picture_;
+  Buffer signal_of_, least_of_, thresholds_, composites_, highlights_, picture_, screen_;
 };
 
 }  // namespace previz::render

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daemon/lighting/response.hpp"
+#include "daemon/render/card_pictures.hpp"
 #include "daemon/render/composite.hpp"
 #include "daemon/render/corner_rays.hpp"
 #include "daemon/render/denoiser.hpp"
@@ -19,27 +20,12 @@
 #include "daemon/render/picture_memory.hpp"
 #include "daemon/render/plate_pool.hpp"
 #include "daemon/render/presenter.hpp"
+#include "daemon/render/showing_state.hpp"
 #include "daemon/render/wavefront.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
 namespace {
-
-// Adds what a frame counted on the device.
-Counters with(Counters counters, const gpu::GpuControl& control) {
-  const auto wide = [](std::uint32_t high, std::uint32_t low) {
-    return static_cast<std::uint64_t>(high) << 32 | low;
-  };
-  counters.rays = wide(control.rays_high, control.rays_low);
-  counters.shadow_rays = wide(control.shadow_rays_high, control.shadow_rays_low);
-  counters.dropped_not_finite = control.dropped_not_finite;
-  counters.dropped_negative = control.dropped_negative;
-  counters.stopped_in_layers = control.stopped_in_layers;
-  counters.unfinished = control.unfinished;
-  counters.measured = wide(control.measured_high, control.measured_low);
-  counters.unmeasured = wide(control.unmeasured_high, control.unmeasured_low);
-  return counters;
-}
 
 struct PlateSize {
   int width = 0, height = 0, bits = 8;  // without a plate: no pixel
@@ -66,6 +52,7 @@ struct Renderer::Impl {
         estimation(the_estimation),
         calibration(the_calibration),
         scene(*device),
+        on_card(*device),
         plate(*device) {
     make_wavefront();
   }
@@ -102,6 +89,7 @@ struct Renderer::Impl {
   std::optional<Wavefront> wavefront;
   std::optional<Denoiser> denoiser;    // made when a picture is first shown
   PlatePool pictures;                  // of show_later()
+  CardPictures on_card;                // likewise
   std::optional<Presenter> presenter;  // likewise; made for the response
   std::optional<History> history;      // made when a frame first accumulates, or is shown among
                                        // others
@@ -539,6 +527,10 @@ Counters Renderer::counters() const {
   return with(impl_->host_counters(), impl_->wavefront->control());
 }
 
+std::optional<CardIdentity> Renderer::card() const {
+  return impl_->device->card();
+}
+
 DeviceWork Renderer::work() const {
   return work_of(*impl_->device);
 }
@@ -547,29 +539,7 @@ DeviceTimes Renderer::take_times() {
   return render::take_times(*impl_->device);
 }
 
-struct Showing::State {
-  std::shared_ptr<Device> device;  // goes last
-  std::shared_ptr<Plate> picture;
-  Counters host;
-  gpu::GpuControl control{};
-  Downloads down;
-};
-
-Showing::Showing(std::unique_ptr<State> state) : state_(std::move(state)) {}
-Showing::~Showing() = default;
-Showing::Showing(Showing&&) noexcept = default;
-Showing& Showing::operator=(Showing&&) noexcept = default;
-
-bool Showing::is_here() const {
-  return state_->down.are_here();
-}
-
-Showing::Shown Showing::finish() {
-  state_->down.finish();
-  return {std::move(state_->picture), with(state_->host, state_->control)};
-}
-
-Showing Renderer::show_later(bool denoise) {
+Showing Renderer::show_later(bool denoise, const ShowTo& to) {
   Impl& r = *impl_;
   auto state = std::make_unique<Showing::State>();
   state->device = r.device;
@@ -578,8 +548,14 @@ Showing Renderer::show_later(bool denoise) {
     r.history->find_surfaces(r.scene_buffers, r.features, r.samples);
     what.history = &*r.history;
   }
-  state->picture = r.pictures.lend(what.width, what.height, r.response->bits());
-  r.presenter->present_later(what, *r.denoiser, *state->picture, state->down);
+  CardPictures::Lent lent;
+  if (to.card) lent = r.on_card.lend(what.width, what.height);
+  state->on_card = std::move(lent.picture);
+  if (to.computer || !state->on_card)
+    state->picture = r.pictures.lend(what.width, what.height, r.response->bits());
+  r.presenter->present_later(
+      what, *r.denoiser,
+      {.down = state->down, .plate = state->picture.get(), .on_card = lent.image});
   r.wavefront->count_into(state->control, state->down);
   state->host = r.host_counters();
   r.device->submissions().flush();

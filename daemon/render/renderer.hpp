@@ -12,9 +12,11 @@
 #include "daemon/render/gpu.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/layers.hpp"
+#include "daemon/render/showing.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
+#include "drivers/card_picture.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
 
@@ -24,27 +26,10 @@ namespace previz::render {
 struct KeptFrame;
 using KeptFramePtr = std::shared_ptr<const KeptFrame>;
 
-// A picture on its way from the device, which may still be at work on it.
-class Showing {
- public:
-  struct State;
-  explicit Showing(std::unique_ptr<State> state);
-  ~Showing();
-  Showing(Showing&&) noexcept;
-  Showing& operator=(Showing&&) noexcept;
-
-  // Returns whether finish() has nothing to wait for.
-  bool is_here() const;
-  // Waits for the picture and what was counted in its frame. May be called once. Throws as
-  // Renderer::show() does.
-  struct Shown {
-    PlatePtr picture;
-    Counters counters;
-  };
-  Shown finish();
-
- private:
-  std::unique_ptr<State> state_;
+// Where a picture is wanted.
+struct ShowTo {
+  bool computer = true;  // as a Plate
+  bool card = false;     // in the card's memory; if it cannot be there, it comes down
 };
 
 class Renderer {
@@ -123,7 +108,7 @@ class Renderer {
   Plate show(bool denoise, Layers* layers = nullptr);
   // Does the same without layers, and does not wait for the picture: the next frame can be begun
   // meanwhile. The pictures of a renderer are to be finished in their order, and before it goes.
-  Showing show_later(bool denoise);
+  Showing show_later(bool denoise, const ShowTo& to = {});
   // Returns what show_among() needs of the current frame, which must have a sample: its input, its
   // samples' sums, and how the scene stood. It takes 160 bytes of the computer's memory per pixel,
   // 16 more with photons, and the plate, which it shares with FrameInput.
@@ -155,6 +140,9 @@ class Renderer {
   // Returns what was counted since begin(). Waits for the samples, so that it costs least after
   // show().
   Counters counters() const;
+  // Returns what names the device for displays that its pictures can be shown on without coming
+  // down; nothing where they cannot.
+  std::optional<CardIdentity> card() const;
   // Return what the device was given to do since it was opened, and how long its passes took since
   // the last call. Work of other renderers on the same device counts, too.
   DeviceWork work() const;

@@ -172,8 +172,15 @@ class LiveRun {
     std::optional<LiveFiles> files;
     const auto show = [&](pipeline::Shot shot, const Look& look) {
       if (options_.on_shown) options_.on_shown(shot, look);
-      screen_->show(shot, shot.picture);
-      files->take(std::move(shot.picture));
+      screen_->show(shot);
+      if (shot.picture) files->take(std::move(shot.picture));
+    };
+    // A picture comes down to the computer only where somebody there wants it.
+    const auto wants = [&](const std::optional<CardIdentity>& card) -> render::ShowTo {
+      const bool is_on_card = card && screen_->card() == card;
+      return {.computer = !is_on_card || set.recording.composite || files->is_due() ||
+                          static_cast<bool>(options_.on_shown),
+              .card = is_on_card};
     };
     std::unique_ptr<Rig> rig;
     try {
@@ -182,7 +189,7 @@ class LiveRun {
           [this] { return to_json(snapshot()); }, reports_);
       screen_.use(set);
       rig = std::make_unique<Rig>(
-          Rig::Parts{loop, sets_, kept_, service_, pulse_, device_, renderer_, show,
+          Rig::Parts{loop, sets_, kept_, service_, pulse_, device_, renderer_, show, wants,
                      [this](RigFacts facts) { screen_->show(std::move(facts)); }, options_.buttons,
                      options_.around_cameras, options_.loop, end_.get_token()});
     } catch (const std::exception& error) {

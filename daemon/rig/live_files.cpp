@@ -29,16 +29,18 @@ LiveFiles::~LiveFiles() {
 }
 
 void LiveFiles::run() {
-  using Clock = std::chrono::steady_clock;
   std::shared_ptr<const Plate> newest;
-  Clock::time_point written = Clock::now();
   while (std::optional<std::shared_ptr<const Plate>> picture = pictures_.pop()) {
     newest = *std::move(picture);
-    if (Clock::now() - written < std::chrono::seconds(1)) continue;
+    if (!is_due()) continue;
     write(newest.get());
-    written = Clock::now();
+    written_ = std::chrono::steady_clock::now();
   }
   write(newest.get());
+}
+
+bool LiveFiles::is_due() const {
+  return std::chrono::steady_clock::now() - written_.load() >= std::chrono::seconds(1);
 }
 
 void LiveFiles::write(const Plate* picture) const {

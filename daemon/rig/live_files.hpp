@@ -1,6 +1,8 @@
 // Writes the newest picture and the metrics to files that other programs can watch.
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -32,6 +34,8 @@ class LiveFiles {
 
   // Returns at once; a thread that waits for the disk writes the newest about once a second.
   void take(std::shared_ptr<const Plate> picture) { pictures_.push(std::move(picture)); }
+  // Returns whether it would write a picture that is taken now. May be called from any thread.
+  bool is_due() const;
 
  private:
   void run();
@@ -41,6 +45,8 @@ class LiveFiles {
   const std::function<std::string()> metrics_;
   report::Reports& reports_;
   pipeline::Mailbox<std::shared_ptr<const Plate>> pictures_;
+  // When the last picture was written; the files begin as if one had been.
+  std::atomic<std::chrono::steady_clock::time_point> written_ = std::chrono::steady_clock::now();
   std::jthread thread_;
 };
 

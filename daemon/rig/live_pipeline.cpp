@@ -71,7 +71,7 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       tracking({parts.set, parts.cameras, parts.recorder, parts.look, light, parts.kept},
                calibration),
       render(parts.set, parts.look, parts.inbox, parts.kept.metrics, parts.kept.reports,
-             {tracked, reviewed, snapshots, found, governed, recorded_variants},
+             {tracked, reviewed, snapshots, found, governed, recorded_variants}, parts.wants,
              stop_source.get_token()),
       graphics({parts.set, parts.scene, parts.device, parts.renderer, render, rendered, parts.kept},
                calibration, stop_source.get_token()),

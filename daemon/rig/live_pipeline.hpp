@@ -28,6 +28,7 @@
 #include "daemon/rig/cameras.hpp"
 #include "daemon/rig/controls.hpp"
 #include "daemon/rig/inbox.hpp"
+#include "daemon/rig/live_render.hpp"
 #include "daemon/scene/scene.hpp"
 
 namespace previz::rig {
@@ -44,6 +45,7 @@ class LivePipeline {
     const pipeline::Newest<Look>& look;
     Inbox& inbox;
     pipeline::StageKeeper::Parts kept;
+    LiveRender::Wants wants;                   // on the render thread
     std::function<void(pipeline::Shot)> show;  // on the display's thread
   };
 

@@ -26,13 +26,14 @@ double seconds_since(Clock::time_point begin) {
 
 LiveRender::LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, Inbox& inbox,
                        pipeline::Metrics& metrics, report::Reports& reports, Channels channels,
-                       std::stop_token stop)
+                       Wants wants, std::stop_token stop)
     : set_(set),
       look_(look),
       inbox_(inbox),
       metrics_(metrics),
       reports_(reports),
       channels_(channels),
+      wants_(std::move(wants)),
       stop_(std::move(stop)),
       intake_(metrics, "render", channels.tracked),
       review_intake_(metrics, "review", channels.reviewed) {
@@ -263,12 +264,15 @@ void LiveRender::start(const Look& look, Shot shot) {
     stage_->show(look.view);
     stage_->fill_layers(snapshot);
     stage_->resize(scale);
-    under_way_.push_back({.picture = stage_->start(std::move(shot)),
+    const bool is_composite = look.view == render::View::composite;
+    const render::ShowTo to = wants_(stage_->renderer()->card());
+    under_way_.push_back({.picture = stage_->start(std::move(shot), to),
                           .recorded = std::move(recorded),
                           .of_take = look.of_take,
                           .governed = look.governed,
                           .snapshot = snapshot,
                           .of_live = look.snapshots > snapshots_,
+                          .is_for_card = to.card && !snapshot && is_composite,
                           .samples = governor_ ? governor_->samples() : 0,
                           .step = governor_ ? governor_->step() : set::PreviewStep{},
                           .begin = begin});
@@ -320,7 +324,10 @@ Shot LiveRender::complete() {
   count_shown(under_way.of_take);
   count_work();
   if (!shot.whole) return shot;
+  if (shot.on_card) metrics_.count("shown from the card's memory");
   if (shot.untouched.empty()) {
+    if (under_way.is_for_card && !shot.on_card)
+      metrics_.count("copied to the screen for want of card memory");
     if (shot.track.pose) keep_as_good(shot, std::move(under_way.recorded));
     if (under_way.governed && governor_) {
       // The governor may have changed its mind since the frame was started.

@@ -34,9 +34,12 @@ class LiveRender {
     pipeline::Newest<std::map<std::string, std::string>>& recorded_variants;
   };
 
+  // Returns where the pictures of this device are wanted.
+  using Wants = std::function<render::ShowTo(const std::optional<CardIdentity>& card)>;
+
   // The stage that renders must ask interrupted() whether it is cancelled.
   LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, Inbox& inbox,
-             pipeline::Metrics& metrics, report::Reports& reports, Channels channels,
+             pipeline::Metrics& metrics, report::Reports& reports, Channels channels, Wants wants,
              std::stop_token stop);
 
   void use(pipeline::RenderStage& stage);
@@ -84,6 +87,7 @@ class LiveRender {
     pipeline::ShotUnderWay picture;
     std::optional<session::SceneState> recorded;  // of a take's frame: its scene
     bool of_take, governed, snapshot, of_live;    // as the Look was
+    bool is_for_card;                             // it is wanted there
     int samples;                                  // the governor's
     set::PreviewStep step;                        // likewise
     std::chrono::steady_clock::time_point begin;
@@ -108,6 +112,7 @@ class LiveRender {
   pipeline::Metrics& metrics_;
   report::Reports& reports_;
   Channels channels_;
+  const Wants wants_;
   const std::stop_token stop_;
   pipeline::RenderStage* stage_ = nullptr;
   std::optional<pipeline::Governor> governor_;

@@ -121,7 +121,13 @@ PictureFacts facts_of(const pipeline::Shot& shot) {
   PictureFacts facts;
   facts.samples = shot.samples;
   facts.history = shot.history;
-  if (shot.picture) facts.width = shot.picture->width, facts.height = shot.picture->height;
+  if (shot.picture) {
+    facts.width = shot.picture->width;
+    facts.height = shot.picture->height;
+  } else if (shot.on_card) {
+    facts.width = shot.on_card->memory->width;
+    facts.height = shot.on_card->memory->height;
+  }
   facts.error = shot.error;
   facts.untouched = shot.untouched;
   facts.tracking = shot.track.status;

@@ -135,6 +135,7 @@ Rig::Rig(Parts parts)
            .look = look_,
            .inbox = inbox_,
            .kept = parts_.kept,
+           .wants = parts_.wants,
            .show = [this](pipeline::Shot shot) { parts_.show(std::move(shot), *look_.get()); }},
           parts_.stop) {
   for (const std::string& what : loaded_.scene.notes)

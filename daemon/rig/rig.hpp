@@ -39,6 +39,7 @@ class Rig {
     std::shared_ptr<render::Device> device;
     std::shared_ptr<render::Renderer>& renderer;            // as LivePipeline's
     std::function<void(pipeline::Shot, const Look&)> show;  // on the pipeline's last thread
+    LiveRender::Wants wants;                                // on the render thread
     std::function<void(RigFacts)> show_facts;               // facts for the overlay
     std::function<std::vector<std::unique_ptr<Buttons>>()> more_buttons;  // may be empty
     std::function<void(Cameras&)> around_cameras;  // as LiveOptions'; may be empty

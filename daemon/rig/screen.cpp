@@ -28,6 +28,7 @@ constexpr std::chrono::seconds file_interval{1};
 
 struct Picture {
   std::shared_ptr<const Plate> plate;
+  CardPicturePtr on_card;  // in place of the plate
   PictureFacts facts;
   Clock::time_point arrived;  // arrival at the daemon
   double in_device_s = 0;     // from capture to arrival, as the driver reports it
@@ -99,6 +100,7 @@ struct Screen::Impl {
   const Parts parts;
   pipeline::Mailbox<Picture> pictures;
   pipeline::Newest<RigFacts> rig{{}};
+  pipeline::Newest<std::optional<CardIdentity>> card{std::nullopt};
 
   // Only the thread uses these.
   DisplayLifeline life;
@@ -168,6 +170,8 @@ void Screen::Impl::put(const output::OsdPage& next, bool fresh) {
   const auto begin = Clock::now();
   const std::optional<DisplayEvent> event =
       life.show([&](const DisplayMode& mode) { return compose(mode, next); });
+  const Display* display = life.display();
+  card.set(display ? display->card() : std::nullopt);
   up_to_date = event && std::holds_alternative<Shown>(*event);
   if (up_to_date) {
     page = next;
@@ -190,7 +194,8 @@ Screenful Screen::Impl::compose(const DisplayMode& mode, const output::OsdPage& 
   if (other_screen || next != painted) overlays = painter->paint(next);
   painted_for = mode;
   painted = next;
-  return {picture ? picture->plate : nullptr, overlays};
+  if (!picture) return {nullptr, overlays};
+  return {picture->plate, overlays, picture->on_card};
 }
 
 void Screen::Impl::was_shown(const Shown& shown, bool fresh) {
@@ -220,8 +225,11 @@ Screen::Screen(const set::Set& set, Parts parts)
 
 Screen::~Screen() = default;
 
-void Screen::show(const pipeline::Shot& shot, std::shared_ptr<const Plate> picture) {
-  Picture shown{std::move(picture), facts_of(shot), shot.arrived,
+void Screen::show(const pipeline::Shot& shot) {
+  Picture shown{shot.picture,
+                shot.on_card,
+                facts_of(shot),
+                shot.arrived,
                 1e-9 * static_cast<double>(shot.frame->arrival_ns - shot.frame->timestamp_ns),
                 shot.frozen};
   if (impl_)
@@ -232,6 +240,10 @@ void Screen::show(const pipeline::Shot& shot, std::shared_ptr<const Plate> pictu
 
 void Screen::show(RigFacts facts) {
   if (impl_) impl_->rig.set(std::move(facts));
+}
+
+std::optional<CardIdentity> Screen::card() const {
+  return impl_ ? *impl_->card.get() : std::nullopt;
 }
 
 }  // namespace previz::rig

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "daemon/output/osd_page.hpp"
 #include "daemon/pipeline/metrics.hpp"
@@ -11,6 +12,7 @@
 #include "daemon/pipeline/stage_keeper.hpp"
 #include "daemon/rig/osd.hpp"
 #include "daemon/set/set.hpp"
+#include "drivers/card_picture.hpp"
 
 namespace previz::rig {
 
@@ -35,9 +37,12 @@ class Screen {
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
 
-  // Both return at once and may be called from any thread. The latest picture and facts are shown.
-  void show(const pipeline::Shot& shot, std::shared_ptr<const Plate> picture);
+  // These return at once and may be called from any thread. The latest picture and facts are shown.
+  void show(const pipeline::Shot& shot);
   void show(RigFacts facts);
+  // Returns the card whose pictures the screen shows where they are (Display::card()); nothing
+  // where they have to come down. May be called from any thread.
+  std::optional<CardIdentity> card() const;
 
  private:
   struct Impl;

@@ -131,15 +131,31 @@ Painter::~Painter() {
   glDeleteProgram(program_);
 }
 
-void Painter::take(const Screenful& screenful) {
-  if (screenful.picture != uploaded_) {
+std::optional<std::string> Painter::take(const Screenful& screenful) {
+  if (screenful.on_card) {
+    if (screenful.on_card->number != copied_ && !copy(*screenful.on_card))
+      return "OpenGL ES cannot show a picture that stays on the graphics card; pictures come down "
+             "to the computer from now on";
+  } else if (screenful.picture != uploaded_ || copied_ != 0) {
     if (screenful.picture)
       upload(*screenful.picture);
     else
       forget_picture();
     uploaded_ = screenful.picture;
+    copied_ = 0;
   }
   upload(screenful.overlays);
+  return std::nullopt;
+}
+
+bool Painter::copy(const CardPicture& picture) {
+  make_picture(picture.memory->width, picture.memory->height);
+  uploaded_.reset();
+  copied_ = 0;
+  if (!shared_.copy(picture)) return false;
+  copied_ = picture.number;
+  filter_picture();
+  return true;
 }
 
 Plate Painter::read_back() {
@@ -190,24 +206,27 @@ void Painter::draw(const Texture& texture, int x, int y, int width, int height, 
   glDrawArrays(GL_TRIANGLE_STRIP, 0, 4);
 }
 
+// Binds the picture's texture, which has this size from now on.
+void Painter::make_picture(int width, int height) {
+  const bool same_size = picture_.width == width && picture_.height == height;
+  if (picture_.name != 0 && same_size) return glBindTexture(GL_TEXTURE_2D, picture_.name);
+  check_fits(width, height);
+  forget_picture();
+  picture_ = {new_texture(GL_LINEAR_MIPMAP_NEAREST, GL_LINEAR), width, height};
+  glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE, nullptr);
+}
+
+void Painter::upload(const Plate& picture) {
+  to_bytes(picture, bytes_);
+  make_picture(picture.width, picture.height);
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, picture_.width, picture_.height, GL_RGB, GL_UNSIGNED_BYTE,
+                  bytes_.data());
+  filter_picture();
+}
+
 // At a picture's own size texels fall on pixels, and both filters give the texel itself. A picture
 // shown smaller than about two thirds is sampled from its mipmaps, so that it does not alias.
-void Painter::upload(const Plate& picture) {
-  const Texture wanted{0, picture.width, picture.height};
-  const bool same_size = picture_.width == wanted.width && picture_.height == wanted.height;
-  to_bytes(picture, bytes_);
-  if (picture_.name == 0 || !same_size) {
-    check_fits(wanted.width, wanted.height);
-    forget_picture();
-    picture_ = wanted;
-    picture_.name = new_texture(GL_LINEAR_MIPMAP_NEAREST, GL_LINEAR);
-    glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, picture_.width, picture_.height, 0, GL_RGB,
-                 GL_UNSIGNED_BYTE, bytes_.data());
-  } else {
-    glBindTexture(GL_TEXTURE_2D, picture_.name);
-    glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, picture_.width, picture_.height, GL_RGB,
-                    GL_UNSIGNED_BYTE, bytes_.data());
-  }
+void Painter::filter_picture() {
   if (scale_ == DisplayScale::letterbox) {
     glGenerateMipmap(GL_TEXTURE_2D);
   } else {

@@ -4,9 +4,12 @@
 #include <GLES3/gl3.h>
 
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "drivers/display.hpp"
+#include "drivers/gles/shared_textures.hpp"
 
 namespace previz::gles {
 
@@ -20,9 +23,13 @@ class Painter {
   Painter(const Painter&) = delete;
   Painter& operator=(const Painter&) = delete;
 
-  // Sets what is drawn from now on; an empty screenful is black. This function and those below
+  // Returns the card whose pictures can be taken (Display::card()).
+  const std::optional<CardIdentity>& card() const { return shared_.card(); }
+  // Sets what is drawn from now on; an empty screenful is black. Returns why a card's picture
+  // cannot be taken, in words; the picture before it then stays. This function and those below
   // throw previz::Error that says what OpenGL refused.
-  void take(const Screenful& screenful);
+  std::optional<std::string> take(const Screenful& screenful);
+  void forget() { take({}); }
   // Draws into the framebuffer that is bound, whose first row is the lowest of the screen (as EGL
   // has it).
   void draw();
@@ -41,6 +48,9 @@ class Painter {
 
   void draw(const Texture& texture, int x, int y, int width, int height, bool blend);
   void upload(const Plate& picture);
+  bool copy(const CardPicture& picture);
+  void make_picture(int width, int height);
+  void filter_picture();
   void upload(const std::vector<Overlay>& overlays);
   void forget_picture();
   void forget_overlays();
@@ -50,7 +60,9 @@ class Painter {
   GLuint program_ = 0, vertices_ = 0;
   GLint rectangle_ = -1;  // location of the uniform
   Texture picture_;
-  std::shared_ptr<const Plate> uploaded_;  // what picture_ holds
+  std::shared_ptr<const Plate> uploaded_;  // what picture_ holds,
+  std::uint64_t copied_ = 0;               // or the number of the card's picture; 0: none
+  SharedTextures shared_;
   std::vector<Quad> overlays_;
   std::vector<std::uint8_t> bytes_;
 };

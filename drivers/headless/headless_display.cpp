@@ -19,7 +19,8 @@ class HeadlessDisplay final : public Display {
   std::string name() const override { return "headless"; }
   DisplayMode mode() const override { return mode_; }
   DisplayEvent show(const Screenful& screenful) override;
-  void release() override { painter_.take({}); }
+  std::optional<CardIdentity> card() const override { return painter_.card(); }
+  void release() override { painter_.forget(); }
   Plate read_back() override { return painter_.read_back(); }
 
  private:
@@ -29,7 +30,8 @@ class HeadlessDisplay final : public Display {
 };
 
 DisplayEvent HeadlessDisplay::show(const Screenful& screenful) {
-  painter_.take(screenful);
+  if (std::optional<std::string> refused = painter_.take(screenful))
+    return DeviceTrouble{name(), *std::move(refused), false};
   return Shown{monotonic_ns()};
 }
 

@@ -81,6 +81,7 @@ class KmsDisplay final : public Display {
   std::string name() const override { return name_of(*target_.connector); }
   DisplayMode mode() const override { return mode_of(mode_); }
   DisplayEvent show(const Screenful& screenful) override;
+  std::optional<CardIdentity> card() const override { return painter_.card(); }
   void release() override;
   Plate read_back() override;
 
@@ -135,7 +136,8 @@ DisplayEvent KmsDisplay::show(const Screenful& screenful) {
     master_ = true;
   }
   scanout_.begin();
-  painter_.take(screenful);
+  if (std::optional<std::string> refused = painter_.take(screenful))
+    return DeviceTrouble{name(), *std::move(refused), false};
   painter_.draw();
   const std::uint32_t framebuffer = scanout_.finish();
   flipped_ns_.reset();

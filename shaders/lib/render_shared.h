@@ -401,6 +401,12 @@ struct GpuCameraFrame {
   uint red_x, red_y;   // column and row, modulo 2, of the red filters
 };
 
+// Push constants of the pass that makes a picture for the screen.
+struct GpuScanOut {
+  uint count;    // pixels
+  uint is_deep;  // 1: codes have 16 bits
+};
+
 // Push constants of the passes that make the shown picture.
 struct GpuShow {
   uint count;          // pixels to work on

@@ -41,4 +41,41 @@ TEST_F(RigAsAGraphicsCard, ShowsEveryPictureInItsOrderAndRefines) {
   EXPECT_GE(metrics_.passes.at("present").runs, 8u);
 }
 
+// Returns the middle of a screen, of the picture's size.
+std::vector<std::uint16_t> middle_of(const Plate& screen, const Plate& picture) {
+  std::vector<std::uint16_t> result;
+  const int left = (screen.width - picture.width) / 2, top = (screen.height - picture.height) / 2;
+  for (int y = 0; y < picture.height; ++y) {
+    const auto row = screen.samples.begin() + 3 * ((top + y) * screen.width + left);
+    result.insert(result.end(), row, row + 3 * picture.width);
+  }
+  return result;
+}
+
+// The screen has a picture that was rendered, from the card's memory and bit for bit.
+TEST_F(RigAsAGraphicsCard, ShowsPicturesFromTheCardsMemory) {
+  replace_in_set("[recording]\n",
+                 "[display]\ndriver = \"headless\"\nmode = \"480x270\"\nscale = \"1:1\"\n"
+                 "osd = false\n[recording]\n");
+  std::mutex mutex;
+  std::deque<PlatePtr> rendered;
+  while_shown_ = [&] {
+    const Shown shown = shown_now();
+    const std::lock_guard lock(mutex);
+    if (shown.shot.on_card) rendered.push_back(shown.shot.picture);
+  };
+  std::atomic<int> equal = 0;
+  options_.on_screen = [&](const Plate& screen, const output::OsdPage&) {
+    const std::lock_guard lock(mutex);
+    equal += std::ranges::any_of(rendered, [&](const PlatePtr& picture) {
+      return middle_of(screen, *picture) == picture->samples;
+    });
+  };
+  run_rendering([&] {
+    EXPECT_TRUE(test::wait_until("pictures are on the screen", [&] { return equal > 3; }));
+  });
+  EXPECT_GT(metrics_.counts.at("shown from the card's memory"), 3u);
+  EXPECT_FALSE(metrics_.counts.contains("screen: device trouble")) << log_.text();
+}
+
 }  // namespace previz::rig::overlap_test

@@ -1,0 +1,24 @@
+// What a picture on its way from the device consists of. Internal to the render room.
+#pragma once
+
+#include <memory>
+
+#include "daemon/render/buffer.hpp"
+#include "daemon/render/showing.hpp"
+#include "shaders/lib/render_shared.h"
+
+namespace previz::render {
+
+struct Showing::State {
+  std::shared_ptr<Device> device;  // goes last
+  std::shared_ptr<Plate> picture;
+  CardPicturePtr on_card;
+  Counters host;
+  gpu::GpuControl control{};
+  Downloads down;
+};
+
+// Adds what a frame counted on the device.
+Counters with(Counters counters, const gpu::GpuControl& control);
+
+}  // namespace previz::render
