@@ -45,7 +45,7 @@ class LivePipeline {
     const pipeline::Newest<Look>& look;
     Inbox& inbox;
     pipeline::StageKeeper::Parts kept;
-    LiveRender::Wants wants;                   // on the render thread
+    LiveRender::Wants wants = {};              // on the render thread
     std::function<void(pipeline::Shot)> show;  // on the display's thread
   };
 

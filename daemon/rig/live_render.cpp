@@ -265,7 +265,7 @@ void LiveRender::start(const Look& look, Shot shot) {
     stage_->fill_layers(snapshot);
     stage_->resize(scale);
     const bool is_composite = look.view == render::View::composite;
-    const render::ShowTo to = wants_(stage_->renderer()->card());
+    const render::ShowTo to = wants_ ? wants_(stage_->renderer()->card()) : render::ShowTo{};
     under_way_.push_back({.picture = stage_->start(std::move(shot), to),
                           .recorded = std::move(recorded),
                           .of_take = look.of_take,

@@ -34,7 +34,7 @@ class LiveRender {
     pipeline::Newest<std::map<std::string, std::string>>& recorded_variants;
   };
 
-  // Returns where the pictures of this device are wanted.
+  // Returns where the pictures of this device are wanted; empty: they come down.
   using Wants = std::function<render::ShowTo(const std::optional<CardIdentity>& card)>;
 
   // The stage that renders must ask interrupted() whether it is cancelled.
