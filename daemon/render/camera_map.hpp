@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <glm/vec4.hpp>
+#include <span>
 #include <vector>
 
 #include "daemon/render/kernel.hpp"
@@ -18,6 +19,7 @@ class CameraMap {
   explicit CameraMap(Device& device) : device_(device) { resize(1); }
 
   void create_kernels(std::uint32_t features);
+  static std::span<const Pass> passes();  // of these kernels
   // Adds the map's buffers, for the passes that read the map and for record().
   void add_to(Buffers& buffers) const;
   // Takes the plate: row-major, linear radiance; w is 1 where a pixel may be used, 0 where it is
