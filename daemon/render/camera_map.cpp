@@ -14,10 +14,15 @@ void CameraMap::resize(std::uint32_t pixels) {
   seen_ = create_storage_buffer(device_, pixels * sizeof(gpu::GpuSeen));
 }
 
+std::span<const Pass> CameraMap::passes() {
+  static constexpr Pass all[] = {{"camera_measured", camera_measured_spv, false},
+                                 {"camera_depth", camera_depth_spv},
+                                 {"camera_usable", camera_usable_spv}};
+  return all;
+}
+
 void CameraMap::create_kernels(std::uint32_t features) {
-  measured_ = Kernel(device_, "camera_measured", camera_measured_spv);
-  depth_ = Kernel(device_, "camera_depth", camera_depth_spv, {features});
-  usable_ = Kernel(device_, "camera_usable", camera_usable_spv, {features});
+  make_kernels({&measured_, &depth_, &usable_}, device_, passes(), features);
 }
 
 void CameraMap::add_to(Buffers& buffers) const {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "daemon/render/kernel.hpp"
@@ -17,6 +18,7 @@ class CameraMap {
   explicit CameraMap(Device& device) : device_(device) { resize(1); }
 
   void create_kernels(std::uint32_t features);
+  static std::span<const Pass> passes();  // of these kernels
   // Adds the map's buffers, for the passes that read the map and for record().
   void add_to(Buffers& buffers) const;
   // Makes room for a picture of so many pixels, of which each code stands for this radiance.

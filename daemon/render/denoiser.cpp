@@ -45,13 +45,19 @@ float most_variance(float white, std::int64_t samples) {
 }
 
 Denoiser::Denoiser(Device& device, std::size_t most_pixels)
-    : device_(device),
-      most_pixels_(most_pixels),
-      variance_pass_(device, "denoise_variance", denoise_variance_spv),
-      guide_pass_(device, "denoise_guide", denoise_guide_spv),
-      level_pass_(device, "denoise", denoise_spv),
-      caustic_pass_(device, "denoise_caustics", denoise_caustics_spv),
-      edge_pass_(device, "denoise_edges", denoise_edges_spv) {}
+    : device_(device), most_pixels_(most_pixels) {
+  make_kernels({&variance_pass_, &guide_pass_, &level_pass_, &caustic_pass_, &edge_pass_}, device,
+               passes());
+}
+
+std::span<const Pass> Denoiser::passes() {
+  static constexpr Pass all[] = {{"denoise_variance", denoise_variance_spv, false},
+                                 {"denoise_guide", denoise_guide_spv, false},
+                                 {"denoise", denoise_spv, false},
+                                 {"denoise_caustics", denoise_caustics_spv, false},
+                                 {"denoise_edges", denoise_edges_spv, false}};
+  return all;
+}
 
 void Denoiser::reserve(std::size_t pixels, bool companions, bool caustics) {
   has_caustics_ = caustics;

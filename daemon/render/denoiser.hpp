@@ -8,6 +8,7 @@
 // the filter blurs less, and the result converges to the same picture.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "daemon/render/composite.hpp"
@@ -26,6 +27,7 @@ class Denoiser {
   // Works on about `most_pixels` at once, in bands of whole rows, at 152 bytes of device memory per
   // pixel, 32 more with companions, and 32 more with the light of photons.
   explicit Denoiser(Device& device, std::size_t most_pixels = most_band_pixels);
+  static std::span<const Pass> passes();  // of all its kernels
 
   // A band: given rows [top, bottom) as input, rows [first, last) of the output are right.
   struct Band {

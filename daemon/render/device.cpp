@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <utility>
 
@@ -153,21 +154,70 @@ void Device::close() {
   instance_.clear();
 }
 
-std::shared_ptr<const Program> Device::program(
-    const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
-    const std::function<std::shared_ptr<const Program>()>& compile) {
+bool Device::Compiled::is(const std::uint32_t* other_spirv,
+                          std::span<const std::uint32_t> others) const {
+  return spirv == other_spirv && std::ranges::equal(constants, others);
+}
+
+Device::Wanted Device::want(const std::uint32_t* spirv, std::span<const std::uint32_t> constants) {
   const std::lock_guard lock(programs_mutex_);
-  const auto found = std::ranges::find_if(programs_, [&](const Compiled& each) {
-    return each.spirv == spirv && std::ranges::equal(each.constants, constants);
-  });
+  const auto found = std::ranges::find_if(
+      programs_, [&](const Compiled& each) { return each.is(spirv, constants); });
   if (found != programs_.end()) {
     std::rotate(found, found + 1, programs_.end());
-  } else {
-    ++made_programs_;
-    programs_.push_back({spirv, {constants.begin(), constants.end()}, compile()});
-    if (programs_.size() > most_programs) programs_.erase(programs_.begin());
+    return {programs_.back().program, std::nullopt};
   }
-  return programs_.back().program;
+  std::promise<ProgramPtr> promise;
+  programs_.push_back({spirv, {constants.begin(), constants.end()}, promise.get_future().share()});
+  if (programs_.size() > most_programs) programs_.erase(programs_.begin());
+  return {programs_.back().program, std::move(promise)};
+}
+
+// Compiles without the lock, so that nobody waits who wants another program.
+Device::ProgramPtr Device::make(const std::uint32_t* spirv,
+                                std::span<const std::uint32_t> constants,
+                                std::promise<ProgramPtr> promise, const Compile& compile) {
+  try {
+    ProgramPtr made = compile();
+    ++made_programs_;
+    promise.set_value(made);
+    return made;
+  } catch (...) {
+    {
+      const std::lock_guard lock(programs_mutex_);
+      std::erase_if(programs_, [&](const Compiled& each) { return each.is(spirv, constants); });
+    }
+    promise.set_value(nullptr);
+    throw;
+  }
+}
+
+Device::ProgramPtr Device::program(const std::uint32_t* spirv,
+                                   std::span<const std::uint32_t> constants,
+                                   const Compile& compile) {
+  for (;;) {
+    Wanted wanted = want(spirv, constants);
+    const bool is_there =
+        wanted.program.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+    if (!is_there) ++awaited_programs_;
+    if (wanted.to_make) return make(spirv, constants, *std::move(wanted.to_make), compile);
+    if (ProgramPtr program = wanted.program.get()) return program;
+  }
+}
+
+void Device::program_ahead(const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
+                           const Compile& compile) {
+  Wanted wanted = want(spirv, constants);
+  if (!wanted.to_make) return;
+  make(spirv, constants, *std::move(wanted.to_make), compile);
+  ++ahead_programs_;
+}
+
+DeviceWork Device::work() const {
+  DeviceWork work = submissions_->work;
+  work.pipelines_awaited = awaited_programs_;
+  work.pipelines_ahead = ahead_programs_;
+  return work;
 }
 
 void Device::open(bool cpu_too) {
@@ -361,7 +411,7 @@ DeviceTimes take_times(Device& device) {
   return device.clock().take();
 }
 DeviceWork work_of(const Device& device) {
-  return device.submissions().work;
+  return device.work();
 }
 std::uint64_t validation_messages(const Device& device) {
   return device.validation_messages();

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -97,12 +98,20 @@ class Device {
 
   // Returns what `compile` made for the same SPIR-V and constants before, or calls it: compiling
   // may take longer than a picture, and a renderer that is made anew mostly wants what the last one
-  // had. The 256 programs that were wanted last are kept; a reopened device has none. `spirv` is
-  // known by its address and must stay there.
-  std::shared_ptr<const Program> program(
-      const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
-      const std::function<std::shared_ptr<const Program>()>& compile);
+  // had. What another thread is compiling is waited for, and tried again if that failed. The 256
+  // programs that were wanted last are kept; a reopened device has none. `spirv` is known by its
+  // address and must stay there. This and program_ahead() may be called on any thread while the
+  // device is open; `compile` too is called by several threads at once.
+  using ProgramPtr = std::shared_ptr<const Program>;
+  using Compile = std::function<ProgramPtr()>;
+  ProgramPtr program(const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
+                     const Compile& compile);
   static constexpr std::size_t most_programs = 256;
+  // Does the same before the program is needed, and waits for no other thread.
+  void program_ahead(const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
+                     const Compile& compile);
+  // Returns what submissions() were given, and how programs were made.
+  DeviceWork work() const;
   const PipelineCache& pipelines() const { return pipelines_; }
   void keep_programs();
 
@@ -110,9 +119,18 @@ class Device {
   struct Compiled {
     const std::uint32_t* spirv;
     std::vector<std::uint32_t> constants;
-    std::shared_ptr<const Program> program;
+    std::shared_future<ProgramPtr> program;  // null: it could not be compiled
+
+    bool is(const std::uint32_t* other_spirv, std::span<const std::uint32_t> others) const;
+  };
+  struct Wanted {
+    std::shared_future<ProgramPtr> program;
+    std::optional<std::promise<ProgramPtr>> to_make;  // absent: another one makes or has made it
   };
 
+  Wanted want(const std::uint32_t* spirv, std::span<const std::uint32_t> constants);
+  ProgramPtr make(const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
+                  std::promise<ProgramPtr> promise, const Compile& compile);
   void open(bool cpu_too);
   void close();
   void publish(Drawing drawing);
@@ -125,6 +143,7 @@ class Device {
   std::atomic<std::uint64_t> validation_messages_ = 0;
   bool has_labels_ = false;
   std::atomic<std::uint64_t> made_buffers_ = 0, made_programs_ = 0;
+  std::atomic<std::uint64_t> awaited_programs_ = 0, ahead_programs_ = 0;
   vk::raii::Instance instance_{nullptr};
   vk::raii::DebugUtilsMessengerEXT messenger_{nullptr};
   vk::raii::PhysicalDevice physical_{nullptr};

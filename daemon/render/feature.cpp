@@ -9,6 +9,7 @@
 
 #include "daemon/render/gpu_lights.hpp"
 #include "daemon/scene/material_extensions.hpp"
+#include "daemon/set/names.hpp"
 #include "shaders/lib/render_shared.h"
 
 namespace previz::render {
@@ -374,6 +375,26 @@ Demand demand_of(const set::Set& set, const Scene& scene, const MaterialFeatures
   demand.has_plate = true;
   demand.denoises = set.quality.denoise;
   return demand;
+}
+
+std::vector<std::uint32_t> reachable_bits(const set::Set& set, const Scene& scene,
+                                          bool has_aperture) {
+  std::vector<set::Estimator> estimators = {set.estimation.estimator};
+  for (const auto& [name, estimator] : set::names(set::Estimator{}))
+    if (estimator != set.estimation.estimator) estimators.push_back(estimator);
+  const MaterialFeatures materials = material_features(scene, set.estimation.specular_roughness);
+  set::Set pressed = set;
+  std::vector<std::uint32_t> reachable;
+  for (const bool finds_lamps : {false, true})
+    for (const set::Estimator estimator : estimators) {
+      pressed.estimation.estimator = estimator;
+      Demand demand = demand_of(pressed, scene, materials);
+      demand.has_aperture = has_aperture;
+      demand.finds_lamps |= finds_lamps && demand.shines_around;
+      const std::uint32_t bits = needed_bits(demand);
+      if (std::ranges::find(reachable, bits) == reachable.end()) reachable.push_back(bits);
+    }
+  return reachable;
 }
 
 }  // namespace previz::render

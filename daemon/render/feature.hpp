@@ -7,6 +7,7 @@
 #include <bitset>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
@@ -67,5 +68,13 @@ std::uint32_t needed_bits(const Demand& demand);
 // counts as shining wherever it may shine. `materials` is material_features() with the set's
 // specular threshold.
 Demand demand_of(const set::Set& set, const scene::Scene& scene, const MaterialFeatures& materials);
+
+// Returns the different FEATURE_* bits that the live pictures of a set can need, whatever its
+// buttons are pressed for: first those that the set file asks for, then those of the other
+// estimator, and last those with lamps that were found in the light around the set. From the first
+// such lamp on, pictures are rendered for any number of them (Renderer::set_sources()).
+// `has_aperture` says whether the observer's lens has an aperture. May read every texel.
+std::vector<std::uint32_t> reachable_bits(const set::Set& set, const scene::Scene& scene,
+                                          bool has_aperture);
 
 }  // namespace previz::render

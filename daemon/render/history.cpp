@@ -5,6 +5,7 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
+#include <iterator>
 #include <utility>
 
 #include "shaders/history.spv.h"
@@ -34,6 +35,11 @@ bool are_comparable(const GpuScene::Stance& a, const GpuScene::Stance& b) {
 // could not do a picture of 3840x2160 in one.
 constexpr std::uint32_t most_pixels_at_once = 1u << 21;
 
+constexpr Pass show_pass{"history_show", history_show_spv, false};
+constexpr Pass frame_passes[] = {{"history_surface", history_surface_spv},
+                                 {"history_cover", history_cover_spv},
+                                 {"history", history_spv}};
+
 double frames_after(double change) {
   return change > 0 ? most_drift / change : std::numeric_limits<double>::infinity();
 }
@@ -45,8 +51,13 @@ void set_rotation(gpu::vec4 (&rows)[3], const glm::dmat3& rotation) {
 
 }  // namespace
 
-History::History(Device& device)
-    : device_(device), show_(device, "history_show", history_show_spv) {}
+History::History(Device& device) : device_(device), show_(device, show_pass, 0) {}
+
+std::vector<Pass> History::passes() {
+  std::vector<Pass> all(std::begin(frame_passes), std::end(frame_passes));
+  all.push_back(show_pass);
+  return all;
+}
 
 void History::forget() {
   shorten(0);
@@ -196,9 +207,7 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
   if (samples_ == samples) return;
   if (features_ != features) {
     features_.reset();  // stays empty if creating the kernel throws
-    surface_ = Kernel(device_, "history_surface", history_surface_spv, {features});
-    cover_ = Kernel(device_, "history_cover", history_cover_spv, {features});
-    blend_ = Kernel(device_, "history", history_spv, {features});
+    make_kernels({&surface_, &cover_, &blend_}, device_, frame_passes, features);
     features_ = features;
   }
   Frame& now = frames_[now_];

@@ -23,6 +23,8 @@ namespace previz::render {
 class History {
  public:
   explicit History(Device& device);
+  // Returns the passes of all its kernels.
+  static std::vector<Pass> passes();
 
   // Forgets all frames so far.
   void forget();

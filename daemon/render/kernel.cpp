@@ -1,6 +1,8 @@
 #include "daemon/render/kernel.hpp"
 
 #include <algorithm>
+#include <cassert>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <utility>
@@ -53,23 +55,67 @@ const std::vector<std::uint32_t>& specialised(std::span<const std::uint32_t> spi
   static std::map<std::pair<const std::uint32_t*, std::vector<std::uint32_t>>,
                   std::vector<std::uint32_t>>
       modules;
-  const std::lock_guard lock(mutex);
   const std::pair key(spirv.data(), values);
-  if (const auto found = modules.find(key); found != modules.end()) return found->second;
-  return modules.emplace(key, specialise_spirv(spirv, values)).first->second;
+  {
+    const std::lock_guard lock(mutex);
+    if (const auto found = modules.find(key); found != modules.end()) return found->second;
+  }
+  std::vector<std::uint32_t> module = specialise_spirv(spirv, values);  // takes long: unlocked
+  const std::lock_guard lock(mutex);
+  return modules.try_emplace(key, std::move(module)).first->second;
 }
+
+std::vector<std::uint32_t> values_of(const Pass& pass, std::uint32_t features) {
+  if (!pass.has_features) return {};
+  return {features};
+}
+
+// A pass with the constants that it reads something of, and the way to compile it.
+struct ToCompile {
+  ToCompile(const Device& device, const Pass& pass, std::vector<std::uint32_t> constants)
+      : info(describe_spirv(pass.spirv)), values(std::move(constants)) {
+    if (!values.empty()) values.front() &= info.asked_bits;
+    compile_now = [this, &device, &pass] {
+      return compile(device, pass.name, info, specialised(pass.spirv, values));
+    };
+  }
+  ToCompile(const ToCompile&) = delete;
+  ToCompile& operator=(const ToCompile&) = delete;
+
+  const SpirvInfo info;
+  std::vector<std::uint32_t> values;
+  std::function<std::shared_ptr<const Program>()> compile_now;
+};
 
 }  // namespace
 
 Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
                std::initializer_list<std::uint32_t> constants)
     : device_(&device), name_(name) {
-  const SpirvInfo info = describe_spirv(spirv);
-  std::vector<std::uint32_t> values = constants;
-  if (!values.empty()) values.front() &= info.asked_bits;
-  const auto compile_now = [&] { return compile(device, name_, info, specialised(spirv, values)); };
-  state_ = {new State{device.program(spirv.data(), values, compile_now), {}},
-            Retire<State>{&device}};
+  use(Pass{name, spirv}, constants);
+}
+
+Kernel::Kernel(Device& device, const Pass& pass, std::uint32_t features)
+    : device_(&device), name_(pass.name) {
+  use(pass, values_of(pass, features));
+}
+
+void Kernel::use(const Pass& pass, std::vector<std::uint32_t> constants) {
+  const ToCompile wanted(*device_, pass, std::move(constants));
+  state_ = {new State{device_->program(pass.spirv.data(), wanted.values, wanted.compile_now), {}},
+            Retire<State>{device_}};
+}
+
+void make_kernels(std::initializer_list<Kernel*> kernels, Device& device,
+                  std::span<const Pass> passes, std::uint32_t features) {
+  assert(kernels.size() == passes.size());
+  const Pass* pass = passes.data();
+  for (Kernel* const kernel : kernels) *kernel = Kernel(device, *pass++, features);
+}
+
+void compile_ahead(Device& device, const Pass& pass, std::uint32_t features) {
+  const ToCompile wanted(device, pass, values_of(pass, features));
+  device.program_ahead(pass.spirv.data(), wanted.values, wanted.compile_now);
 }
 
 Kernel::BoundSet Kernel::create_set() const {

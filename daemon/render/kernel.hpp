@@ -52,12 +52,22 @@ struct Program {
   vk::raii::Pipeline pipeline{nullptr};
 };
 
+// What a kernel is made of.
+struct Pass {
+  const char* name;
+  std::span<const std::uint32_t> spirv;  // static
+  bool has_features = true;  // specialisation constant 0 has the FEATURE_* bits; otherwise no
+                             // constant is set
+};
+
 class Kernel {
  public:
   Kernel() = default;  // cannot be dispatched
   // `spirv` is static; `constants[i]` is specialisation constant i (32 bits each).
   Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
          std::initializer_list<std::uint32_t> constants = {});
+  // `features` are FEATURE_* bits.
+  Kernel(Device& device, const Pass& pass, std::uint32_t features);
 
   // Record the pass, under a debug label with its name, and a barrier after it. The first runs as
   // many work groups as `invocations` need, the second the number of groups stored in an indirect
@@ -79,6 +89,7 @@ class Kernel {
     std::vector<BoundSet> sets;  // for the buffers of the last dispatches
   };
 
+  void use(const Pass& pass, std::vector<std::uint32_t> constants);
   void bind(const Recording& recording);
   void finish(const Recording& recording) const;
   vk::DescriptorSet bound(const Buffers& buffers);
@@ -89,5 +100,14 @@ class Kernel {
   std::string name_;
   std::unique_ptr<State, Retire<State>> state_;
 };
+
+// Makes each of the kernels of the pass in its place.
+void make_kernels(std::initializer_list<Kernel*> kernels, Device& device,
+                  std::span<const Pass> passes, std::uint32_t features = 0);
+
+// Compiles the program of a kernel, unless that has been done or is under way, so that the kernel
+// need not wait for it. May be called on any thread while the device is open. Throws
+// previz::Error or vk::SystemError where it cannot be compiled; the kernel then tries again.
+void compile_ahead(Device& device, const Pass& pass, std::uint32_t features);
 
 }  // namespace previz::render

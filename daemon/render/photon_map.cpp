@@ -29,12 +29,17 @@ void PhotonMap::resize(std::uint32_t photons) {
   room_ = photons;
 }
 
+std::span<const Pass> PhotonMap::passes() {
+  static constexpr Pass all[] = {{"photon_emit", photon_emit_spv},
+                                 {"photon_bounce", photon_bounce_spv},
+                                 {"photon_buckets", photon_buckets_spv},
+                                 {"photon_scatter", photon_scatter_spv},
+                                 {"photon_sort", photon_sort_spv}};
+  return all;
+}
+
 void PhotonMap::create_kernels(std::uint32_t features) {
-  emit_ = Kernel(device_, "photon_emit", photon_emit_spv, {features});
-  bounce_ = Kernel(device_, "photon_bounce", photon_bounce_spv, {features});
-  share_out_ = Kernel(device_, "photon_buckets", photon_buckets_spv, {features});
-  scatter_ = Kernel(device_, "photon_scatter", photon_scatter_spv, {features});
-  sort_ = Kernel(device_, "photon_sort", photon_sort_spv, {features});
+  make_kernels({&emit_, &bounce_, &share_out_, &scatter_, &sort_}, device_, passes(), features);
 }
 
 void PhotonMap::add_to(Buffers& buffers) const {

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "daemon/render/kernel.hpp"
 
@@ -17,6 +18,7 @@ class PhotonMap {
   // is at least 1, even where no photons are used.
   void resize(std::uint32_t photons);
   void create_kernels(std::uint32_t features);
+  static std::span<const Pass> passes();  // of these kernels
   // Adds the map's buffers, for the passes that read the map and for the passes below.
   void add_to(Buffers& buffers) const;
   // These record a pass of photons, in this order: emission fills the queue of paths; after each

@@ -55,12 +55,8 @@ gpu::GpuShow constants_of(const ToPresent& what, int bits, const lighting::Clipp
 }  // namespace
 
 Presenter::Presenter(Device& device, const lighting::Response& response)
-    : device_(device),
-      bits_(response.bits()),
-      clipping_(response.clipping()),
-      composite_(device, "composite", composite_spv),
-      present_(device, "present", present_spv),
-      scan_out_(device, "scan_out", scan_out_spv) {
+    : device_(device), bits_(response.bits()), clipping_(response.clipping()) {
+  make_kernels({&composite_, &present_, &scan_out_}, device, passes());
   const std::vector<double>& inverse = response.inverse();
   upload_storage(device, signal_of_, std::vector<float>(inverse.begin(), inverse.end()));
   std::vector<float> least;
@@ -69,6 +65,13 @@ Presenter::Presenter(Device& device, const lighting::Response& response)
   upload_storage(device, least_of_, least);
   static const std::vector<float> pattern = blue_noise(gpu::DITHER_SIDE);
   upload_storage(device, thresholds_, pattern);
+}
+
+std::span<const Pass> Presenter::passes() {
+  static constexpr Pass all[] = {{"composite", composite_spv, false},
+                                 {"present", present_spv, false},
+                                 {"scan_out", scan_out_spv, false}};
+  return all;
 }
 
 void Presenter::reserve(std::size_t pixels) {

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include "daemon/render/composite.hpp"
@@ -43,6 +44,7 @@ class Presenter {
   // Makes pictures with this response. Where nothing virtual touches a pixel, the result is the
   // plate's own samples, bit for bit.
   Presenter(Device& device, const lighting::Response& response);
+  static std::span<const Pass> passes();  // of all its kernels
 
   // Works band by band, with 26 bytes of device memory per pixel beside the denoiser's.
   // `after_band` is called with each band that the denoiser's passes have run over.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <iterator>
 #include <span>
 #include <utility>
 
@@ -31,6 +32,14 @@ constexpr std::uint32_t gpu_slots = 1u << 20;
 // square of the radius, which must not round to zero; a disc that reached the camera itself would
 // have no place in the grid.
 constexpr double least_photon_radius = 1e-15, most_photon_radius = 0.5;
+
+constexpr Pass path_passes[] = {{"generate", generate_spv},
+                                {"advance", advance_spv},
+                                {"extend", extend_spv},
+                                {"shade", shade_spv},
+                                {"prepare_shadow", prepare_shadow_spv},
+                                {"shadow", shadow_spv},
+                                {"accumulate", accumulate_spv}};
 
 std::uint32_t round_up(std::uint32_t value, std::uint32_t to) {
   return (value + to - 1) / to * to;
@@ -184,15 +193,20 @@ void Wavefront::use_scene(Buffers scene, std::uint32_t features) {
   if (features != features_) create_kernels(features);
 }
 
+std::vector<Pass> Wavefront::passes_for(std::uint32_t features) {
+  std::vector<Pass> passes(std::begin(path_passes), std::end(path_passes));
+  const auto add = [&](std::span<const Pass> more) {
+    passes.insert(passes.end(), more.begin(), more.end());
+  };
+  if ((features & gpu::FEATURE_PHOTONS) != 0) add(PhotonMap::passes());
+  if ((features & gpu::FEATURE_CAMERA) != 0) add(CameraMap::passes());
+  return passes;
+}
+
 void Wavefront::create_kernels(std::uint32_t features) {
   features_.reset();  // stays empty if creating a kernel throws
-  generate_ = Kernel(device_, "generate", generate_spv, {features});
-  advance_ = Kernel(device_, "advance", advance_spv, {features});
-  extend_ = Kernel(device_, "extend", extend_spv, {features});
-  shade_ = Kernel(device_, "shade", shade_spv, {features});
-  prepare_shadow_ = Kernel(device_, "prepare_shadow", prepare_shadow_spv, {features});
-  shadow_ = Kernel(device_, "shadow", shadow_spv, {features});
-  accumulate_ = Kernel(device_, "accumulate", accumulate_spv, {features});
+  make_kernels({&generate_, &advance_, &extend_, &shade_, &prepare_shadow_, &shadow_, &accumulate_},
+               device_, path_passes, features);
   if ((features & gpu::FEATURE_PHOTONS) != 0) photons_.create_kernels(features);
   if ((features & gpu::FEATURE_CAMERA) != 0) camera_.create_kernels(features);
   features_ = features;

@@ -27,6 +27,8 @@ class Wavefront {
   // ones.
   void resize(int width, int height);
   std::uint32_t paths_a_slot() const { return paths_a_slot_; }
+  // Returns the passes that use_scene() makes kernels of for these features.
+  static std::vector<Pass> passes_for(std::uint32_t features);
 
   // Uses the scene in these buffers, which must stay where they are, and the pipelines for
   // `features`.

@@ -3,6 +3,7 @@
 #include <thread>
 #include <utility>
 
+#include "daemon/render/feature.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/rig/graphics.hpp"
 
@@ -22,7 +23,29 @@ LiveGraphics::LiveGraphics(Parts parts, const ObserverCalibration& calibration,
   keeper_.start();
 }
 
+// Pipelines are compiled while the scene is made and the cameras are opened, so that the first
+// picture also comes sooner.
+void LiveGraphics::begin_ahead() {
+  ahead_.reset();
+  are_ahead_ = false;
+  const bool is_processor = render::memory_of(*parts_.device).read_back;
+  if (is_processor) return;
+  ahead_.emplace(parts_.device, [this] {
+    return render::reachable_bits(parts_.set, parts_.scene, calibration_.lens.has_value());
+  });
+}
+
+// Asking a driver for all that it has compiled takes a moment, in which no picture comes. So that
+// is done once all pipelines are there, and not after each of them.
+void LiveGraphics::keep_programs() {
+  if (ahead_ && !ahead_->is_done()) return;
+  if (ahead_ && !std::exchange(are_ahead_, true))
+    parts_.kept.metrics.count("all pipelines are made ahead");
+  render::keep_programs(*parts_.device);
+}
+
 void LiveGraphics::make_stage() {
+  begin_ahead();
   stage_.emplace(parts_.device, parts_.set, calibration_, parts_.scene,
                  pipeline::RenderStageOptions{
                      .renderer = std::exchange(parts_.renderer, nullptr),
@@ -41,6 +64,7 @@ void LiveGraphics::make_stage() {
 }
 
 void LiveGraphics::drop_stage() {
+  ahead_.reset();
   parts_.render.use_none();
   stage_.reset();
   parts_.renderer.reset();
@@ -58,6 +82,7 @@ GpuKeeper::Gpu LiveGraphics::gpu() {
           .open =
               [this] {
                 parts_.renderer.reset();  // it is of the device that was lost
+                ahead_.reset();           // likewise
                 render::reopen_device(*parts_.device, parts_.set.quality.cpu_instead);
               },
           .name = [this] { return render::drawing_device(*parts_.device); },
@@ -92,7 +117,7 @@ std::optional<Shot> LiveGraphics::next_picture() {
       shot = parts_.render.next(renew);
       if (!shot) return rendering_.had_nothing_to_do();
       begun_anew_ = 0;
-      if (render::is_open(*parts_.device)) render::keep_programs(*parts_.device);
+      if (render::is_open(*parts_.device)) keep_programs();
     });
     if (!is_well) {
       drop_stage();

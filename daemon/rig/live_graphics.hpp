@@ -12,6 +12,7 @@
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/pipeline/stage_keeper.hpp"
+#include "daemon/render/pipelines_ahead.hpp"
 #include "daemon/render/renderer.hpp"
 #include "daemon/rig/gpu_keeper.hpp"
 #include "daemon/rig/live_render.hpp"
@@ -39,6 +40,8 @@ class LiveGraphics {
   GpuKeeper::Gpu gpu();
   void make_stage();
   void drop_stage();
+  void begin_ahead();
+  void keep_programs();
   void begin_anew();
   void show_plates(std::chrono::milliseconds time);
 
@@ -48,7 +51,10 @@ class LiveGraphics {
   std::optional<pipeline::RenderStage> stage_;
   GpuKeeper keeper_;
   pipeline::StageKeeper rendering_;
-  int begun_anew_ = 0;  // renderers since the last picture, beside the first
+  int begun_anew_ = 0;      // renderers since the last picture, beside the first
+  bool are_ahead_ = false;  // what ahead_ had to do is done and counted
+  // Nothing where the device is the processor. It is gone before the device is opened again.
+  std::optional<render::PipelinesAhead> ahead_;
 };
 
 }  // namespace previz::rig

@@ -280,15 +280,18 @@ void LiveRender::start(const Look& look, Shot shot) {
 }
 
 // Counts the hand-overs, waits and copies between the computer and the device, which take time that
-// no pass explains.
+// no pass explains, and the pipelines, each of which the picture that waits for it may miss.
 void LiveRender::count_work() {
   const render::DeviceWork work = stage_->renderer()->work();
   const render::DeviceWork before = std::exchange(counted_, work);
-  metrics_.device_counted("graphics", {{"submissions", work.submissions - before.submissions},
-                                       {"waits", work.waits - before.waits},
-                                       {"allocations", work.allocations - before.allocations},
-                                       {"bytes up", work.bytes_up - before.bytes_up},
-                                       {"bytes down", work.bytes_down - before.bytes_down}});
+  metrics_.device_counted(
+      "graphics", {{"submissions", work.submissions - before.submissions},
+                   {"waits", work.waits - before.waits},
+                   {"allocations", work.allocations - before.allocations},
+                   {"bytes up", work.bytes_up - before.bytes_up},
+                   {"bytes down", work.bytes_down - before.bytes_down},
+                   {"pipelines awaited", work.pipelines_awaited - before.pipelines_awaited},
+                   {"pipelines made ahead", work.pipelines_ahead - before.pipelines_ahead}});
   metrics_.passes_ran(stage_->renderer()->take_times());
 }
 

@@ -78,4 +78,31 @@ TEST_F(RigAsAGraphicsCard, ShowsPicturesFromTheCardsMemory) {
   EXPECT_FALSE(metrics_.counts.contains("screen: device trouble")) << log_.text();
 }
 
+// Whatever a button can switch, the pipelines for it are there.
+TEST_F(RigAsAGraphicsCard, CompilesNothingWhenAButtonIsPressed) {
+  std::uint64_t awaited = 0;
+  run_rendering([&] {
+    until_metrics("all pipelines are made ahead", [&](const nlohmann::json& metrics) {
+      if (!metrics.contains("counts")) return false;
+      if (!metrics.at("counts").contains("all pipelines are made ahead")) return false;
+      awaited = metrics.at("devices").at("graphics").at("pipelines awaited").get<std::uint64_t>();
+      return true;
+    });
+    const auto press_and_see = [&](const std::string& button) {
+      press(button);
+      until_more(2);
+      until_rendered(2);
+    };
+    for (const char* button : {"accumulate", "estimator", "light_mode", "estimator", "light_mode",
+                               "light_mode", "accumulate"})
+      press_and_see(button);
+    press("refine");
+    until_frozen(8);
+  });
+  const auto& counted = metrics_.devices.at("graphics");
+  EXPECT_EQ(counted.at("pipelines awaited"), awaited);
+  EXPECT_GT(counted.at("pipelines made ahead"), 0u);
+  EXPECT_EQ(count_said("light: sources"), 1);
+}
+
 }  // namespace previz::rig::overlap_test

@@ -1,0 +1,79 @@
+#include "daemon/render/pipelines_ahead.hpp"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <exception>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "daemon/render/denoiser.hpp"
+#include "daemon/render/history.hpp"
+#include "daemon/render/presenter.hpp"
+#include "daemon/render/wavefront.hpp"
+#include "daemon/report/log.hpp"
+
+namespace previz::render {
+namespace {
+
+constexpr int niceness = 10;  // cameras, recording and pictures go before
+
+// Returns what a shown picture with these features is made by, and then what averages it.
+std::vector<Pass> passes_for(std::uint32_t features) {
+  std::vector<Pass> passes = Wavefront::passes_for(features);
+  const auto add = [&](std::span<const Pass> more) {
+    passes.insert(passes.end(), more.begin(), more.end());
+  };
+  add(Presenter::passes());
+  add(Denoiser::passes());
+  add(History::passes());
+  return passes;
+}
+
+// Reports the first failure only: the others most often have the same cause.
+class Failures {
+ public:
+  void add(const std::exception& error) {
+    if (std::exchange(is_reported_, true)) return;
+    report::log({report::Severity::warning, "render",
+                 std::string("a shader could not be compiled ahead, so that a button may hold up "
+                             "the picture: ") +
+                     error.what()});
+  }
+
+ private:
+  bool is_reported_ = false;
+};
+
+}  // namespace
+
+PipelinesAhead::PipelinesAhead(std::shared_ptr<Device> device,
+                               std::function<std::vector<std::uint32_t>()> reachable)
+    : device_(std::move(device)),
+      reachable_(std::move(reachable)),
+      thread_([this](const std::stop_token& stop) {
+        work(stop);
+        is_done_ = true;
+      }) {}
+
+void PipelinesAhead::work(const std::stop_token& stop) const {
+  // The niceness is that of this thread only, and may only be refused.
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), niceness);
+  Failures failures;
+  try {
+    for (const std::uint32_t features : reachable_())
+      for (const Pass& pass : passes_for(features)) {
+        if (stop.stop_requested()) return;
+        try {
+          compile_ahead(*device_, pass, features);
+        } catch (const std::exception& error) {
+          failures.add(error);
+        }
+      }
+  } catch (const std::exception& error) {  // there is no memory for the list
+    failures.add(error);
+  }
+}
+
+}  // namespace previz::render
