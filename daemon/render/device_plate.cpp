@@ -70,8 +70,13 @@ bool may_yuv_be_at_least(const Frame& frame, std::uint32_t least) {
 
 }  // namespace
 
-DevicePlate::DevicePlate(Device& device)
-    : device_(device), kernel_(device, "plate_codes", plate_codes_spv) {
+std::span<const Pass> DevicePlate::passes() {
+  static constexpr Pass all[] = {{"plate_codes", plate_codes_spv, false}};
+  return all;
+}
+
+DevicePlate::DevicePlate(Device& device) : device_(device) {
+  make_kernels({&kernel_}, device, passes());
   reserve(0);
 }
 

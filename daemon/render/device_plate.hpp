@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "daemon/render/kernel.hpp"
 #include "drivers/frame.hpp"
@@ -13,6 +14,7 @@ namespace previz::render {
 class DevicePlate {
  public:
   explicit DevicePlate(Device& device);
+  static std::span<const Pass> passes();  // of its kernels
 
   // Uploads the bytes of the frame, and records what makes codes of them: those of to_plate(), bit
   // for bit. Throws as check_size().

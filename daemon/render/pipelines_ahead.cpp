@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "daemon/render/denoiser.hpp"
+#include "daemon/render/device_plate.hpp"
 #include "daemon/render/history.hpp"
 #include "daemon/render/presenter.hpp"
 #include "daemon/render/wavefront.hpp"
@@ -25,6 +26,7 @@ std::vector<Pass> passes_for(std::uint32_t features) {
   const auto add = [&](std::span<const Pass> more) {
     passes.insert(passes.end(), more.begin(), more.end());
   };
+  add(DevicePlate::passes());
   add(Presenter::passes());
   add(Denoiser::passes());
   add(History::passes());
