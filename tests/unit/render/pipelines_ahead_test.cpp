@@ -122,7 +122,8 @@ TEST(PipelinesAhead, ThatAPictureNeedsMeanwhileAreMadeOnceAndHoldUpNoOther) {
   EXPECT_TRUE(
       wait_until("both are awaited", [&] { return device->work().pipelines_awaited == 2; }));
   is_to_end.set_value();
-  EXPECT_EQ(waits.get(), device->program(&shader, {}, make));
+  const render::Device::ProgramPtr waited_for = waits.get();
+  EXPECT_EQ(waited_for, device->program(&shader, {}, make));
   EXPECT_EQ(device->made().programs, 2u);
   EXPECT_EQ(device->work().pipelines_awaited, 2u);
 }
