@@ -22,9 +22,11 @@ struct OsdText {
   friend bool operator==(const OsdText&, const OsdText&) = default;
 };
 
-// The boxes of each corner stand beside each other; notices are stacked at the bottom centre.
+// The boxes of each corner stand beside each other; notices are stacked at the bottom centre, and
+// the lines of the column below each other at the left, under the upper corners.
 struct OsdPage {
   std::vector<OsdText> top_left, top_right, bottom_left, bottom_right, notices;
+  std::vector<OsdText> column = {};
 
   friend bool operator==(const OsdPage&, const OsdPage&) = default;
 };

@@ -88,6 +88,7 @@ std::vector<Overlay> OsdPainter::paint(const OsdPage& page) const {
   };
   for (const auto& row : top) put(row);
   const Rows said = notices(page.notices, room);
+  for (const auto& row : column(page.column, room - said.size())) put(row);
   y = height_ - margin_ + gap_ -
       static_cast<int>(said.size() + bottom.size()) * (box_height_ + gap_);
   for (const auto& row : said) put(row);
@@ -164,21 +165,34 @@ OsdPainter::Rows OsdPainter::rows_of(const std::vector<OsdText>& left,
   return rows;
 }
 
-OsdPainter::Rows OsdPainter::notices(const std::vector<OsdText>& notices, std::size_t most) const {
+// Breaks texts into at most so many lines. The last of them says how many more there are, with
+// these words after the number.
+std::vector<OsdText> OsdPainter::stacked(const std::vector<OsdText>& texts, std::size_t most,
+                                         const OsdText& hidden) const {
   std::vector<OsdText> lines;
-  for (const OsdText& notice : notices)
-    for (OsdText& line : broken(notice)) lines.push_back(std::move(line));
-  if (lines.size() > most) {
-    const std::size_t hidden = lines.size() - most + 1;
-    lines.resize(most);
-    if (most > 0)
-      lines.back() = {std::to_string(hidden) + " more lines in the log", OsdTone::warning};
-  }
+  for (const OsdText& text : texts)
+    for (OsdText& line : broken(text)) lines.push_back(std::move(line));
+  if (lines.size() <= most) return lines;
+  const std::size_t number = lines.size() - most + 1;
+  lines.resize(most);
+  if (most > 0) lines.back() = {std::to_string(number) + hidden.text, hidden.tone};
+  return lines;
+}
+
+OsdPainter::Rows OsdPainter::notices(const std::vector<OsdText>& notices, std::size_t most) const {
+  const OsdText hidden{" more lines in the log", OsdTone::warning};
   Rows rows;
-  for (const OsdText& line : lines) {
+  for (const OsdText& line : stacked(notices, most, hidden)) {
     const int width = width_of(line);
     rows.push_back({{(width_ - width) / 2, 0, line, width}});
   }
+  return rows;
+}
+
+OsdPainter::Rows OsdPainter::column(const std::vector<OsdText>& texts, std::size_t most) const {
+  Rows rows;
+  for (const OsdText& line : stacked(texts, most, {" more lines"}))
+    rows.push_back({{margin_, 0, line, width_of(line)}});
   return rows;
 }
 

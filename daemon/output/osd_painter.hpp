@@ -18,8 +18,9 @@ class OsdPainter {
              const std::filesystem::path& font = default_font());
 
   // Returns boxes within the screen that do not overlap. Boxes that do not fit beside each other go
-  // to further rows; text that is too long for a row is broken. If rows run out, the last notice
-  // says how many are hidden, and the permanent texts lose their lower rows.
+  // to further rows; text that is too long for a row is broken. If rows run out, the column has
+  // those that the notices leave; the last line of each says how many are hidden, and the permanent
+  // texts lose their lower rows.
   std::vector<Overlay> paint(const OsdPage& page) const;
 
  private:
@@ -34,7 +35,10 @@ class OsdPainter {
   bool fits(const std::string& text) const;  // true: fits in one row
   std::vector<OsdText> broken(const OsdText& words) const;
   Rows rows_of(const std::vector<OsdText>& left, const std::vector<OsdText>& right) const;
+  std::vector<OsdText> stacked(const std::vector<OsdText>& texts, std::size_t most,
+                               const OsdText& hidden) const;
   Rows notices(const std::vector<OsdText>& notices, std::size_t most) const;
+  Rows column(const std::vector<OsdText>& texts, std::size_t most) const;
   Overlay draw(const Box& box) const;
 
   const int width_, height_;

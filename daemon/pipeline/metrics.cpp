@@ -68,6 +68,7 @@ void Metrics::passes_ran(const render::DeviceTimes& times) {
     all.runs += pass.count;
     all.busy_s += 1e-3 * pass.ms;
   }
+  if (times.untimed > 0) count_named(counts_, untimed_passes) += times.untimed;
 }
 
 Metrics::Watch::Watch(Metrics& metrics, std::string stage, std::function<Waiting()> waiting)

@@ -53,7 +53,8 @@ class Metrics {
   void count(const std::string& event, std::uint64_t times = 1);
   // Adds what the device has counted since the last call for this device.
   void device_counted(const std::string& device, const DeviceCounters& more);
-  // Adds how long the passes of the device have taken since the last call.
+  // Adds how long the passes of the device have taken since the last call. Those that were too many
+  // to be timed are counted as an event, `untimed_passes`.
   void passes_ran(const render::DeviceTimes& times);
   void shown(double latency_s);
 
@@ -77,6 +78,7 @@ class Metrics {
 
   static constexpr std::size_t most_names = 256;
   static constexpr const char* other_names = "others";
+  static constexpr const char* untimed_passes = "passes not timed";
 
  private:
   static constexpr std::size_t latency_window = 4096;  // frames

@@ -1,9 +1,8 @@
 #include "daemon/render/card_pictures.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
-
-#include "drivers/error.hpp"
 
 namespace previz::render {
 namespace {
@@ -21,16 +20,16 @@ bool fits(const CardMemory& memory, int width, int height) {
 
 }  // namespace
 
-CardPictures::Slot CardPictures::create(int width, int height) {
+// Adds memory for one picture. Returns false where the device has none.
+bool CardPictures::create(int width, int height) {
   Slot slot;
   slot.shared = {new Shared, Retire<Shared>{&device_}};
   const auto [columns, rows] =
       std::pair(static_cast<std::uint32_t>(width), static_cast<std::uint32_t>(height));
-  using Usage = vk::ImageUsageFlagBits;
   const vk::ExternalMemoryImageCreateInfo external(handle_type);
-  vk::ImageCreateInfo image({}, vk::ImageType::e2D, vk::Format::eR8G8B8A8Unorm, {columns, rows, 1},
-                            1, 1, vk::SampleCountFlagBits::e1, vk::ImageTiling::eOptimal,
-                            Usage::eTransferDst | Usage::eSampled);
+  vk::ImageCreateInfo image({}, vk::ImageType::e2D, card_picture_format, {columns, rows, 1}, 1, 1,
+                            vk::SampleCountFlagBits::e1, vk::ImageTiling::eOptimal,
+                            card_picture_usage);
   image.pNext = &external;
   try {
     slot.shared->image = vk::raii::Image(device_.vk(), image);
@@ -55,13 +54,13 @@ CardPictures::Slot CardPictures::create(int width, int height) {
     slot.memory = std::move(memory);
   } catch (const vk::DeviceLostError&) {
     throw;
-  } catch (const vk::SystemError& error) {
-    throw Error("Vulkan: " + device_.name() +
-                " has no room for a picture to be shown: " + error.what());
+  } catch (const vk::SystemError&) {
+    return false;
   }
   slot.is_held = std::make_shared<std::atomic<bool>>(false);
   ++device_.submissions().work.allocations;
-  return slot;
+  slots_.push_back(std::move(slot));
+  return true;
 }
 
 CardPictures::Lent CardPictures::lend(int width, int height) {
@@ -73,8 +72,8 @@ CardPictures::Lent CardPictures::lend(int width, int height) {
     return fits(*slot.memory, width, height) && !slot.is_held->load();
   });
   if (free == slots_.end()) {
-    if (slots_.size() >= most) return {};
-    free = slots_.insert(slots_.end(), create(width, height));
+    if (slots_.size() >= most || !create(width, height)) return {};
+    free = std::prev(slots_.end());
   }
   free->is_held->store(true);
   return {CardPicturePtr(new CardPicture{free->memory, next_number()},

@@ -17,8 +17,8 @@ class CardPictures {
   explicit CardPictures(Device& device) : device_(device) {}
 
   // Returns memory for a picture of this size, and the image in it, to be written by copy commands
-  // that are recorded next; no picture where all are held, or the device shares none. Throws
-  // previz::Error where it has no memory for it.
+  // that are recorded next; no picture where all are held, or the device has no memory for it or
+  // shares none.
   struct Lent {
     CardPicturePtr picture;
     vk::Image image;
@@ -39,7 +39,7 @@ class CardPictures {
     std::shared_ptr<const CardMemory> memory;
     std::shared_ptr<std::atomic<bool>> is_held;
   };
-  Slot create(int width, int height);
+  bool create(int width, int height);
 
   Device& device_;
   std::vector<Slot> slots_;

@@ -78,13 +78,32 @@ std::string lacks(const vk::raii::PhysicalDevice& physical) {
   return {};
 }
 
+bool can_export_pictures(const vk::raii::PhysicalDevice& physical) {
+  const vk::PhysicalDeviceExternalImageFormatInfo shared(
+      vk::ExternalMemoryHandleTypeFlagBits::eOpaqueFd);
+  vk::PhysicalDeviceImageFormatInfo2 image(card_picture_format, vk::ImageType::e2D,
+                                           vk::ImageTiling::eOptimal, card_picture_usage);
+  image.pNext = &shared;
+  try {
+    const auto properties =
+        physical.getImageFormatProperties2<vk::ImageFormatProperties2,
+                                           vk::ExternalImageFormatProperties>(image);
+    return static_cast<bool>(properties.get<vk::ExternalImageFormatProperties>()
+                                 .externalMemoryProperties.externalMemoryFeatures &
+                             vk::ExternalMemoryFeatureFlagBits::eExportable);
+  } catch (const vk::SystemError&) {  // no such images, shared or not
+    return false;
+  }
+}
+
 // Returns what names the device for OpenGL ES, if images that it makes can be shared with that.
 std::optional<CardIdentity> card_of(const vk::raii::PhysicalDevice& physical) {
   const auto extensions = physical.enumerateDeviceExtensionProperties();
   const auto is_sharing = [](const vk::ExtensionProperties& extension) {
     return std::string_view(extension.extensionName) == VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME;
   };
-  if (std::ranges::none_of(extensions, is_sharing)) return std::nullopt;
+  if (std::ranges::none_of(extensions, is_sharing) || !can_export_pictures(physical))
+    return std::nullopt;
   const auto ids =
       physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceIDProperties>()
           .get<vk::PhysicalDeviceIDProperties>();

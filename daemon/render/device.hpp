@@ -25,6 +25,11 @@ namespace previz::render {
 struct Program;  // a compute pass compiled for a device: daemon/render/kernel.hpp
 class Staging;   // daemon/render/buffer.hpp
 
+// The images of pictures that are shared with a display (drivers/card_picture.hpp).
+inline constexpr vk::Format card_picture_format = vk::Format::eR8G8B8A8Unorm;
+inline constexpr vk::ImageUsageFlags card_picture_usage =
+    vk::ImageUsageFlagBits::eTransferDst | vk::ImageUsageFlagBits::eSampled;
+
 class Device {
  public:
   // Throws previz::Error saying what is missing and which devices were found.

@@ -30,9 +30,9 @@ constexpr std::uint64_t camera_bytes = 3;
 
 // A pixel of a band takes twelve arrays of four floats and one of four halves in the denoiser,
 // two of them for the light of photons (denoiser.hpp), one of four floats in the presenter
-// (presenter.hpp), a word of flags, and its part of the shown picture.
+// (presenter.hpp), a word of flags, and its part of the shown picture, also as the screen has it.
 constexpr std::uint64_t band_bytes =
-    13 * 4 * sizeof(float) + 4 * sizeof(std::uint16_t) + sizeof(std::uint32_t) + plate_bytes;
+    13 * 4 * sizeof(float) + 4 * sizeof(std::uint16_t) + 2 * sizeof(std::uint32_t) + plate_bytes;
 
 std::uint64_t pixels_of(int width, int height) {
   return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);

@@ -271,6 +271,13 @@ Outcome Controls::apply(const set::ToggleOsd&) {
   return {look_.osd ? "overlay on" : "overlay off", false, {}};
 }
 
+// Whoever asks for the times while the overlay is hidden wants to see them.
+Outcome Controls::apply(const set::TogglePassTimes&) {
+  look_.pass_times = !look_.pass_times || !look_.osd;
+  if (look_.pass_times) look_.osd = true;
+  return {look_.pass_times ? "pass times on" : "pass times off", false, {}};
+}
+
 Outcome Controls::apply(const set::SelectObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
   object_ = around(object_, effect.next, objects_.size());

@@ -43,6 +43,7 @@ struct LivePipeline::Impl {
   pipeline::Newest<std::vector<pipeline::FoundLamp>> found{{}};
   pipeline::Newest<std::map<std::string, std::string>> recorded_variants{{}};
   pipeline::Newest<set::PreviewStep> governed{{.samples = 0, .denoise = {}}};
+  pipeline::Newest<std::optional<PassTimes>> pass_times{std::nullopt};
   pipeline::BoundedQueue<Shot> snapshots{4};  // closed by the render thread, or at a stop
   std::stop_callback<std::function<void()>> close_snapshots{stop_source.get_token(),
                                                             [this] { snapshots.close(); }};
@@ -71,8 +72,8 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       tracking({parts.set, parts.cameras, parts.recorder, parts.look, light, parts.kept},
                calibration),
       render(parts.set, parts.look, parts.inbox, parts.kept.metrics, parts.kept.reports,
-             {tracked, reviewed, snapshots, found, governed, recorded_variants}, parts.wants,
-             stop_source.get_token()),
+             {tracked, reviewed, snapshots, found, governed, recorded_variants, pass_times},
+             parts.wants, stop_source.get_token()),
       graphics({parts.set, parts.scene, parts.device, parts.renderer, render, rendered, parts.kept},
                calibration, stop_source.get_token()),
       output({parts.set, parts.recorder, parts.look, parts.show, parts.kept}, calibration) {
@@ -187,6 +188,10 @@ set::PreviewStep LivePipeline::governed() const {
 
 std::map<std::string, std::string> LivePipeline::recorded_variants() const {
   return *impl_->recorded_variants.get();
+}
+
+std::optional<PassTimes> LivePipeline::pass_times() const {
+  return *impl_->pass_times.get();
 }
 
 }  // namespace previz::rig

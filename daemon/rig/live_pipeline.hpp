@@ -15,6 +15,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <stop_token>
 #include <string>
 
@@ -29,6 +30,7 @@
 #include "daemon/rig/controls.hpp"
 #include "daemon/rig/inbox.hpp"
 #include "daemon/rig/live_render.hpp"
+#include "daemon/rig/pass_meter.hpp"
 #include "daemon/scene/scene.hpp"
 
 namespace previz::rig {
@@ -68,6 +70,8 @@ class LivePipeline {
   set::PreviewStep governed() const;
   // Returns the variants, by object, that the last picture of a take in review was recorded with.
   std::map<std::string, std::string> recorded_variants() const;
+  // Returns what each pass takes, while Look::pass_times asks for it and pictures are rendered.
+  std::optional<PassTimes> pass_times() const;
 
  private:
   struct Impl;

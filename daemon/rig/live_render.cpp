@@ -5,6 +5,8 @@
 #include <thread>
 #include <utility>
 
+#include "drivers/host_clock.hpp"
+
 namespace previz::rig {
 
 using pipeline::Shot;
@@ -58,6 +60,7 @@ void LiveRender::drop_under_way(const char* cause) {
 void LiveRender::use_none(const char* cause) {
   drop_under_way(cause);
   stage_ = nullptr;
+  measure_nothing();
   refining_ = false;
   refined_.reset();
 }
@@ -128,6 +131,7 @@ std::optional<Shot> LiveRender::refine_round(const Look& look) {
   const int round = next_round(look);
   if (!stage_->add_samples(round)) {
     refining_ = false;
+    count_work();
     return std::nullopt;
   }
   shot.samples += round;
@@ -139,6 +143,7 @@ std::optional<Shot> LiveRender::refine_round(const Look& look) {
   refined_ = shown;
   metrics_.busy("refine", seconds_since(begin));
   metrics_.count("refine rounds");
+  measure(count_work(), /*is_round=*/true);
   return shown;
 }
 
@@ -281,7 +286,8 @@ void LiveRender::start(const Look& look, Shot shot) {
 
 // Counts the hand-overs, waits and copies between the computer and the device, which take time that
 // no pass explains, and the pipelines, each of which the picture that waits for it may miss.
-void LiveRender::count_work() {
+// Returns how long the passes took.
+render::DeviceTimes LiveRender::count_work() {
   const render::DeviceWork work = stage_->renderer()->work();
   const render::DeviceWork before = std::exchange(counted_, work);
   metrics_.device_counted(
@@ -292,7 +298,24 @@ void LiveRender::count_work() {
                    {"bytes down", work.bytes_down - before.bytes_down},
                    {"pipelines awaited", work.pipelines_awaited - before.pipelines_awaited},
                    {"pipelines made ahead", work.pipelines_ahead - before.pipelines_ahead}});
-  metrics_.passes_ran(stage_->renderer()->take_times());
+  render::DeviceTimes times = stage_->renderer()->take_times();
+  metrics_.passes_ran(times);
+  return times;
+}
+
+// Averages what was rendered, if the crew looks at it.
+void LiveRender::measure(render::DeviceTimes times, bool is_round) {
+  const std::shared_ptr<const Look> look = look_.get();
+  if (!look->osd || !look->pass_times) return measure_nothing();
+  if (!meter_) meter_.emplace();
+  if (meter_->add(monotonic_ns(), std::move(times), is_round))
+    channels_.pass_times.set(meter_->read());
+}
+
+void LiveRender::measure_nothing() {
+  if (!meter_) return;
+  meter_.reset();
+  channels_.pass_times.set(std::nullopt);
 }
 
 // A reviewed frame was not captured now, so its loss is not counted.
@@ -325,9 +348,10 @@ Shot LiveRender::complete() {
   if (shot.render_s > 0) shot.render_s = took;
   metrics_.busy("render", took);
   count_shown(under_way.of_take);
-  count_work();
+  render::DeviceTimes times = count_work();
   if (!shot.whole) return shot;
   if (shot.on_card) metrics_.count("shown from the card's memory");
+  if (shot.untouched.empty()) measure(std::move(times), /*is_round=*/false);
   if (shot.untouched.empty()) {
     if (under_way.is_for_card && !shot.on_card)
       metrics_.count("copied to the screen for want of card memory");

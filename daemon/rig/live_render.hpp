@@ -19,6 +19,7 @@
 #include "daemon/report/reports.hpp"
 #include "daemon/rig/controls.hpp"
 #include "daemon/rig/inbox.hpp"
+#include "daemon/rig/pass_meter.hpp"
 
 namespace previz::rig {
 
@@ -32,6 +33,8 @@ class LiveRender {
     pipeline::Newest<set::PreviewStep>& governed;               // output, as the rate is held
     // Output: the variants, by object, that the last reviewed frame was recorded with.
     pipeline::Newest<std::map<std::string, std::string>>& recorded_variants;
+    // Output: what each pass takes, while the overlay shows it.
+    pipeline::Newest<std::optional<PassTimes>>& pass_times;
   };
 
   // Returns where the pictures of this device are wanted; empty: they come down.
@@ -95,7 +98,9 @@ class LiveRender {
   void start(const Look& look, pipeline::Shot shot);
   pipeline::Shot complete();
   bool wants_snapshot(const Look& look) const;
-  void count_work();
+  render::DeviceTimes count_work();
+  void measure(render::DeviceTimes times, bool is_round);
+  void measure_nothing();
   void count_failed(bool of_take, const char* cause);
   void counting_failure(bool of_take, const std::function<void()>& work);
   void keep_as_good(const pipeline::Shot& shot, std::optional<session::SceneState> recorded);
@@ -116,7 +121,8 @@ class LiveRender {
   const std::stop_token stop_;
   pipeline::RenderStage* stage_ = nullptr;
   std::optional<pipeline::Governor> governor_;
-  render::DeviceWork counted_;  // of the stage's device
+  render::DeviceWork counted_;      // of the stage's device
+  std::optional<PassMeter> meter_;  // of the stage's device, while the overlay shows the times
   bool is_first_ = true;  // no picture came of the stage yet; the first one compiles its pipelines
   // The last shots with pose and light, of the rig and of the take in review: their frames only.
   std::optional<pipeline::Shot> good_, good_of_take_;

@@ -17,6 +17,7 @@ using tracking::TrackStatus;
 constexpr std::uint64_t little_space = 10'000'000'000;  // bytes, besides the reserve
 constexpr double long_silence_s = 2;                    // of a disk
 constexpr double long_behind_s = 1;                     // of a recording
+constexpr std::size_t most_passes = 7;                  // that have a line of their own
 
 // "1 tag", "2 tags"
 std::string counted(int number, const char* noun) {
@@ -115,6 +116,43 @@ void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page
     page.notices.push_back({line_of(news), tone_of(news.severity)});
 }
 
+// Two digits of what takes little, and one of what takes long.
+std::string milliseconds(double ms) {
+  return fmt::format("{:.{}f} ms", ms, ms < 9.995 ? 2 : 1);
+}
+
+std::vector<OsdText> lines_of(const PassTimes& times) {
+  const std::vector<PassTimes::Pass>& passes = times.passes;
+  const char* const each = times.is_of_rounds ? "round" : "frame";
+  double sum_ms = 0, others_ms = 0;
+  std::vector<OsdText> longest;
+  for (const PassTimes::Pass& pass : passes) {
+    sum_ms += pass.ms;
+    if (longest.size() < most_passes)
+      longest.push_back({pass.name + ": " + milliseconds(pass.ms)});
+    else
+      others_ms += pass.ms;
+  }
+  std::vector<OsdText> lines = {{"graphics card: " + milliseconds(sum_ms) + " per " + each},
+                                {"computer waits: " + milliseconds(times.waited_ms)}};
+  lines.insert(lines.end(), longest.begin(), longest.end());
+  if (passes.size() > most_passes)
+    lines.push_back({counted(static_cast<int>(passes.size() - most_passes), "other") + ": " +
+                     milliseconds(others_ms)});
+  if (times.untimed > 0)
+    lines.push_back({fmt::format("{:.0f} passes per {} are too many to be timed",
+                                 std::ceil(times.untimed), each),
+                     OsdTone::warning});
+  return lines;
+}
+
+std::vector<OsdText> pass_times(const RigFacts& rig) {
+  if (!rig.look.pass_times) return {};
+  if (!rig.pass_times) return {{"graphics card: no frame timed yet"}};
+  if (rig.pass_times->is_timed) return lines_of(*rig.pass_times);
+  return {{(rig.device.empty() ? "this computer" : rig.device) + " does not time its passes"}};
+}
+
 }  // namespace
 
 PictureFacts facts_of(const pipeline::Shot& shot) {
@@ -161,6 +199,7 @@ OsdPage osd_page(const RigFacts& rig, const PictureFacts* picture, const Pace& p
     page.bottom_right.push_back(tracking_words(*picture));
   }
   page.bottom_right.push_back({std::string("light: ") + set::name_of(look.light_mode)});
+  page.column = pass_times(rig);
   add_notices(rig, picture, page);
   return page;
 }

@@ -12,6 +12,7 @@
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/rig/controls.hpp"
+#include "daemon/rig/pass_meter.hpp"
 #include "drivers/session/session.hpp"
 
 namespace previz::rig {
@@ -50,6 +51,7 @@ struct RigFacts {
   std::optional<std::uint64_t> free_bytes;  // for takes, without the reserve; none: not known
   std::vector<report::Notice> news;         // actions of buttons and of the rig, oldest first
   std::vector<report::Notice> troubles;     // troubles of devices
+  std::optional<PassTimes> pass_times;      // none: nothing was rendered since they were asked for
 };
 
 // Returns the overlay's words. `picture` is null before the first picture.

@@ -461,6 +461,7 @@ void Rig::show_facts() {
   facts.free_bytes = free_bytes_;
   facts.news = parts_.kept.reports.news();
   facts.troubles = parts_.kept.reports.troubles();
+  if (facts.look.pass_times) facts.pass_times = pipeline_.pass_times();
   parts_.show_facts(std::move(facts));
 }
 

@@ -28,6 +28,7 @@ constexpr Action action_table[] = {
     {"light_mode", "Next way to use the light camera's picture: image, sources, hybrid.", NextLightMode{}},
     {"debug_view", "Show the next layer in place of the composite.", NextView{}},
     {"osd", "Hide the overlay; press again to show it.", ToggleOsd{}},
+    {"pass_times", "Show on the overlay how long each pass of the graphics card takes (a hidden overlay comes back); press again to hide the times.", TogglePassTimes{}},
     {"next_object", "Select the next virtual object.", SelectObject{1}},
     {"previous_object", "Select the previous virtual object.", SelectObject{-1}},
     {"move_left", "Move the selected object a step along -X.", MoveObject{{-1, 0, 0}}},

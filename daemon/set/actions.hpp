@@ -40,6 +40,7 @@ struct NextEstimator {};
 struct NextLightMode {};
 struct NextView {};
 struct ToggleOsd {};
+struct TogglePassTimes {};
 struct SelectObject {
   int next = 1;
 };
@@ -75,9 +76,9 @@ struct ChangeExposure {
 using Effect =
     std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits, OtherSet,
                  ChangeSamples, HoldRate, ToggleAccumulation, NextEstimator, NextLightMode,
-                 NextView, ToggleOsd, SelectObject, MoveObject, TurnObject, ScaleObject,
-                 ChangeVariant, ResetObject, PlayAnimations, HoldAnimations, SelectLight, DimLight,
-                 TintLight, ResetLight, ChangeExposure>;
+                 NextView, ToggleOsd, TogglePassTimes, SelectObject, MoveObject, TurnObject,
+                 ScaleObject, ChangeVariant, ResetObject, PlayAnimations, HoldAnimations,
+                 SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
 
 struct Action {
   const char* name;

@@ -63,8 +63,8 @@ class Pages {
  private:
   static std::string words_of(const output::OsdPage& page) {
     std::string words;
-    for (const auto* texts :
-         {&page.top_left, &page.top_right, &page.bottom_left, &page.bottom_right, &page.notices})
+    for (const auto* texts : {&page.top_left, &page.top_right, &page.column, &page.notices,
+                              &page.bottom_left, &page.bottom_right})
       for (const output::OsdText& text : *texts) words += text.text + "\n";
     return words;
   }

@@ -13,7 +13,8 @@ OsdPage busy_page() {
       {{"6 tags · ±0.83 mm"}, {"light: hybrid"}},
       {{"film camera: usb-Acme_4K_0123456789abcdef-video-index0 was unplugged; it is opened anew",
         OsdTone::alarm},
-       {"card moved by +0.010 +0.000 +0.000 m"}}};
+       {"card moved by +0.010 +0.000 +0.000 m"}},
+      {{"graphics card: 18.4 ms per frame"}, {"extend: 6.10 ms"}, {"shade: 3.05 ms"}}};
 }
 
 bool overlap(const Overlay& a, const Overlay& b) {
@@ -25,7 +26,7 @@ TEST(OsdPainter, BoxesAreOnTheScreenAndApart) {
        {std::pair{1920, 1080}, {1280, 720}, {640, 480}, {720, 1280}}) {
     const OsdPainter painter(width, height, 1.0 / 24);
     const std::vector<Overlay> boxes = painter.paint(busy_page());
-    EXPECT_GE(boxes.size(), 10u);
+    EXPECT_GE(boxes.size(), width > height ? 13u : 10u);
     for (std::size_t i = 0; i < boxes.size(); ++i) {
       const Overlay& box = boxes[i];
       EXPECT_TRUE(box.x >= 0 && box.y >= 0 && box.x + box.width <= width &&
@@ -97,6 +98,24 @@ TEST(OsdPainter, NoticesBeyondTheScreenAreCounted) {
   const std::vector<Overlay> said = painter.paint(page);
   ASSERT_EQ(said.size(), boxes.size());
   EXPECT_EQ(said.back().rgba, boxes.back().rgba);
+}
+
+// The notices come first, because a column can wait.
+TEST(OsdPainter, AColumnHasTheRowsThatNoticesLeave) {
+  OsdPage page;
+  for (int i = 0; i < 100; ++i) page.column.push_back({"pass " + std::to_string(i)});
+  const OsdPainter painter(320, 240, 0.04);
+  const std::vector<Overlay> alone = painter.paint(page);
+  EXPECT_LT(alone.size(), 100u);
+  EXPECT_GT(alone.size(), 5u);
+  page.column.resize(alone.size());
+  page.column.back() = {std::to_string(100 - alone.size() + 1) + " more lines"};
+  EXPECT_EQ(painter.paint(page).back().rgba, alone.back().rgba);
+  page.notices = {{"disk not responding for 5 s", OsdTone::alarm}};
+  const std::vector<Overlay> both = painter.paint(page);
+  ASSERT_EQ(both.size(), alone.size());
+  for (std::size_t i = 1; i < both.size(); ++i) EXPECT_FALSE(overlap(both[i], both[i - 1])) << i;
+  EXPECT_NE(both.back().rgba, alone.back().rgba);
 }
 
 TEST(OsdPainter, AFontThatIsMissingIsNamed) {

@@ -190,11 +190,12 @@ TEST(Metrics, JsonHasRatesDropsAndLatency) {
   metrics.count("plate untouched: pose lost", 2);
   for (int i = 1; i <= 100; ++i) metrics.shown(0.001 * i);
   for (int i = 0; i < 2; ++i)
-    metrics.passes_ran({.passes = {{"extend", 35, 5.0}, {"shade", 18, 4.0}}});
+    metrics.passes_ran({.passes = {{"extend", 35, 5.0}, {"shade", 18, 4.0}}, .untimed = 12});
   const auto json = nlohmann::json::parse(to_json(metrics.snapshot(2.0)));
   EXPECT_EQ(json["passes"]["extend"]["runs"], 70);
   EXPECT_DOUBLE_EQ(json["passes"]["extend"]["busy_s"], 0.01);
   EXPECT_DOUBLE_EQ(json["passes"]["shade"]["busy_s"], 0.008);
+  EXPECT_EQ(json["counts"][Metrics::untimed_passes], 24);
   EXPECT_EQ(json["stages"]["render"]["frames"], 50);
   EXPECT_DOUBLE_EQ(json["stages"]["render"]["frames_per_second"], 25);
   EXPECT_NEAR(json["stages"]["render"]["busy_fraction"], 0.75, 1e-12);

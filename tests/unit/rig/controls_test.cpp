@@ -395,6 +395,20 @@ TEST(Controls, AveragingOverFramesIsTheSetsUntilItIsSwitched) {
   EXPECT_FALSE(Controls(set).look().accumulates);
 }
 
+TEST(Controls, PassTimesBringBackAnOverlayThatIsHidden) {
+  Desk desk;
+  const Look& look = desk.controls.look();
+  EXPECT_FALSE(look.pass_times);
+  EXPECT_EQ(desk("pass_times").said, "pass times on");
+  EXPECT_TRUE(look.pass_times);
+  EXPECT_EQ(desk("pass_times").said, "pass times off");
+  EXPECT_TRUE(look.osd);
+  desk("pass_times");
+  desk("osd");
+  EXPECT_EQ(desk("pass_times").said, "pass times on");
+  EXPECT_TRUE(look.pass_times && look.osd);
+}
+
 TEST(Controls, EstimatorAndViewGoAround) {
   Desk desk;
   EXPECT_EQ(desk("estimator").said, "estimator: difference");

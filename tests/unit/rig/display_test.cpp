@@ -141,6 +141,49 @@ TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
   EXPECT_EQ(output::read_png(directory_ / "live/screen.png").width, screen_width);
 }
 
+// A device that is treated as a graphics card, and times its passes as one does.
+TEST_F(RigDisplay, ShowsWhatEachPassTakesWhileItIsAskedFor) {
+  options_.device.as_gpu = options_.device.times_passes = true;
+  write_set(
+      "[display]\ndriver = \"headless\"\nmode = \"480x270\"\nscale = \"1:1\"\n"
+      "text_height = 0.05\n");
+  std::vector<output::OsdText> column;
+  run_rendering([&] {
+    const auto shows_times = [](const std::string& of_what) {
+      return [of_what](const OsdPage& page) {
+        return says(page.column, of_what) && says(page.column, "computer waits: ");
+      };
+    };
+    pages_.until_words("2 samples");
+    press("record");
+    press("osd");
+    pages_.until([](const OsdPage& page) { return page == OsdPage{}; });
+    press("pass_times");
+    pages_.until(shows_times(" ms per frame"), "frames' times");
+    column = pages_.next().column;
+    press("refine");
+    pages_.until(shows_times(" ms per round"), "rounds' times");
+    press("pass_times");
+    pages_.until(
+        [](const OsdPage& page) { return page.column.empty() && says(page.top_left, "LIVE"); });
+    press("record");
+    until_said("12A_take001 is finished");
+  });
+  EXPECT_EQ(as_expected_, count_);
+  ASSERT_EQ(column.size(), 2u + 7 + 1) << "the sum, the wait, the longest passes and the others";
+  for (std::size_t i = 2; i < 2 + 7; ++i) {
+    const std::string& words = column[i].text;
+    EXPECT_TRUE(metrics_.passes.contains(words.substr(0, words.find(": ")))) << words;
+    EXPECT_TRUE(words.ends_with(" ms")) << words;
+  }
+  // What the crew looked at is no part of the take.
+  session::Session take = session::open_session(take_folder());
+  const auto stream = session::open_stream(take, "observer");
+  for (std::size_t i = 0; i < stream->records().size(); ++i)
+    EXPECT_EQ(stream->read(i)->bytes,
+              test::small_take_frame(static_cast<int>(stream->records()[i].sequence % 8)).bytes);
+}
+
 // What a driver's release() does is seen on a real screen (KmsScreen): here that it comes, once,
 // and that nothing is shown between it and the next picture.
 TEST_F(RigDisplay, IsReleasedInStandbyAndBackAfterIt) {

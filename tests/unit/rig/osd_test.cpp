@@ -162,6 +162,61 @@ TEST(OsdWords, BeforeTheFirstPicture) {
   EXPECT_TRUE(page.bottom_left.empty());
 }
 
+PassTimes times_of(std::vector<PassTimes::Pass> passes) {
+  PassTimes times;
+  times.is_timed = true;
+  times.passes = std::move(passes);
+  times.waited_ms = 12.34;
+  return times;
+}
+
+TEST(OsdWords, ThePassesTimesStandInTheColumnWhileTheyAreAskedFor) {
+  const PictureFacts picture = tracked();
+  RigFacts rig = in(Mode::live);
+  rig.pass_times = times_of({{"extend", 9.996}, {"shade", 6.1}, {"present", 0.042}});
+  EXPECT_TRUE(osd_page(rig, &picture, pace).column.empty());
+  rig.look.pass_times = true;
+  EXPECT_EQ(osd_page(rig, &picture, pace).column, (Texts{{"graphics card: 16.1 ms per frame"},
+                                                         {"computer waits: 12.3 ms"},
+                                                         {"extend: 10.0 ms"},
+                                                         {"shade: 6.10 ms"},
+                                                         {"present: 0.04 ms"}}));
+  rig.pass_times->is_of_rounds = true;
+  EXPECT_EQ(osd_page(rig, &picture, pace).column.front(),
+            OsdText{"graphics card: 16.1 ms per round"});
+}
+
+TEST(OsdWords, PassesBeyondTheSevenLongestAreSummed) {
+  RigFacts rig = in(Mode::live);
+  rig.look.pass_times = true;
+  std::vector<PassTimes::Pass> passes;
+  for (int i = 0; i < 8; ++i) passes.push_back({"pass " + std::to_string(i), 8.0 - i});
+  rig.pass_times = times_of(passes);
+  const Texts column = osd_page(rig, nullptr, {}).column;
+  ASSERT_EQ(column.size(), 2u + 7 + 1);
+  EXPECT_EQ(column.front(), OsdText{"graphics card: 36.0 ms per frame"});
+  EXPECT_EQ(column[8], OsdText{"pass 6: 2.00 ms"});
+  EXPECT_EQ(column.back(), OsdText{"1 other: 1.00 ms"});
+  passes.push_back({"pass 8", 0.5});
+  rig.pass_times = times_of(passes);
+  EXPECT_EQ(osd_page(rig, nullptr, {}).column.back(), OsdText{"2 others: 1.50 ms"});
+}
+
+TEST(OsdWords, PassesWithoutTimes) {
+  RigFacts rig = in(Mode::live);
+  rig.look.pass_times = true;
+  const auto column = [&] { return osd_page(rig, nullptr, {}).column; };
+  EXPECT_EQ(column(), (Texts{{"graphics card: no frame timed yet"}}));
+  rig.pass_times = PassTimes{};
+  EXPECT_EQ(column(), (Texts{{"this computer does not time its passes"}}));
+  rig.device = "llvmpipe (CPU)";
+  EXPECT_EQ(column(), (Texts{{"llvmpipe (CPU) does not time its passes"}}));
+  rig.pass_times = times_of({{"extend", 4}});
+  rig.pass_times->untimed = 119.5;
+  EXPECT_EQ(column().back(),
+            (OsdText{"120 passes per frame are too many to be timed", OsdTone::warning}));
+}
+
 // The deviation of a place is the root of its three variances' sum.
 TEST(OsdWords, FactsOfAShot) {
   pipeline::Shot shot;

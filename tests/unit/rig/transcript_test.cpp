@@ -83,6 +83,8 @@ constexpr Line transcript[] = {
     {"live", "button live: live", "Mode=live", "LIVE"},
     {"osd", "button osd: overlay off", "", no_words},
     {"osd", "button osd: overlay on"},
+    {"pass_times", "button pass_times: pass times on", "", "does not time its passes"},  // the CPU
+    {"pass_times", "button pass_times: pass times off"},
     {"keep", "button keep: buttons have changed nothing; nothing to keep (refused)", "", "buttons have changed nothing"},
     {"reload_set", "button reload_set: reloading the set file", "", "LIVE"},
     {"next_set", "button next_set: next set", "", "LIVE"},
