@@ -11,6 +11,7 @@ using namespace std::chrono_literals;
 
 constexpr int cycles = 100;
 constexpr int warm_cycles = 20;  // until what is made once a process has been made
+constexpr int last_cycles = 10;  // in which what stays is looked for
 
 LifelineOptions impatient(milliseconds stall_timeout) {
   return {5000ms, stall_timeout, 0ms, {10ms, 40ms}};
@@ -56,9 +57,11 @@ TEST_P(Replugging, AHundredTimesLeavesNothingBehind) {
       "device", [this] { return device_->open(); }, impatient(device_->stall_timeout()));
   lifeline.start();
   std::size_t descriptors = 0, bytes = 0;
+  std::size_t bytes_after = std::numeric_limits<std::size_t>::max();  // in the last cycles
   for (int cycle = 0; cycle < cycles; ++cycle) {
     ASSERT_NO_FATAL_FAILURE(take(lifeline, 2));
     if (cycle == warm_cycles) descriptors = open_descriptors(), bytes = live_bytes();
+    if (cycle >= cycles - last_cycles) bytes_after = std::min(bytes_after, live_bytes());
     device_->unplug();
     lifeline.next(0ms);
     device_->plug();
@@ -68,9 +71,11 @@ TEST_P(Replugging, AHundredTimesLeavesNothingBehind) {
   EXPECT_EQ(open_descriptors(), descriptors);
   // malloc gives no less than 32 bytes: the smallest object left behind in each cycle is as much.
   // Three quarters of it leave room for 1920 bytes that differ once, as between two states of a
-  // queue (1296 were seen).
+  // queue. On a busy machine more may wait in one at any moment (2016 were seen): of the last
+  // cycles the one with the least tells what stays.
   const std::size_t least = std::max<std::size_t>(24, device_->kept_by_others());
-  const std::size_t kept = live_bytes() - std::min(bytes, live_bytes());
+  bytes_after = std::min(bytes_after, live_bytes());
+  const std::size_t kept = bytes_after - std::min(bytes, bytes_after);
   RecordProperty("bytes_a_cycle", static_cast<int>(kept / (cycles - warm_cycles)));
   EXPECT_LT(kept, (cycles - warm_cycles) * least);
   EXPECT_GE(lifeline.counters().at("opened"), std::uint64_t{cycles} + 1);

@@ -209,12 +209,12 @@ TEST_F(Check, SaysHowMuchMemoryFramesTakeThatAreAveraged) {
   expect_said(words + "2591 MiB");
   ASSERT_EQ(check(lens + "[quality]\nneighbours=1\n"), 0) << said_;
   expect_said(words + "1713 MiB");
-  expect_said("picture in the GPU's memory: about 1155 MiB");
+  expect_said("picture in the GPU's memory: about 1169 MiB");
   for (const char* quality : {"neighbours=0\n", "denoise=false\n"}) {
     ASSERT_EQ(check(lens + "[quality]\n" + quality), 0) << said_;
     EXPECT_THAT(said_, Not(HasSubstr(words)));
   }
-  expect_said("picture in the GPU's memory: about 823 MiB");
+  expect_said("picture in the GPU's memory: about 837 MiB");
 }
 
 // One of a virtual object is chosen by the set, and all are there for the buttons.
