@@ -60,6 +60,8 @@ class Bench {
       more.triangles = triangles;
       measure(frames, more, report_.by_triangles);
     }
+    if (!frames.no_display().empty())
+      report_.left_out.push_back({"the way to the display", frames.no_display()});
     try {
       measure_set();
     } catch (const render::DeviceLost&) {

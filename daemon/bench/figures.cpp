@@ -63,6 +63,11 @@ std::string passes_of(const FrameFigures& frame) {
       "  submissions {}, waits {}, allocations {}, barriers {}, {:.1f} MB up, {:.1f} MB down\n",
       work.submissions, work.waits, work.allocations, work.barriers,
       static_cast<double>(work.bytes_up) / 1e6, static_cast<double>(work.bytes_down) / 1e6);
+  if (frame.screen_ms > 0)
+    text += fmt::format(
+        "  {:.1f} ms from a frame's arrival to the display, for which the picture {}\n"
+        "  (camera readout, tracking and the screen's refresh come on top)\n",
+        frame.latency_ms(), frame.comes_down ? "comes down" : "stays on the card");
   const double rays = rays_a_second(frame.rays, frame.ms_of("extend"));
   const double shadow_rays = rays_a_second(frame.shadow_rays, frame.ms_of("shadow"));
   if (rays > 0)
@@ -90,6 +95,9 @@ Json json_of(const FrameFigures& frame) {
           {"waited_ms", frame.waited_ms},
           {"cpu_ms", frame.cpu_ms},
           {"device_ms", frame.passes_ms()},
+          {"screen_ms", frame.screen_ms},
+          {"latency_ms", frame.latency_ms()},
+          {"comes_down", frame.comes_down},
           {"rays", frame.rays},
           {"rays_per_s", rays_a_second(frame.rays, frame.ms_of("extend"))},
           {"shadow_rays", frame.shadow_rays},

@@ -12,18 +12,21 @@
 
 namespace previz::bench {
 
-// A live frame, as `previzd run` makes it: averaged with those before it, denoised, and brought
-// down into the computer's memory. All times are means over `frames` frames.
+// A live frame, as `previzd run` makes it of the camera's bytes: averaged with those before it,
+// denoised, and shown by a display without a screen (headless), for which it comes down into the
+// computer's memory only if it has to. All times are means over `frames` frames.
 struct FrameFigures {
   int width = 0, height = 0, samples = 0;
   std::size_t triangles = 0;
   int frames = 0;
-  double ms = 0;         // of the whole frame, on the clock, from the plate to its picture
-  double begin_ms = 0;   // of these, until the plate and the scene are on their way up
+  double ms = 0;         // of the whole frame, on the clock, from the camera's bytes to its picture
+  double begin_ms = 0;   // of these, until the bytes and the scene are on their way up
   double record_ms = 0;  // until all commands are recorded
   double show_ms = 0;    // until the picture is there, waiting for the device included
   double waited_ms = 0;  // of this, waiting for the device
   double cpu_ms = 0;     // of all the computer's cores
+  double screen_ms = 0;  // after `ms`, until the display has the picture; 0: there is none
+  bool comes_down = true;  // the picture, to be shown
   // From one picture to the next where frames follow at once: the next one is begun before the
   // picture of the last one is there.
   double interval_ms = 0;
@@ -32,6 +35,9 @@ struct FrameFigures {
   std::uint64_t rays = 0, shadow_rays = 0;  // a frame
   render::DeviceWork work;                  // a frame's, rounded up
 
+  // From the arrival of a frame to the display. The camera's readout, tracking, and what is left
+  // until the screen's next refresh come on top.
+  double latency_ms() const { return ms + screen_ms; }
   double rate() const { return interval_ms > 0 ? 1000 / interval_ms : 0; }
   double passes_ms() const;
   double ms_of(const std::string& pass) const;  // 0: it did not run

@@ -9,7 +9,9 @@
 
 #include "daemon/bench/shapes.hpp"
 #include "daemon/lighting/environment.hpp"
-#include "drivers/plate.hpp"
+#include "drivers/display_drivers.hpp"
+#include "drivers/error.hpp"
+#include "drivers/frame.hpp"
 
 namespace previz::bench {
 namespace {
@@ -65,6 +67,17 @@ std::size_t triangles_of(const scene::Scene& scene) {
   return count;
 }
 
+// What a camera with colour filters gives.
+FramePtr grey_mosaic(int width, int height) {
+  Frame frame;
+  frame.format = PixelFormat::gray8;
+  frame.bayer = BayerPattern::rggb;
+  frame.width = width;
+  frame.height = height;
+  frame.bytes.assign(frame_bytes(frame.format, width, height), 128);
+  return std::make_shared<const Frame>(std::move(frame));
+}
+
 std::uint64_t share(std::uint64_t before, std::uint64_t after, int frames) {
   const auto count = static_cast<std::uint64_t>(frames);
   return (after - before + count - 1) / count;
@@ -76,7 +89,7 @@ struct Frames::Stage {
   FrameWish wish;
   std::size_t triangles;
   std::unique_ptr<render::Renderer> renderer;
-  PlatePtr plate;
+  FramePtr camera;
   glm::dmat4 view;
   int frames = 0;
   FrameFigures sums;
@@ -134,19 +147,35 @@ void Frames::make_stage(const FrameWish& wish) {
     stage_->renderer->resize(camera_of(wish.width, wish.height));
   }
   stage_->wish = wish;
-  stage_->plate = std::make_shared<const Plate>(
-      Plate{wish.width, wish.height, 8,
-            std::vector<std::uint16_t>(std::size_t{3} * wish.width * wish.height, 128)});
+  stage_->camera = grey_mosaic(wish.width, wish.height);
+  open_display(wish.width, wish.height);
+}
+
+void Frames::open_display(int width, int height) {
+  display_.reset();  // before another one has its context in this thread
+  no_display_.clear();
+  try {
+    display_ = display_driver("headless").open({"", DisplayMode{width, height, 0}, {}});
+  } catch (const Error& error) {
+    no_display_ = error.what();
+  }
+}
+
+// Returns where the next picture is wanted, as `previzd run` decides.
+render::ShowTo Frames::where() const {
+  const std::optional<CardIdentity> card = stage_->renderer->card();
+  const bool is_on_card = card && display_ && display_->card() == card;
+  return {.computer = !is_on_card, .card = is_on_card};
 }
 
 void Frames::begin() {
   Stage& stage = *stage_;
   ++stage.frames;
-  stage.renderer->begin({.plate = stage.plate,
-                         .world_from_camera = glm::translate(
+  stage.renderer->begin({.world_from_camera = glm::translate(
                              stage.view, glm::dvec3(0.002 * (stage.frames % 16), 0, 0)),
                          .accumulates = true,
-                         .dithers = true});
+                         .dithers = true,
+                         .camera = stage.camera});
 }
 
 // Renders frames as `previzd run` does where the next one waits already.
@@ -156,7 +185,7 @@ double Frames::interval_ms(int samples, int frames) {
   for (int i = 0; i <= frames; ++i) {
     begin();
     stage_->renderer->render(samples);
-    render::Showing showing = stage_->renderer->show_later(true);
+    render::Showing showing = stage_->renderer->show_later(true, where());
     if (last) last->finish();
     if (i == 1) start = Clock::now();
     last = std::move(showing);
@@ -174,8 +203,11 @@ void Frames::frame(int samples) {
   const Clock::time_point begun = Clock::now();
   renderer.render(samples);
   const Clock::time_point recorded = Clock::now();
-  renderer.show(true);
+  const render::Showing::Shown picture = renderer.show_later(true, where()).finish();
   const Clock::time_point shown = Clock::now();
+  if (display_) display_->show({picture.picture, {}, picture.on_card});
+  stage.sums.comes_down = picture.picture != nullptr;
+  stage.sums.screen_ms += 1e3 * seconds_between(shown, Clock::now());
   stage.sums.begin_ms += 1e3 * seconds_between(start, begun);
   stage.sums.record_ms += 1e3 * seconds_between(begun, recorded);
   stage.sums.show_ms += 1e3 * seconds_between(recorded, shown);
@@ -197,7 +229,8 @@ FrameFigures Frames::measure(const FrameWish& wish) {
   const render::Counters counters = stage_->renderer->counters();
 
   FrameFigures figures = stage_->sums;
-  for (double* of_all : {&figures.begin_ms, &figures.record_ms, &figures.show_ms})
+  for (double* of_all :
+       {&figures.begin_ms, &figures.record_ms, &figures.show_ms, &figures.screen_ms})
     *of_all /= frames;
   figures.width = wish.width;
   figures.height = wish.height;

@@ -69,7 +69,8 @@ std::string parts(const FrameFigures& frame) {
   const std::pair<const char*, double> host[] = {
       {"placing the frame", frame.begin_ms},
       {"recording commands", frame.record_ms},
-      {"having the picture, without waiting", std::max(frame.show_ms - frame.waited_ms, 0.0)}};
+      {"having the picture, without waiting", std::max(frame.show_ms - frame.waited_ms, 0.0)},
+      {"giving it to the display", frame.screen_ms}};
   double longest = 0;
   for (const auto& [name, ms] : passes) longest = std::max(longest, ms);
   for (const auto& [name, ms] : host) longest = std::max(longest, ms);
@@ -82,10 +83,13 @@ std::string parts(const FrameFigures& frame) {
          fmt::format(
              "<p class=\"soft\">Blue: passes of the graphics card, by its own clock{}. Brown: "
              "the computer, which then waits for the card for {} ms. Submissions: {}; waits: {}; "
-             "allocations: {}; barriers: {}. {:.1f} MB go up, and {:.1f} MB come down.</p>\n",
+             "allocations: {}; barriers: {}. {:.1f} MB go up, and {:.1f} MB come down. From a "
+             "frame's arrival to the display it takes {} ms; camera readout, tracking and the "
+             "screen's refresh come on top.</p>\n",
              frame.passes.empty() ? " (it has none)" : "", number(frame.waited_ms),
              work.submissions, work.waits, work.allocations, work.barriers,
-             static_cast<double>(work.bytes_up) / 1e6, static_cast<double>(work.bytes_down) / 1e6);
+             static_cast<double>(work.bytes_up) / 1e6, static_cast<double>(work.bytes_down) / 1e6,
+             number(frame.latency_ms()));
 }
 
 std::string machine(const BenchReport& report) {
