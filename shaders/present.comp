@@ -9,8 +9,6 @@
 
 #include "shaders/lib/show.glsl"
 
-// The least signal that becomes each code.
-layout(scalar) readonly buffer LeastOf { float least_of[]; };
 layout(scalar) readonly buffer Composites { vec4 composites[]; };  // as composite.comp writes them
 layout(scalar) readonly buffer Signals { vec4 signals[]; };        // denoised, and so are the next two
 layout(scalar) readonly buffer Uncovered { vec4 uncovered[]; };
@@ -21,24 +19,10 @@ layout(scalar) readonly buffer Caustics { vec4 caustics[]; };    // what the sig
 layout(scalar) readonly buffer Thresholds { float thresholds[]; };
 layout(scalar) writeonly buffer Picture { uint picture[]; };     // samples, as the plate's
 
-// Returns the largest code that stands for no more than `signal`, and 0 for NaN. With `rounds`, what is
-// nearer to the next code already counts as that.
-uint code_of(float signal, bool rounds) {
-  if (!(signal > 0.0)) return 0u;
-  uint code = 0u;
-  uint above = show.most + 1u;
-  while (above - code > 1u) {
-    const uint middle = (code + above) / 2u;
-    if ((rounds ? least_of[middle] : signal_of[middle]) <= signal) code = middle;
-    else above = middle;
-  }
-  return code;
-}
-
 // Returns the code below or above `signal`, so that the mean over the pattern's pixels is the signal
 // itself. Each channel has the pattern at another place, so that they are not raised together.
 uint dithered_code_of(float signal, uvec2 at, uint channel) {
-  const uint code = code_of(signal, false);
+  const uint code = code_of(signal, show.most, false);
   if (code == show.most || !(signal > 0.0)) return code;
   const float share = (signal - signal_of[code]) / (signal_of[code + 1u] - signal_of[code]);
   const uvec2 in_pattern = (at + channel * uvec2(23u, 41u)) % DITHER_SIDE;
@@ -73,7 +57,7 @@ uvec3 codes_of(uint pixel) {
   }
   const vec3 exposed = show.exposure * radiance;
   if (show.is_dithered == 0u)
-    return uvec3(code_of(exposed.r, true), code_of(exposed.g, true), code_of(exposed.b, true));
+    return uvec3(code_of(exposed.r, show.most, true), code_of(exposed.g, show.most, true), code_of(exposed.b, show.most, true));
   const uint in_picture = show.in_picture + index;
   const uvec2 at = uvec2(in_picture % show.width, in_picture / show.width);
   return uvec3(dithered_code_of(exposed.r, at, 0u), dithered_code_of(exposed.g, at, 1u),

@@ -170,9 +170,10 @@ bool RenderStage::begin(Shot& shot, bool is_live) {
   stands_elsewhere_ = false;
   // A shot with layers can be compared with what is rendered from a take, so it stands alone.
   const bool is_shown_live = is_live && !options_.layers;
-  const bool is_whole = options_.scale == 1;  // the device then makes the plate
-  renderer_->begin({.plate = is_whole ? nullptr : sized(shot),
-                    .exposure = exposure_of(shot),
+  const bool is_scaled = options_.scale != 1;
+  if (is_scaled)
+    if (const std::optional<std::string> why = why_other_size(*shot.frame)) throw Error(*why);
+  renderer_->begin({.exposure = exposure_of(shot),
                     .world_from_camera = *camera,
                     .seed = options_.seeds_shots
                                 ? std::optional(seed_of(set_.estimation.seed, shot.index))
@@ -180,7 +181,8 @@ bool RenderStage::begin(Shot& shot, bool is_live) {
                     .accumulates = is_shown_live && set_.quality.accumulate,
                     .stands_aside = is_live && set_.quality.accumulate,
                     .dithers = is_shown_live,
-                    .camera = is_whole ? shot.frame : nullptr});
+                    .camera = shot.frame,
+                    .is_scaled = is_scaled});
   return true;
 }
 

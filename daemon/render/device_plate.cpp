@@ -7,6 +7,7 @@
 
 #include "shaders/lib/render_shared.h"
 #include "shaders/plate_codes.spv.h"
+#include "shaders/plate_scale.spv.h"
 
 namespace previz::render {
 namespace {
@@ -71,47 +72,72 @@ bool may_yuv_be_at_least(const Frame& frame, std::uint32_t least) {
 }  // namespace
 
 std::span<const Pass> DevicePlate::passes() {
-  static constexpr Pass all[] = {{"plate_codes", plate_codes_spv, false}};
+  static constexpr Pass all[] = {{"plate_codes", plate_codes_spv, false},
+                                 {"plate_scale", plate_scale_spv, false}};
   return all;
 }
 
 DevicePlate::DevicePlate(Device& device) : device_(device) {
-  make_kernels({&kernel_}, device, passes());
-  reserve(0);
+  make_kernels({&codes_of_bytes_, &scale_}, device, passes());
+  reserve(codes_, 0);
 }
 
-void DevicePlate::reserve(std::size_t samples) {
+void DevicePlate::reserve(Buffer& codes, std::size_t pixels) {
   // Two pixels are written at once.
   const vk::DeviceSize size =
-      std::max<std::size_t>((samples + 5) / 6, 1) * 6 * sizeof(std::uint16_t);
-  if (codes_.size < size) codes_ = create_storage_buffer(device_, size);
+      std::max<std::size_t>((pixels + 1) / 2, 1) * 6 * sizeof(std::uint16_t);
+  if (codes.size < size) codes = create_storage_buffer(device_, size);
+}
+
+// Runs a kernel that works on two pixels of the picture in each invocation.
+template <typename Constants>
+void DevicePlate::dispatch(Kernel& kernel, Constants constants, std::size_t pixels,
+                           const Buffers& buffers) {
+  const auto pairs = static_cast<std::uint32_t>((pixels + 1) / 2);
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
+    for (constants.first = 0; constants.first < pairs; constants.first += most_pairs)
+      kernel.dispatch({commands, constants, buffers},
+                      std::min(pairs - constants.first, most_pairs));
+  });
 }
 
 void DevicePlate::take(const Plate& plate) {
-  reserve(plate.samples.size());
+  reserve(codes_, plate.samples.size() / 3);
   if (!plate.samples.empty())
     upload_bytes(device_, codes_, std::as_bytes(std::span(plate.samples)));
 }
 
 void DevicePlate::take(const Frame& frame) {
+  make_codes(frame, codes_);
+}
+
+void DevicePlate::take(const Frame& frame, int width, int height, const CodeTables& tables) {
+  make_codes(frame, whole_);
+  const std::size_t pixels = static_cast<std::size_t>(width) * height;
+  reserve(codes_, pixels);
+  Buffers buffers{{"plate_samples", &whole_}, {"small_samples", &codes_}};
+  tables.add_to(buffers);
+  gpu::GpuPlateScale constants{};
+  constants.from_width = static_cast<std::uint32_t>(frame.width);
+  constants.from_height = static_cast<std::uint32_t>(frame.height);
+  constants.width = static_cast<std::uint32_t>(width);
+  constants.height = static_cast<std::uint32_t>(height);
+  constants.most = (1u << tables.bits) - 1;
+  dispatch(scale_, constants, pixels, buffers);
+}
+
+void DevicePlate::make_codes(const Frame& frame, Buffer& codes) {
   check_size(frame);
   const std::span<const std::byte> bytes = std::as_bytes(std::span(frame.bytes));
   const std::size_t pixels = static_cast<std::size_t>(frame.width) * frame.height;
-  reserve(3 * pixels);
-  if (frame.format == PixelFormat::rgb16) return upload_bytes(device_, codes_, bytes);
+  reserve(codes, pixels);
+  if (frame.format == PixelFormat::rgb16) return upload_bytes(device_, codes, bytes);
   if (!yuv_terms_.buffer) upload_storage(device_, yuv_terms_, yuv_of_plates().terms());
   const vk::DeviceSize size = (bytes.size() + 3) / 4 * 4;
   if (bytes_.size < size) bytes_ = create_storage_buffer(device_, size);
   upload_bytes(device_, bytes_, bytes);
-  const Buffers buffers{
-      {"camera_bytes", &bytes_}, {"yuv_terms", &yuv_terms_}, {"plate_samples", &codes_}};
-  gpu::GpuCameraFrame constants = constants_of(frame);
-  const auto pairs = static_cast<std::uint32_t>((pixels + 1) / 2);
-  device_.record([&](const vk::raii::CommandBuffer& commands) {
-    for (; constants.first < pairs; constants.first += most_pairs)
-      kernel_.dispatch({commands, constants, buffers},
-                       std::min(pairs - constants.first, most_pairs));
-  });
+  dispatch(codes_of_bytes_, constants_of(frame), pixels,
+           {{"camera_bytes", &bytes_}, {"yuv_terms", &yuv_terms_}, {"plate_samples", &codes}});
 }
 
 bool has_at_least(const Frame& frame, std::uint32_t least) {

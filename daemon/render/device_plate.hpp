@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <span>
 
+#include "daemon/render/code_tables.hpp"
 #include "daemon/render/kernel.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
@@ -19,6 +20,9 @@ class DevicePlate {
   // Uploads the bytes of the frame, and records what makes codes of them: those of to_plate(), bit
   // for bit. Throws as check_size().
   void take(const Frame& frame);
+  // Does the same, and makes the plate smaller: every pixel has the mean of the linear signal over
+  // its area. `tables` are of the response; neither side may be longer than the frame's.
+  void take(const Frame& frame, int width, int height, const CodeTables& tables);
   // Uploads codes as they are.
   void take(const Plate& plate);
 
@@ -26,11 +30,15 @@ class DevicePlate {
   const Buffer& codes() const { return codes_; }
 
  private:
-  void reserve(std::size_t samples);
+  void reserve(Buffer& codes, std::size_t pixels);
+  void make_codes(const Frame& frame, Buffer& codes);
+  template <typename Constants>
+  void dispatch(Kernel& kernel, Constants constants, std::size_t pixels, const Buffers& buffers);
 
   Device& device_;
-  Kernel kernel_;
+  Kernel codes_of_bytes_, scale_;
   Buffer bytes_, codes_, yuv_terms_;
+  Buffer whole_;  // codes of a picture that is made smaller
 };
 
 // Return whether a sample of the picture may be `least` or more. That of a frame of Y'CbCr is a

@@ -26,6 +26,9 @@ struct FrameInput {
   // The frame as the camera gave it, in place of `plate`, which the device then makes of it. If
   // both are null, the composite is over black.
   FramePtr camera = {};
+  // `camera` is larger than the calibration's picture, and is made smaller: every pixel has the
+  // mean of the linear signal over its area.
+  bool is_scaled = false;
 };
 
 }  // namespace previz::render

@@ -55,14 +55,11 @@ gpu::GpuShow constants_of(const ToPresent& what, int bits, const lighting::Clipp
 }  // namespace
 
 Presenter::Presenter(Device& device, const lighting::Response& response)
-    : device_(device), bits_(response.bits()), clipping_(response.clipping()) {
+    : device_(device),
+      bits_(response.bits()),
+      clipping_(response.clipping()),
+      tables_(device, response) {
   make_kernels({&composite_, &present_, &scan_out_}, device, passes());
-  const std::vector<double>& inverse = response.inverse();
-  upload_storage(device, signal_of_, std::vector<float>(inverse.begin(), inverse.end()));
-  std::vector<float> least;
-  for (std::size_t code = 0; code < inverse.size(); ++code)
-    least.push_back(static_cast<float>(response.least_signal(static_cast<std::uint16_t>(code))));
-  upload_storage(device, least_of_, least);
   static const std::vector<float> pattern = blue_noise(gpu::DITHER_SIDE);
   upload_storage(device, thresholds_, pattern);
 }
@@ -99,7 +96,7 @@ void Presenter::composite(const ToPresent& what, const Denoiser::Band& band, gpu
                           {"pixel_caustics", tile.caustics ? tile.caustics : &tile.pixels},
                           {"caustics", &denoiser.caustic()},
                           {"plate_samples", &what.plate},
-                          {"signal_of", &signal_of_},
+                          {"signal_of", &tables_.signal_of},
                           {"composites", &composites_},
                           {"highlights", &highlights_},
                           {"signals", &denoiser.signal()},
@@ -117,7 +114,7 @@ void Presenter::composite(const ToPresent& what, const Denoiser::Band& band, gpu
 // Adds the band to its past, and puts the result in its place.
 void Presenter::accumulate(const ToPresent& what, const Denoiser::Band& band,
                            const gpu::GpuShow& constants, Denoiser& denoiser) {
-  const Buffers buffers{{"plate_samples", &what.plate},      {"signal_of", &signal_of_},
+  const Buffers buffers{{"plate_samples", &what.plate},      {"signal_of", &tables_.signal_of},
                         {"composites", &composites_},        {"signals", &denoiser.signal()},
                         {"variances", &denoiser.variance()}, {"surfaces", &denoiser.surface()},
                         {"albedos", &denoiser.albedo()},     {"uncovered", &denoiser.uncovered()},
@@ -219,8 +216,8 @@ void Presenter::present_later(const ToPresent& what, Denoiser& denoiser, const D
     constants.in_band = static_cast<std::uint32_t>(first - top);
     const Buffers buffers{
         {"plate_samples", &what.plate},
-        {"signal_of", &signal_of_},
-        {"least_of", &least_of_},
+        {"signal_of", &tables_.signal_of},
+        {"least_of", &tables_.least_of},
         {"thresholds", &thresholds_},
         {"caustics", &denoiser.caustic()},
         {"composites", &composites_},

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "daemon/render/code_tables.hpp"
 #include "daemon/render/composite.hpp"
 #include "daemon/render/denoiser.hpp"
 #include "daemon/render/history.hpp"
@@ -46,6 +47,7 @@ class Presenter {
   Presenter(Device& device, const lighting::Response& response);
   static std::span<const Pass> passes();  // of all its kernels
 
+  const CodeTables& tables() const { return tables_; }
   // Works band by band, with 26 bytes of device memory per pixel beside the denoiser's.
   // `after_band` is called with each band that the denoiser's passes have run over.
   Plate present(const ToPresent& what, Denoiser& denoiser,
@@ -73,7 +75,8 @@ class Presenter {
   lighting::Clipping clipping_;
   Kernel composite_, present_, scan_out_;
   std::size_t pixels_ = 0;
-  Buffer signal_of_, least_of_, thresholds_, composites_, highlights_, picture_, screen_;
+  CodeTables tables_;
+  Buffer thresholds_, composites_, highlights_, picture_, screen_;
 };
 
 }  // namespace previz::render

@@ -28,10 +28,11 @@ namespace previz::render {
 namespace {
 
 struct PlateSize {
-  int width = 0, height = 0, bits = 8;  // without a plate: no pixel
+  int width = 0, height = 0, bits = 8;  // no pixel: any size will do
 };
 
 PlateSize size_of(const FrameInput& input) {
+  if (input.camera && input.is_scaled) return {0, 0, plate_bits(input.camera->format)};
   if (input.camera)
     return {input.camera->width, input.camera->height, plate_bits(input.camera->format)};
   if (input.plate && !input.plate->samples.empty())
@@ -70,6 +71,7 @@ struct Renderer::Impl {
   std::vector<float> radiance_of_codes() const;
   bool has_plate() const { return frame.camera || (frame.plate && !frame.plate->samples.empty()); }
   const Plate& codes();
+  Presenter& shown_by();
   PlateRadiance plate_radiance() {
     return render::plate_radiance(codes(), *response, frame.exposure);
   }
@@ -185,7 +187,11 @@ void Renderer::Impl::upload_plate() {
   const std::uint32_t clipped = response->clipping().from;
   if (frame.camera) {
     is_clipped = has_at_least(*frame.camera, clipped);
-    plate.take(*frame.camera);
+    const PinholeIntrinsics& lens = calibration.intrinsics;
+    if (frame.is_scaled)
+      plate.take(*frame.camera, lens.width, lens.height, shown_by().tables());
+    else
+      plate.take(*frame.camera);
   } else {
     is_clipped = has_at_least(*frame.plate, clipped);
     plate.take(*frame.plate);
@@ -194,9 +200,20 @@ void Renderer::Impl::upload_plate() {
 
 // Returns the plate in the computer's memory.
 const Plate& Renderer::Impl::codes() {
-  if (!frame.plate)
-    frame.plate = std::make_shared<const Plate>(frame.camera ? to_plate(*frame.camera) : Plate());
+  if (frame.plate) return *frame.plate;
+  const PinholeIntrinsics& lens = calibration.intrinsics;
+  const std::size_t count =
+      std::size_t{3} * static_cast<std::size_t>(lens.width) * static_cast<std::size_t>(lens.height);
+  frame.plate = std::make_shared<const Plate>(
+      Plate{lens.width, lens.height, response->bits(),
+            download<std::uint16_t>(*device, plate.codes(), count)});
   return *frame.plate;
+}
+
+// Returns what makes the shown picture, for the response.
+Presenter& Renderer::Impl::shown_by() {
+  if (!presenter) presenter.emplace(*device, *response);
+  return *presenter;
 }
 
 void Renderer::Impl::begin_accumulating() {
@@ -416,7 +433,7 @@ Layers Renderer::layers() const {
 
 ToPresent Renderer::Impl::to_present(bool denoise) {
   if (!denoiser) denoiser.emplace(*device);
-  if (!presenter) presenter.emplace(*device, *response);
+  shown_by();
   const PinholeIntrinsics& lens = calibration.intrinsics;
   return {wavefront->sums(), lens.width, lens.height, plate.codes(), has_plate(),  is_clipped,
           frame.exposure,    rule(),     sampled(),   denoise,       frame.dithers};

@@ -401,6 +401,13 @@ struct GpuCameraFrame {
   uint red_x, red_y;   // column and row, modulo 2, of the red filters
 };
 
+// Push constants of the pass that makes a smaller plate of a plate.
+struct GpuPlateScale {
+  uint from_width, from_height, width, height;  // pixels, the second pair no more than the first
+  uint first;                                   // pair of pixels to begin with
+  uint most;                                    // the largest code
+};
+
 // Push constants of the pass that makes a picture for the screen.
 struct GpuScanOut {
   uint count;    // pixels

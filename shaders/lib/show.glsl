@@ -4,12 +4,11 @@
 #define PREVIZ_SHOW_GLSL
 
 #include "shaders/lib/plate.glsl"
+#include "shaders/lib/response.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(scalar, push_constant) uniform Show { GpuShow show; };
-// The linear signal of each code.
-layout(scalar) readonly buffer SignalOf { float signal_of[]; };
 
 // Gains are limited to this: a larger ratio means nothing, and its square would overflow.
 const float MOST_GAIN = 1e15;

@@ -95,6 +95,48 @@ TEST_P(DevicePlates, RefuseAFrameThatIsCutShort) {
 INSTANTIATE_TEST_SUITE_P(Memory, DevicePlates, ::testing::Bool(),
                          [](const auto& mode) { return mode.param ? "AsAGpu" : "AsACpu"; });
 
+// Returns the mean of the linear signal over the area of a pixel of a smaller picture.
+double mean_signal(const Plate& whole, const lighting::Response& response, int width, int height,
+                   int column, int row, int channel) {
+  const double across = double(whole.width) / width, down = double(whole.height) / height;
+  const auto share = [](int pixel, int index, double side) {
+    return std::max(std::min(pixel + 1.0, (index + 1) * side) - std::max(1.0 * pixel, index * side),
+                    0.0);
+  };
+  double sum = 0;
+  for (int y = 0; y < whole.height; ++y)
+    for (int x = 0; x < whole.width; ++x)
+      sum += share(x, column, across) * share(y, row, down) *
+             response.inverse()[whole.samples[3 * (y * whole.width + x) + channel]];
+  return sum / (across * down);
+}
+
+// Every code of a smaller plate is the one that its mean becomes, or the next one where the mean
+// lies at the very edge between two: single precision is off by at most four roundings, 2^-22.
+TEST_P(DevicePlates, OfSmallerPicturesHaveTheMeans) {
+  for (const Kind& kind : {kinds[0], kinds[1], kinds[5], kinds[9]}) {
+    const Frame frame = random_frame(kind, 32, 24);
+    const Plate whole = to_plate(frame);
+    for (const auto curve : {ResponseCurve::Kind::linear, ResponseCurve::Kind::srgb}) {
+      const lighting::Response response({.kind = curve, .inverse_table = {}}, whole.bits);
+      const render::CodeTables tables(*device_, response);
+      for (const auto& [width, height] : {std::pair{24, 18}, {16, 12}, {11, 9}, {32, 24}, {1, 1}}) {
+        render::DevicePlate plate(*device_);
+        plate.take(frame, width, height, tables);
+        const std::vector<std::uint16_t> codes =
+            codes_of(plate, static_cast<std::size_t>(3 * width * height));
+        for (int i = 0; i < 3 * width * height; ++i) {
+          const double mean =
+              mean_signal(whole, response, width, height, i / 3 % width, i / 3 / width, i % 3);
+          const auto code_of = [&](double off) { return response.forward(mean + off); };
+          ASSERT_GE(codes[i], code_of(-0x1p-22)) << name_of(kind) << " " << width << ", " << i;
+          ASSERT_LE(codes[i], code_of(0x1p-22)) << name_of(kind) << " " << width << ", " << i;
+        }
+      }
+    }
+  }
+}
+
 // A frame may have a code from `least` on exactly where its plate has one; one of Y'CbCr at least
 // there.
 TEST(DevicePlate, KnowsWhetherAFrameMayClip) {
