@@ -86,7 +86,8 @@ class Display {
   // if the graphics card refuses; the display is then lost as well.
   virtual DisplayEvent show(const Screenful& screenful) = 0;
   // Returns the card whose pictures (Screenful::on_card) can be shown; nothing where there is none.
-  // The first one that OpenGL ES refuses is reported as other trouble, and none can be shown then.
+  // One that is refused is reported as other trouble by show(), which then shows `picture` and the
+  // overlays; if the driver refuses one of its own card, there is no such card from then on.
   virtual std::optional<CardIdentity> card() const { return std::nullopt; }
   // Makes the screen dark and leaves it to other programs until the next show(), which takes it
   // back.

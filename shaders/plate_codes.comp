@@ -30,7 +30,7 @@ uint sample_at(uint index) {
 // Returns a sample of the mosaic, which is mirrored about the pixels at its edge.
 int mosaic(int x, int y) {
   const ivec2 last = ivec2(camera.width, camera.height) - 1;
-  const ivec2 at = last - abs(last - abs(ivec2(x, y)));
+  const ivec2 at = max(last - abs(last - abs(ivec2(x, y))), 0);
   return int(sample_at(uint(at.y) * camera.width + uint(at.x)));
 }
 

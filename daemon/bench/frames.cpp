@@ -205,7 +205,10 @@ void Frames::frame(int samples) {
   const Clock::time_point recorded = Clock::now();
   const render::Showing::Shown picture = renderer.show_later(true, where()).finish();
   const Clock::time_point shown = Clock::now();
-  if (display_) display_->show({picture.picture, {}, picture.on_card});
+  if (display_) {
+    const DisplayEvent event = display_->show({picture.picture, {}, picture.on_card});
+    if (const auto* trouble = std::get_if<DeviceTrouble>(&event)) no_display_ = trouble->what;
+  }
   stage.sums.comes_down = picture.picture != nullptr;
   stage.sums.screen_ms += 1e3 * seconds_between(shown, Clock::now());
   stage.sums.begin_ms += 1e3 * seconds_between(start, begun);

@@ -181,7 +181,7 @@ bool RenderStage::begin(Shot& shot, bool is_live) {
                     .accumulates = is_shown_live && set_.quality.accumulate,
                     .stands_aside = is_live && set_.quality.accumulate,
                     .dithers = is_shown_live,
-                    .camera = shot.frame,
+                    .camera = camera_frame(shot),
                     .is_scaled = is_scaled});
   return true;
 }

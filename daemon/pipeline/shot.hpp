@@ -28,8 +28,9 @@ namespace previz::pipeline {
 struct Shot {
   // The observer camera fills these in.
   std::uint64_t index = 0;  // place in the stream, from 0
-  FramePtr frame;
-  PlatePtr plate;  // converted frame; null until plate_of() was called
+  FramePtr frame;           // in colour, if the camera's is a mosaic and that was made of it
+  FramePtr camera;          // as the camera gave it, if that is another one; null: it is `frame`
+  PlatePtr plate;           // converted frame; null until plate_of() was called
   std::chrono::steady_clock::time_point arrived;  // when the daemon got it
 
   // Tracking and lighting fill these in.
@@ -65,6 +66,11 @@ struct Shot {
 inline const glm::dmat4* world_from_camera(const Shot& shot) {
   if (shot.shown_pose) return &shot.shown_pose->world_from_camera;
   return shot.track.pose ? &shot.track.pose->world_from_camera : nullptr;
+}
+
+// Returns the frame that the renderer makes the plate of: as few bytes as there are.
+inline const FramePtr& camera_frame(const Shot& shot) {
+  return shot.camera ? shot.camera : shot.frame;
 }
 
 // Returns the shot's frame as a plate, which the first call converts.

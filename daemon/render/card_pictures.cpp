@@ -4,6 +4,8 @@
 #include <iterator>
 #include <utility>
 
+#include "drivers/error.hpp"
+
 namespace previz::render {
 namespace {
 
@@ -56,6 +58,8 @@ bool CardPictures::create(int width, int height) {
     throw;
   } catch (const vk::SystemError&) {
     return false;
+  } catch (const Error&) {  // no such memory
+    return false;
   }
   slot.is_held = std::make_shared<std::atomic<bool>>(false);
   ++device_.submissions().work.allocations;
@@ -64,7 +68,8 @@ bool CardPictures::create(int width, int height) {
 }
 
 CardPictures::Lent CardPictures::lend(int width, int height) {
-  if (!device_.card()) return {};
+  const std::uint32_t longest = device_.limits().maxImageDimension2D;
+  if (!device_.card() || static_cast<std::uint32_t>(std::max(width, height)) > longest) return {};
   std::erase_if(slots_, [&](const Slot& slot) {
     return !fits(*slot.memory, width, height) && !slot.is_held->load();
   });

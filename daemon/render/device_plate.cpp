@@ -56,17 +56,41 @@ bool is_any_16_bit_at_least(std::span<const std::uint8_t> bytes, std::uint32_t l
   return false;
 }
 
+struct Range {
+  std::uint8_t low = 255, high = 0;
+};
+
+// This too becomes wide instructions.
+Range range_of(std::span<const std::uint8_t> codes) {
+  Range range;
+  for (const std::uint8_t code : codes) {
+    range.low = std::min(range.low, code);
+    range.high = std::max(range.high, code);
+  }
+  return range;
+}
+
+// The brightest luma of a few pixels in a row with the strongest chroma around them is a bound.
 bool may_yuv_be_at_least(const Frame& frame, std::uint32_t least) {
+  constexpr std::size_t pixels = 64;
   const std::span<const std::uint8_t> bytes = frame.bytes;
-  const std::size_t luma = static_cast<std::size_t>(frame.width) * frame.height;
-  const std::size_t chroma = (bytes.size() - luma) / 2;
-  const auto [cb_low, cb_high] = std::ranges::minmax(bytes.subspan(luma, chroma));
-  const auto [cr_low, cr_high] = std::ranges::minmax(bytes.subspan(luma + chroma));
-  const int brightest = std::ranges::max(bytes.first(luma));
-  std::uint8_t of_high_chroma[3], of_low_chroma[3];
-  yuv_of_plates()(brightest, 8 * cb_high, 8 * cr_high, of_high_chroma);  // red and blue
-  yuv_of_plates()(brightest, 8 * cb_low, 8 * cr_low, of_low_chroma);     // green
-  return std::max({of_high_chroma[0], of_low_chroma[1], of_high_chroma[2]}) >= least;
+  const std::size_t width = frame.width, height = frame.height, chroma_width = (width + 1) / 2;
+  const auto cb = bytes.subspan(width * height, chroma_width * height);
+  const auto cr = bytes.subspan(width * height + cb.size(), cb.size());
+  const convert::YuvToRgb& to_rgb = yuv_of_plates();
+  for (std::size_t y = 0; y < height; ++y)
+    for (std::size_t x = 0; x < width; x += pixels) {
+      const auto luma = range_of(bytes.subspan(y * width + x, std::min(pixels, width - x)));
+      const std::size_t first = y * chroma_width + x / 2;
+      const std::size_t count = std::min(pixels / 2 + 1, chroma_width - x / 2);
+      const Range blue = range_of(cb.subspan(first, count)),
+                  red = range_of(cr.subspan(first, count));
+      std::uint8_t of_high_chroma[3], of_low_chroma[3];
+      to_rgb(luma.high, 8 * blue.high, 8 * red.high, of_high_chroma);  // red and blue
+      to_rgb(luma.high, 8 * blue.low, 8 * red.low, of_low_chroma);     // green
+      if (std::max({of_high_chroma[0], of_low_chroma[1], of_high_chroma[2]}) >= least) return true;
+    }
+  return false;
 }
 
 }  // namespace

@@ -42,7 +42,8 @@ class DevicePlate {
 };
 
 // Return whether a sample of the picture may be `least` or more. That of a frame of Y'CbCr is a
-// bound, which says yes where the picture has none, if its largest luma and chroma would make one.
+// bound, which says yes where the picture has none, if the brightest luma and the strongest chroma
+// of 64 pixels in a row would make one. The frame must be whole (check_size()).
 bool has_at_least(const Frame& frame, std::uint32_t least);
 bool has_at_least(const Plate& plate, std::uint32_t least);
 

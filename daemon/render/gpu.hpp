@@ -64,8 +64,9 @@ struct DeviceWork {
   std::uint64_t allocations = 0;  // of device memory
   std::uint64_t barriers = 0;
   std::uint64_t bytes_up = 0, bytes_down = 0;  // copied
-  // Compiled pipelines, since the object was made: those that something waited for, and those that
-  // were made before anything asked for them (daemon/render/pipelines_ahead.hpp).
+  // Pipelines, also those of the device before it was lost and opened again: those that something
+  // waited for, and those that were made before anything asked for them
+  // (daemon/render/pipelines_ahead.hpp).
   std::uint64_t pipelines_awaited = 0, pipelines_ahead = 0;
 };
 

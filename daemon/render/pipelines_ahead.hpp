@@ -33,13 +33,15 @@ class PipelinesAhead {
 
   // Returns whether the thread has no more to do.
   bool is_done() const { return is_done_; }
+  // Returns whether it has made them all.
+  bool has_all() const { return has_all_; }
 
  private:
-  void work(const std::stop_token& stop) const;
+  bool work(const std::stop_token& stop) const;
 
   const std::shared_ptr<Device> device_;
   const std::function<std::vector<std::uint32_t>()> reachable_;
-  std::atomic<bool> is_done_ = false;
+  std::atomic<bool> is_done_ = false, has_all_ = false;
   std::jthread thread_;
 };
 

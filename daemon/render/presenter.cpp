@@ -77,6 +77,7 @@ void Presenter::reserve(std::size_t pixels) {
   composites_ = create_storage_buffer(device_, pixels * sizeof(gpu::vec4));
   highlights_ = create_storage_buffer(device_, pixels * sizeof(std::uint32_t));
   picture_ = create_storage_buffer(device_, words_of(pixels) * sizeof(std::uint32_t));
+  if (device_.card()) screen_ = create_storage_buffer(device_, pixels * sizeof(std::uint32_t));
   pixels_ = pixels;
 }
 
@@ -174,8 +175,6 @@ void Presenter::scan_out(int width, const Denoiser::Band& band, vk::Image image,
   const auto columns = static_cast<std::uint32_t>(width);
   const auto rows = static_cast<std::uint32_t>(band.last - band.first);
   const gpu::GpuScanOut constants{columns * rows, bits_ > 8 ? 1u : 0u};
-  if (screen_.size < pixels_ * sizeof(std::uint32_t))
-    screen_ = create_storage_buffer(device_, pixels_ * sizeof(std::uint32_t));
   const Buffers buffers{{"picture", &picture_}, {"screen", &screen_}};
   device_.record([&](const vk::raii::CommandBuffer& commands) {
     scan_out_.dispatch({commands, constants, buffers}, constants.count);
@@ -187,10 +186,12 @@ void Presenter::scan_out(int width, const Denoiser::Band& band, vk::Image image,
                                   Layout::eGeneral, VK_QUEUE_FAMILY_IGNORED,
                                   VK_QUEUE_FAMILY_IGNORED, image, whole);
     if (band.first == 0) commands.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, order));
+    device_.clock().start(commands, "copy to the screen's memory");
     commands.copyBufferToImage(
         *screen_.parts->buffer, image, Layout::eGeneral,
         vk::BufferImageCopy(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1}, {0, band.first, 0},
                             {columns, rows, 1}));
+    device_.clock().stop(commands);
     if (is_last) {
       order.oldLayout = Layout::eGeneral;
       order.srcQueueFamilyIndex = device_.queue_family();

@@ -24,7 +24,7 @@ struct ToPresent {
   int width, height;
   const Buffer& plate;  // codes of the response's bits as shaders/lib/plate.glsl reads them
   bool has_plate;       // if not, the composite is over black
-  bool is_clipped;      // some code of the plate is from response.clipping().from on
+  bool is_clipped;      // some code of the plate may be from response.clipping().from on
   double exposure;      // signal over radiance, above 0
   CompositeRule rule;
   std::int64_t samples;  // the largest number that a pixel has
@@ -48,7 +48,7 @@ class Presenter {
   static std::span<const Pass> passes();  // of all its kernels
 
   const CodeTables& tables() const { return tables_; }
-  // Works band by band, with 26 bytes of device memory per pixel beside the denoiser's.
+  // Works band by band, with 30 bytes of device memory per pixel beside the denoiser's.
   // `after_band` is called with each band that the denoiser's passes have run over.
   Plate present(const ToPresent& what, Denoiser& denoiser,
                 const std::function<void(const Denoiser::Band&)>& after_band = {});

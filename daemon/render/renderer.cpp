@@ -68,7 +68,7 @@ struct Renderer::Impl {
     return {estimation.composite, estimation.composite_floor / frame.exposure};
   }
   std::int64_t sampled() const { return std::max<std::int64_t>(samples, 1); }
-  std::vector<float> radiance_of_codes() const;
+  const std::vector<float>& radiance_of_codes();
   bool has_plate() const { return frame.camera || (frame.plate && !frame.plate->samples.empty()); }
   const Plate& codes();
   Presenter& shown_by();
@@ -108,6 +108,8 @@ struct Renderer::Impl {
   bool has_scene = false, has_environment = false;
   FrameInput frame;
   std::optional<lighting::Response> response;
+  std::vector<float> radiance;   // of codes, for this response
+  double radiance_exposure = 0;  // and this exposure
   std::int64_t samples = 0;
   std::uint64_t trees_now = 0, trees_before = 0;  // rebuilt up to this frame's begin and the last's
 };
@@ -175,12 +177,14 @@ std::uint32_t Renderer::Impl::needed() const {
 }
 
 // Returns the linear radiance that each code of the plate stands for.
-std::vector<float> Renderer::Impl::radiance_of_codes() const {
-  std::vector<float> result;
-  result.reserve(response->inverse().size());
-  for (const double signal : response->inverse())
-    result.push_back(static_cast<float>(signal / frame.exposure));
-  return result;
+const std::vector<float>& Renderer::Impl::radiance_of_codes() {
+  const std::vector<double>& signals = response->inverse();
+  if (radiance.size() == signals.size() && radiance_exposure == frame.exposure) return radiance;
+  radiance.clear();
+  for (const double signal : signals)
+    radiance.push_back(static_cast<float>(signal / frame.exposure));
+  radiance_exposure = frame.exposure;
+  return radiance;
 }
 
 void Renderer::Impl::upload_plate() {
@@ -204,9 +208,9 @@ const Plate& Renderer::Impl::codes() {
   const PinholeIntrinsics& lens = calibration.intrinsics;
   const std::size_t count =
       std::size_t{3} * static_cast<std::size_t>(lens.width) * static_cast<std::size_t>(lens.height);
-  frame.plate = std::make_shared<const Plate>(
-      Plate{lens.width, lens.height, response->bits(),
-            download<std::uint16_t>(*device, plate.codes(), count)});
+  frame.plate =
+      std::make_shared<const Plate>(Plate{lens.width, lens.height, response->bits(),
+                                          download<std::uint16_t>(*device, plate.codes(), count)});
   return *frame.plate;
 }
 
@@ -270,6 +274,7 @@ void Renderer::begin_set(const set::Estimation& estimation,
   r.past_samples = 0;
   r.history.reset();
   r.response.reset();
+  r.radiance.clear();
   r.presenter.reset();
   if (has_room)  // the pipelines stay, if they are those that the set needs
     r.upload_rays();
@@ -324,6 +329,7 @@ std::uint32_t Renderer::needed() const {
 // Makes this the current frame. Throws if its plate does not fit the calibration.
 void Renderer::Impl::take(FrameInput input) {
   const PinholeIntrinsics& lens = calibration.intrinsics;
+  if (input.camera) check_size(*input.camera);
   const PlateSize taken = size_of(input);
   if (taken.width > 0 && (taken.width != lens.width || taken.height != lens.height))
     throw Error("observer: a frame of " + std::to_string(taken.width) + "x" +
@@ -333,6 +339,7 @@ void Renderer::Impl::take(FrameInput input) {
   frame = std::move(input);
   if (!response || response->bits() != taken.bits) {
     response.emplace(calibration.response, taken.bits);
+    radiance.clear();
     presenter.reset();
   }
 }

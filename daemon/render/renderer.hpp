@@ -111,7 +111,7 @@ class Renderer {
   Showing show_later(bool denoise, const ShowTo& to = {});
   // Returns what show_among() needs of the current frame, which must have a sample: its input, its
   // samples' sums, and how the scene stood. It takes 160 bytes of the computer's memory per pixel,
-  // 16 more with photons, and the plate, which it shares with FrameInput.
+  // 16 more with photons, and the camera's frame, which it shares with FrameInput.
   KeptFramePtr keep() const;
   // Returns the picture of the last of these frames, averaged with the others as far as they show
   // the same: each is carried along to the next by the motion between the two, whichever was

@@ -33,8 +33,8 @@ void LiveFiles::run() {
   while (std::optional<std::shared_ptr<const Plate>> picture = pictures_.pop()) {
     newest = *std::move(picture);
     if (!is_due()) continue;
-    write(newest.get());
     written_ = std::chrono::steady_clock::now();
+    write(newest.get());
   }
   write(newest.get());
 }

@@ -28,7 +28,7 @@ class LiveFiles {
   // metrics.json.
   LiveFiles(std::filesystem::path directory, std::function<std::string()> metrics,
             report::Reports& reports);
-  ~LiveFiles();  // writes the last picture and metrics
+  ~LiveFiles();  // writes the last picture that was taken, and metrics
   LiveFiles(const LiveFiles&) = delete;
   LiveFiles& operator=(const LiveFiles&) = delete;
 
@@ -45,8 +45,7 @@ class LiveFiles {
   const std::function<std::string()> metrics_;
   report::Reports& reports_;
   pipeline::Mailbox<std::shared_ptr<const Plate>> pictures_;
-  // When the last picture was written; the files begin as if one had been.
-  std::atomic<std::chrono::steady_clock::time_point> written_ = std::chrono::steady_clock::now();
+  std::atomic<std::chrono::steady_clock::time_point> written_;  // when the last picture was
   std::jthread thread_;
 };
 

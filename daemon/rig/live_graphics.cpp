@@ -39,7 +39,7 @@ void LiveGraphics::begin_ahead() {
 // is done once all pipelines are there, and not after each of them.
 void LiveGraphics::keep_programs() {
   if (ahead_ && !ahead_->is_done()) return;
-  if (ahead_ && !std::exchange(are_ahead_, true))
+  if (ahead_ && !std::exchange(are_ahead_, true) && ahead_->has_all())
     parts_.kept.metrics.count("all pipelines are made ahead");
   render::keep_programs(*parts_.device);
 }

@@ -149,7 +149,11 @@ std::optional<Shot> LivePipeline::Impl::capture() {
     shot.index = next_index++;
     shot.arrived = std::chrono::steady_clock::now();
     record_captured(frame);
-    if (demosaicing.attempt([&] { shot.frame = demosaiced(frame); })) return shot;  // once for all
+    // Tracking and light want colours; the renderer makes its own.
+    if (demosaicing.attempt([&] { shot.frame = demosaiced(frame); })) {
+      if (shot.frame != frame) shot.camera = std::move(frame);
+      return shot;
+    }
     parts.kept.metrics.worked("observer", 0);
     parts.kept.metrics.dropped("tracking", "not converted");
   }

@@ -350,7 +350,7 @@ Shot LiveRender::complete() {
   count_shown(under_way.of_take);
   render::DeviceTimes times = count_work();
   if (!shot.whole) return shot;
-  if (shot.on_card) metrics_.count("shown from the card's memory");
+  if (shot.on_card) metrics_.count("stayed in the card's memory");
   if (shot.untouched.empty()) measure(std::move(times), /*is_round=*/false);
   if (shot.untouched.empty()) {
     if (under_way.is_for_card && !shot.on_card)
@@ -381,6 +381,7 @@ void LiveRender::keep_as_good(const Shot& shot, std::optional<session::SceneStat
   Shot good;
   good.index = shot.index;
   good.frame = shot.frame;
+  good.camera = shot.camera;
   good.plate = shot.plate;
   good.arrived = shot.arrived;
   good.track = shot.track;

@@ -132,27 +132,34 @@ Painter::~Painter() {
 }
 
 std::optional<std::string> Painter::take(const Screenful& screenful) {
-  if (screenful.on_card) {
-    if (screenful.on_card->number != copied_ && !copy(*screenful.on_card))
-      return "OpenGL ES cannot show a picture that stays on the graphics card; pictures come down "
-             "to the computer from now on";
-  } else if (screenful.picture != uploaded_ || copied_ != 0) {
-    if (screenful.picture)
-      upload(*screenful.picture);
-    else
-      forget_picture();
-    uploaded_ = screenful.picture;
-    copied_ = 0;
-  }
+  const bool is_on_card = screenful.on_card && copy(*screenful.on_card);
+  if (!is_on_card) take(screenful.picture);
   upload(screenful.overlays);
-  return std::nullopt;
+  if (!screenful.on_card || is_on_card) return std::nullopt;
+  return "OpenGL ES cannot show a picture that is in another graphics card's memory, or that the "
+         "driver does not share; it has to come down to the computer";
 }
 
+void Painter::take(const std::shared_ptr<const Plate>& picture) {
+  copied_ = 0;
+  if (!picture) {
+    forget_picture();
+  } else if (picture != uploaded_) {
+    upload(*picture);
+    uploaded_ = picture;
+  }
+}
+
+// Returns false, and has no picture, if OpenGL ES refuses.
 bool Painter::copy(const CardPicture& picture) {
+  if (picture.number == copied_) return true;
   make_picture(picture.memory->width, picture.memory->height);
   uploaded_.reset();
   copied_ = 0;
-  if (!shared_.copy(picture)) return false;
+  if (!shared_.copy(picture)) {
+    forget_picture();
+    return false;
+  }
   copied_ = picture.number;
   filter_picture();
   return true;
@@ -214,6 +221,7 @@ void Painter::make_picture(int width, int height) {
   forget_picture();
   picture_ = {new_texture(GL_LINEAR_MIPMAP_NEAREST, GL_LINEAR), width, height};
   glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, width, height, 0, GL_RGB, GL_UNSIGNED_BYTE, nullptr);
+  check("the picture has no room");
 }
 
 void Painter::upload(const Plate& picture) {
@@ -250,6 +258,7 @@ void Painter::upload(const std::vector<Overlay>& overlays) {
 void Painter::forget_picture() {
   glDeleteTextures(1, &picture_.name);
   picture_ = {};
+  uploaded_.reset();
 }
 
 void Painter::forget_overlays() {

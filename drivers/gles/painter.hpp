@@ -26,10 +26,13 @@ class Painter {
   // Returns the card whose pictures can be taken (Display::card()).
   const std::optional<CardIdentity>& card() const { return shared_.card(); }
   // Sets what is drawn from now on; an empty screenful is black. Returns why a card's picture
-  // cannot be taken, in words; the picture before it then stays. This function and those below
-  // throw previz::Error that says what OpenGL refused.
+  // cannot be taken, in words; `picture` is then drawn in its place, or none if there is none. A
+  // card's picture must be held until it was drawn, or finish() was called. This function and those
+  // below throw previz::Error that says what OpenGL refused.
   std::optional<std::string> take(const Screenful& screenful);
-  void forget() { take({}); }
+  // Waits until all is done that was asked for.
+  static void finish() { glFinish(); }
+  void forget() { take(Screenful{}); }
   // Draws into the framebuffer that is bound, whose first row is the lowest of the screen (as EGL
   // has it).
   void draw();
@@ -47,6 +50,7 @@ class Painter {
   };
 
   void draw(const Texture& texture, int x, int y, int width, int height, bool blend);
+  void take(const std::shared_ptr<const Plate>& picture);
   void upload(const Plate& picture);
   bool copy(const CardPicture& picture);
   void make_picture(int width, int height);

@@ -74,7 +74,9 @@ GLuint SharedTextures::texture_of(const CardMemory& memory) {
   const int descriptor = fcntl(memory.descriptor.get(), F_DUPFD_CLOEXEC, 0);
   address_of<PFNGLIMPORTMEMORYFDEXTPROC>("glImportMemoryFdEXT")(
       made.memory, memory.bytes, GL_HANDLE_TYPE_OPAQUE_FD_EXT, descriptor);
-  if (glGetError() != GL_NO_ERROR && descriptor >= 0) ::close(descriptor);
+  // What OpenGL ES took is no longer ours to close.
+  const bool is_taken = glGetError() == GL_NO_ERROR;
+  if (!is_taken && descriptor >= 0) ::close(descriptor);
   glGenTextures(1, &made.texture);
   imported_.push_back(made);
   GLint bound = 0;
@@ -89,6 +91,8 @@ GLuint SharedTextures::texture_of(const CardMemory& memory) {
 bool SharedTextures::copy(const CardPicture& picture) {
   const CardMemory& memory = *picture.memory;
   if (card_ != memory.card) return false;
+  while (glGetError() != GL_NO_ERROR) {
+  }  // what follows is judged alone
   GLint before = 0;
   glGetIntegerv(GL_FRAMEBUFFER_BINDING, &before);
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
@@ -98,7 +102,6 @@ bool SharedTextures::copy(const CardPicture& picture) {
   if (is_complete) glCopyTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, 0, 0, memory.width, memory.height);
   glFramebufferTexture2D(GL_FRAMEBUFFER, GL_COLOR_ATTACHMENT0, GL_TEXTURE_2D, 0, 0);
   glBindFramebuffer(GL_FRAMEBUFFER, static_cast<GLuint>(before));
-  glFinish();
   const bool is_copied = glGetError() == GL_NO_ERROR && is_complete;
   if (!is_copied) card_.reset();
   return is_copied;

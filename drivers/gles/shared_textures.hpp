@@ -22,8 +22,8 @@ class SharedTextures {
   // Returns the card whose pictures can be copied; nothing where the extensions are missing, or
   // after copy() failed.
   const std::optional<CardIdentity>& card() const { return card_; }
-  // Copies the picture into the texture that is bound, which has its size, and waits until that is
-  // done: the picture can then be given back. Returns false where OpenGL ES refuses.
+  // Copies the picture into the texture that is bound, which has its size. The picture must be held
+  // until that is done. Returns false where OpenGL ES refuses.
   bool copy(const CardPicture& picture);
 
  private:

@@ -30,8 +30,9 @@ class HeadlessDisplay final : public Display {
 };
 
 DisplayEvent HeadlessDisplay::show(const Screenful& screenful) {
-  if (std::optional<std::string> refused = painter_.take(screenful))
-    return DeviceTrouble{name(), *std::move(refused), false};
+  std::optional<std::string> refused = painter_.take(screenful);
+  gles::Painter::finish();  // nothing draws it
+  if (refused) return DeviceTrouble{name(), *std::move(refused), false};
   return Shown{monotonic_ns()};
 }
 

@@ -136,13 +136,13 @@ DisplayEvent KmsDisplay::show(const Screenful& screenful) {
     master_ = true;
   }
   scanout_.begin();
-  if (std::optional<std::string> refused = painter_.take(screenful))
-    return DeviceTrouble{name(), *std::move(refused), false};
+  std::optional<std::string> refused = painter_.take(screenful);
   painter_.draw();
   const std::uint32_t framebuffer = scanout_.finish();
   flipped_ns_.reset();
   if (const int error = output_.flip(framebuffer, &flipped_ns_)) {
     scanout_.withdraw();
+    gles::Painter::finish();  // the caller may let go of a card's picture
     if (error != EACCES)
       return lost(std::string("cannot display a picture: ") + std::strerror(error));
     master_ = false;
@@ -151,6 +151,7 @@ DisplayEvent KmsDisplay::show(const Screenful& screenful) {
   const std::optional<std::int64_t> shown_ns = wait_for_flip();
   if (!shown_ns) return lost("shows nothing: the graphics card does not respond");
   scanout_.seen();
+  if (refused) return DeviceTrouble{name(), *std::move(refused), false};  // the overlay is shown
   return Shown{*shown_ns};
 }
 

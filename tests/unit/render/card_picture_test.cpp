@@ -142,8 +142,13 @@ TEST_F(CardPictures, OfAnotherCardAreRefusedInWords) {
   EXPECT_THAT(std::get<DeviceTrouble>(event).what, HasSubstr("come down to the computer"));
   EXPECT_FALSE(std::get<DeviceTrouble>(event).lost);
   EXPECT_EQ(display_->card(), shown.on_card->memory->card) << "its own card's are still welcome";
-  display_->show({shown.picture, {}});
-  EXPECT_TRUE(display_->read_back().samples == shown.picture->samples);
+  for (const CardPicturePtr& also : {CardPicturePtr(), CardPicturePtr(foreign)}) {
+    display_->show(
+        {shown.picture, {{.x = 0, .y = 0, .width = 1, .height = 1, .rgba = {9, 8, 7, 255}}}, also});
+    Plate expected = *shown.picture;
+    std::ranges::copy(std::array<std::uint16_t, 3>{9, 8, 7}, expected.samples.begin());
+    EXPECT_TRUE(display_->read_back().samples == expected.samples);
+  }
 }
 
 TEST_F(CardPictures, OfMemoryThatCannotBeImportedAreRefusedInWords) {

@@ -162,6 +162,29 @@ TEST(DevicePlate, OfDarkLumaAndGreyChromaDoesNotClip) {
   EXPECT_FALSE(render::has_at_least(frame, 255));
 }
 
+// Two levels of luma far below white, and chroma of a little more than grey.
+TEST(DevicePlate, OfModestColoursDoesNotClip) {
+  Frame frame = random_frame({PixelFormat::yuv422p8}, 130, 9);
+  for (std::size_t i = 0; i < frame.bytes.size(); ++i)
+    frame.bytes[i] = static_cast<std::uint8_t>(i < 130 * 9 ? 60 + frame.bytes[i] % 100
+                                                           : 120 + frame.bytes[i] % 16);
+  EXPECT_LT(std::ranges::max(to_plate(frame).samples), 240);
+  EXPECT_FALSE(render::has_at_least(frame, 240));
+  frame.bytes[130 * 9 - 1] = 255;
+  EXPECT_TRUE(render::has_at_least(frame, 240));
+}
+
+TEST(DevicePlate, IsNotMadeOfAFrameThatIsCutShort) {
+  const View view = empty_view({0, -0.8, 1}, {0, 0, 0}, pinhole(8, 8, 0.8), glm::vec3(0.3f));
+  SetRenderer renderer(view, {.max_depth = 1});
+  for (const std::size_t left : {0u, 63u, 64u, 127u}) {
+    Frame frame = random_frame({PixelFormat::yuv422p8}, 8, 8);
+    frame.bytes.resize(left);
+    EXPECT_THAT(error_of([&] { renderer.begin({.camera = std::make_shared<const Frame>(frame)}); }),
+                HasSubstr("holds " + std::to_string(left) + " bytes"));
+  }
+}
+
 // The picture, and its layers, are those of the plate: also where the plate is a measurement.
 class PictureOfACameraFrame : public ::testing::TestWithParam<set::RealRadiance> {};
 

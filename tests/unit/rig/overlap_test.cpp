@@ -4,6 +4,8 @@
 
 namespace previz::rig::overlap_test {
 
+using namespace nlohmann::literals;
+
 class RigAsAGraphicsCard : public test::RigLive {
  protected:
   void SetUp() override {
@@ -17,6 +19,13 @@ class RigAsAGraphicsCard : public test::RigLive {
       EXPECT_GT(time, last_ns_) << "picture " << shown.count;
       last_ns_ = time;
     };
+  }
+
+  // A screen that is larger than the pictures, and has nothing above them.
+  void write_display() {
+    replace_in_set("[recording]\n",
+                   "[display]\ndriver = \"headless\"\nmode = \"480x270\"\nscale = \"1:1\"\n"
+                   "osd = false\n[recording]\n");
   }
 
   std::int64_t last_ns_ = 0;
@@ -54,9 +63,7 @@ std::vector<std::uint16_t> middle_of(const Plate& screen, const Plate& picture) 
 
 // The screen has a picture that was rendered, from the card's memory and bit for bit.
 TEST_F(RigAsAGraphicsCard, ShowsPicturesFromTheCardsMemory) {
-  replace_in_set("[recording]\n",
-                 "[display]\ndriver = \"headless\"\nmode = \"480x270\"\nscale = \"1:1\"\n"
-                 "osd = false\n[recording]\n");
+  write_display();
   std::mutex mutex;
   std::deque<PlatePtr> rendered;
   while_shown_ = [&] {
@@ -74,8 +81,31 @@ TEST_F(RigAsAGraphicsCard, ShowsPicturesFromTheCardsMemory) {
   run_rendering([&] {
     EXPECT_TRUE(test::wait_until("pictures are on the screen", [&] { return equal > 3; }));
   });
-  EXPECT_GT(metrics_.counts.at("shown from the card's memory"), 3u);
+  EXPECT_GT(metrics_.counts.at("stayed in the card's memory"), 3u);
   EXPECT_FALSE(metrics_.counts.contains("screen: device trouble")) << log_.text();
+}
+
+// Nobody else wants the pictures, but the file of one each second.
+TEST_F(RigAsAGraphicsCard, BringsNoPictureDownThatIsOnlyShown) {
+  write_display();
+  sees_pictures_ = false;
+  std::atomic<int> screenfuls = 0;
+  options_.on_screen = [&](const Plate& screen, const output::OsdPage&) {
+    const auto [least, most] = std::ranges::minmax(screen.samples);
+    screenfuls += most > least ? 1 : 0;
+  };
+  const auto stayed = [](const nlohmann::json& metrics) {
+    return metrics.value("/counts/stayed in the card's memory"_json_pointer, 0);
+  };
+  run([&] {
+    until_metrics("pictures stay on the card",
+                  [&](const nlohmann::json& metrics) { return stayed(metrics) > 20; });
+  });
+  EXPECT_GT(screenfuls, 10);
+  const std::uint64_t pictures = metrics_.counts.at("stayed in the card's memory");
+  constexpr std::uint64_t picture_bytes = 6 * 48 * 36;  // of the small take's, as a plate
+  EXPECT_LT(metrics_.devices.at("graphics").at("bytes down"), pictures / 2 * picture_bytes);
+  EXPECT_TRUE(std::filesystem::exists(directory_ / "live/picture.png"));
 }
 
 // Whatever a button can switch, the pipelines for it are there.
