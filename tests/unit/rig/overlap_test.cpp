@@ -1,6 +1,7 @@
 // On a graphics card the next frame is begun before the picture of the last one is there. What is
 // shown, refined and saved is what it was.
 #include "tests/support/live_rig.hpp"
+#include "tests/support/other_camera.hpp"
 
 namespace previz::rig::overlap_test {
 
@@ -106,6 +107,34 @@ TEST_F(RigAsAGraphicsCard, BringsNoPictureDownThatIsOnlyShown) {
   constexpr std::uint64_t picture_bytes = 6 * 48 * 36;  // of the small take's, as a plate
   EXPECT_LT(metrics_.devices.at("graphics").at("bytes down"), pictures / 2 * picture_bytes);
   EXPECT_TRUE(std::filesystem::exists(directory_ / "live/picture.png"));
+}
+
+// Makes a frame one of a camera with colour filters: one byte a pixel.
+CameraEvent mosaic_of(CameraEvent event, Camera&) {
+  const auto* captured = std::get_if<FramePtr>(&event);
+  if (!captured) return event;
+  auto mosaic = std::make_shared<Frame>(**captured);
+  mosaic->format = PixelFormat::gray8;
+  mosaic->bayer = BayerPattern::grbg;
+  mosaic->bytes.resize(frame_bytes(mosaic->format, mosaic->width, mosaic->height));
+  return FramePtr(std::move(mosaic));
+}
+
+// The device makes the colours of what the camera gave. A plate that nothing was drawn into shows
+// that they are those of the computer.
+TEST_F(RigAsAGraphicsCard, TakesUpTheCamerasOwnBytes) {
+  options_.around_cameras = [](Cameras& cameras) { test::put_around(cameras.observer, mosaic_of); };
+  run_rendering([&] {
+    const Shown shown = until_rendered(3);
+    ASSERT_TRUE(shown.shot.camera);
+    EXPECT_EQ(shown.shot.camera->bytes.size(), shown.shot.frame->bytes.size() / 3);
+    const Plate plate = to_plate(*shown.shot.frame);
+    EXPECT_EQ(to_plate(*shown.shot.camera).samples, plate.samples);
+    std::size_t equal = 0;
+    for (std::size_t i = 0; i < plate.samples.size(); ++i)
+      equal += shown.shot.picture->samples[i] == plate.samples[i] ? 1 : 0;
+    EXPECT_GT(equal, plate.samples.size() / 2) << "beside the card and its shadow";
+  });
 }
 
 // Whatever a button can switch, the pipelines for it are there.
