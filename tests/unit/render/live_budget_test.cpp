@@ -86,17 +86,18 @@ TEST_F(LiveBudget, OfAFrameIsTwoSubmissionsAndOneWait) {
   expect_within_budget(frame(4, shown_and_recorded), 6 * pixels_);
 }
 
-// No dispatch, buffer or picture is larger than devices allow (Vulkan's validation knows how much
-// this one does), and a frame stays within the same budget.
+// No dispatch, buffer or picture is larger than devices allow: Vulkan's validation knows how much
+// this one does. How many submissions such a frame takes depends on how fast the device is.
 class LiveBudgetOf4K : public LiveBudget {
  protected:
   LiveBudgetOf4K() : LiveBudget(3840, 2160, true) {}
 };
 
-TEST_F(LiveBudgetOf4K, IsTheSame) {
-  frame(1, shown_and_recorded);
-  frame(1, shown_and_recorded);
-  expect_within_budget(frame(1, shown), 0);
+TEST_F(LiveBudgetOf4K, IsThatOfItsPixels) {
+  frame(1, shown);
+  const render::DeviceWork work = frame(1, shown);
+  EXPECT_LE(work.bytes_up, camera_->bytes.size() + (1u << 16));
+  EXPECT_LE(work.bytes_down, 1u << 10);
   EXPECT_EQ(render::validation_messages(*device_), 0u);
 }
 
