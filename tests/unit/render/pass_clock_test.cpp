@@ -30,7 +30,7 @@ Timed times_of_a_frame(bool times_passes) {
   renderer.render(1);
   renderer.layers();
   const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - start;
-  const Timed times{render::take_times(*device), wall.count()};
+  Timed times{render::take_times(*device), wall.count()};
   EXPECT_EQ(times.submissions, times_passes ? render::work_of(*device).submissions - before : 0);
   EXPECT_TRUE(render::take_times(*device).passes.empty()) << "it was taken";
   EXPECT_EQ(render::validation_messages(*device), 0u);
