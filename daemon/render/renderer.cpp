@@ -189,17 +189,18 @@ const std::vector<float>& Renderer::Impl::radiance_of_codes() {
 
 void Renderer::Impl::upload_plate() {
   const std::uint32_t clipped = response->clipping().from;
-  if (frame.camera) {
-    is_clipped = has_at_least(*frame.camera, clipped);
-    const PinholeIntrinsics& lens = calibration.intrinsics;
-    if (frame.is_scaled)
-      plate.take(*frame.camera, lens.width, lens.height, shown_by().tables());
-    else
-      plate.take(*frame.camera);
-  } else {
-    is_clipped = has_at_least(*frame.plate, clipped);
+  is_clipped =
+      frame.camera ? has_at_least(*frame.camera, clipped) : has_at_least(*frame.plate, clipped);
+  // A processor makes a plate in a twentieth of the time if it does so by itself.
+  if (frame.camera && !frame.is_scaled && device->shares_host_memory() && !frame.plate)
+    frame.plate = std::make_shared<const Plate>(to_plate(*frame.camera));
+  const PinholeIntrinsics& lens = calibration.intrinsics;
+  if (frame.is_scaled)
+    plate.take(*frame.camera, lens.width, lens.height, shown_by().tables());
+  else if (frame.plate)
     plate.take(*frame.plate);
-  }
+  else
+    plate.take(*frame.camera);
 }
 
 // Returns the plate in the computer's memory.

@@ -18,12 +18,17 @@ namespace {
 constexpr int rounds = 3;
 constexpr int width = 1920, height = 1080;
 
-Plate noise() {
-  Plate plate{width, height, 8, std::vector<std::uint16_t>(std::size_t{3} * width * height)};
+// What a camera with colour filters gives.
+FramePtr noise() {
+  Frame frame;
+  frame.format = PixelFormat::gray8;
+  frame.bayer = BayerPattern::rggb;
+  frame.width = width;
+  frame.height = height;
+  frame.bytes.resize(frame_bytes(frame.format, width, height));
   std::minstd_rand random;
-  for (std::uint16_t& sample : plate.samples)
-    sample = static_cast<std::uint16_t>(random() >> 8 & 0xff);
-  return plate;
+  for (std::uint8_t& byte : frame.bytes) byte = static_cast<std::uint8_t>(random() >> 8 & 0xff);
+  return std::make_shared<const Frame>(std::move(frame));
 }
 
 struct Step {
@@ -45,12 +50,18 @@ void run() {
   renderer.set_scene(scene);
   renderer.set_environment(lighting::EnvironmentMap{1, {glm::vec3(0.3F)}},
                            set::LightSampling::importance);
-  const render::FrameInput frame{std::make_shared<const Plate>(noise()), 1, view_of_field(scene)};
+  const FramePtr camera = noise();
+  render::FrameInput with_plate{.world_from_camera = view_of_field(scene)};
+  render::FrameInput with_camera = with_plate;
+  with_camera.camera = camera;
 
   render::Layers layers;
   Plate picture;
   Step steps[] = {
-      {"begin", [&] { renderer.begin(frame); }},
+      {"the plate, by the computer",
+       [&] { with_plate.plate = std::make_shared<const Plate>(to_plate(*camera)); }},
+      {"begin with the plate", [&] { renderer.begin(with_plate); }},
+      {"begin with the camera's bytes", [&] { renderer.begin(with_camera); }},
       {"one sample",
        [&] {
          renderer.render(1);

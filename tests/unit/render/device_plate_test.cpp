@@ -186,7 +186,8 @@ TEST(DevicePlate, IsNotMadeOfAFrameThatIsCutShort) {
 }
 
 // The picture, and its layers, are those of the plate: also where the plate is a measurement.
-class PictureOfACameraFrame : public ::testing::TestWithParam<set::RealRadiance> {};
+class PictureOfACameraFrame : public ::testing::TestWithParam<std::tuple<set::RealRadiance, bool>> {
+};
 
 TEST_P(PictureOfACameraFrame, IsThatOfItsPlate) {
   View view = empty_view({0, -0.8, 1}, {0, 0, 0.05}, pinhole(64, 48, 0.8), glm::vec3(0.3f));
@@ -194,8 +195,11 @@ TEST_P(PictureOfACameraFrame, IsThatOfItsPlate) {
   add(view.scene, icosphere_mesh(0.2, 1), diffuse(glm::vec3(0.7f)), at({0, 0, 0.25}),
       scene::world_mixed);
   set::Estimation estimation{.max_depth = 2};
-  estimation.real_radiance = GetParam();
-  SetRenderer renderer(view, estimation);
+  estimation.real_radiance = std::get<0>(GetParam());
+  SetRenderer renderer(view, estimation, set::LightSampling::importance,
+                       std::get<1>(GetParam())
+                           ? render::open_device({.validation = true, .name = "", .as_gpu = true})
+                           : shared_device());
   for (const Kind& kind : kinds) {
     const auto frame = std::make_shared<const Frame>(random_frame(kind, 64, 48));
     const auto picture = [&](PlatePtr plate, FramePtr camera) {
@@ -213,9 +217,14 @@ TEST_P(PictureOfACameraFrame, IsThatOfItsPlate) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Real, PictureOfACameraFrame,
-                         ::testing::Values(set::RealRadiance::traced, set::RealRadiance::camera),
+                         ::testing::Combine(::testing::Values(set::RealRadiance::traced,
+                                                              set::RealRadiance::camera),
+                                            ::testing::Bool()),
                          [](const auto& kind) {
-                           return kind.param == set::RealRadiance::camera ? "Camera" : "Traced";
+                           return std::string(std::get<0>(kind.param) == set::RealRadiance::camera
+                                                  ? "Camera"
+                                                  : "Traced") +
+                                  (std::get<1>(kind.param) ? "AsAGpu" : "AsACpu");
                          });
 
 }  // namespace previz::test::device_plate_test
