@@ -124,10 +124,11 @@ TEST_P(BenchOn, MeasuresALiveFrameOfWhichItKnowsEveryPart) {
     EXPECT_GT(figures.ms_of(pass), 0) << pass;
   EXPECT_GT(figures.rays, 64u * 36u);
   EXPECT_EQ(figures.work.allocations, 0u);
-  // A display has the picture from the card's memory.
+  // A display has the picture from a card's memory.
   EXPECT_EQ(figures.comes_down, !GetParam());
   EXPECT_EQ(figures.work.bytes_down >= 6u * 64 * 36, !GetParam());
-  EXPECT_LT(figures.work.bytes_up, 6u * 64 * 36) << "the camera's bytes and what a frame needs";
+  // It takes up the camera's bytes; a processor makes the plate of them before.
+  EXPECT_EQ(figures.work.bytes_up >= 6u * 64 * 36, !GetParam());
   EXPECT_GT(figures.screen_ms, 0);
 }
 
