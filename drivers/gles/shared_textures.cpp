@@ -39,6 +39,12 @@ std::optional<CardIdentity> card_of_context() {
   return card;
 }
 
+// What follows is judged alone. A context that is lost may have an error each time it is asked.
+void forget_errors() {
+  constexpr int kinds = 8;
+  for (int i = 0; i < kinds && glGetError() != GL_NO_ERROR; ++i) continue;
+}
+
 }  // namespace
 
 SharedTextures::SharedTextures() : card_(card_of_context()) {
@@ -91,8 +97,7 @@ GLuint SharedTextures::texture_of(const CardMemory& memory) {
 bool SharedTextures::copy(const CardPicture& picture) {
   const CardMemory& memory = *picture.memory;
   if (card_ != memory.card) return false;
-  while (glGetError() != GL_NO_ERROR) {
-  }  // what follows is judged alone
+  forget_errors();
   GLint before = 0;
   glGetIntegerv(GL_FRAMEBUFFER_BINDING, &before);
   glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
