@@ -10,8 +10,8 @@ layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(scalar, push_constant) uniform CameraFrame { GpuCameraFrame camera; };
 layout(scalar) readonly buffer CameraBytes { uint camera_bytes[]; };
-// What is added up in codes (drivers/convert/yuv.hpp): of 256 codes of luma, then of CHROMA_CODES eighths
-// of a code of Cr for red, of Cb and Cr for green, of Cb for blue.
+// These terms are added up to a colour, in codes (drivers/convert/yuv.hpp): those of 256 codes of luma,
+// then those of CHROMA_CODES eighths of a code of Cr for red, of Cb and Cr for green, of Cb for blue.
 layout(scalar) readonly buffer YuvTerms { float yuv_terms[]; };
 layout(scalar) writeonly buffer PlateSamples { uint plate_samples[]; };
 

@@ -35,8 +35,8 @@ struct FrameFigures {
   std::uint64_t rays = 0, shadow_rays = 0;  // a frame
   render::DeviceWork work;                  // a frame's, rounded up
 
-  // From the arrival of a frame to the display. The camera's readout, tracking, and what is left
-  // until the screen's next refresh come on top.
+  // Returns the time from the arrival of a frame to the display. The camera's readout, tracking,
+  // and what is left until the screen's next refresh come on top.
   double latency_ms() const { return ms + screen_ms; }
   double rate() const { return interval_ms > 0 ? 1000 / interval_ms : 0; }
   double passes_ms() const;

@@ -67,7 +67,7 @@ std::size_t triangles_of(const scene::Scene& scene) {
   return count;
 }
 
-// What a camera with colour filters gives.
+// Returns what a camera with colour filters gives.
 FramePtr grey_mosaic(int width, int height) {
   Frame frame;
   frame.format = PixelFormat::gray8;

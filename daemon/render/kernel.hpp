@@ -52,7 +52,7 @@ struct Program {
   vk::raii::Pipeline pipeline{nullptr};
 };
 
-// What a kernel is made of.
+// A pass has what its kernel is made of.
 struct Pass {
   const char* name;
   std::span<const std::uint32_t> spirv;  // static

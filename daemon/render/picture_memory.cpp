@@ -25,8 +25,9 @@ constexpr std::uint64_t sum_bytes = sizeof(gpu::GpuPixel) + 4 * sizeof(float);
 // A pixel of the plate and of the shown picture is three samples.
 constexpr std::uint64_t plate_bytes = 3 * sizeof(std::uint16_t);
 
-// And so many bytes does the camera give a pixel, where they are not the plate's codes. A preview
-// that is smaller takes less altogether than one at the camera's size.
+// The camera gives a pixel no more bytes than this, where they are not the plate's codes. A smaller
+// preview keeps the whole plate's codes as well, and from 0.97 of the camera's size on it takes
+// less altogether all the same.
 constexpr std::uint64_t camera_bytes = 3;
 
 // A pixel of a band takes twelve arrays of four floats and one of four halves in the denoiser,

@@ -33,7 +33,7 @@ struct ToPresent {
   History* history = nullptr;  // what the frame is added to; null: it stands alone
 };
 
-// Where a picture goes.
+// Says where a finished picture goes.
 struct Destination {
   Downloads& down;
   Plate* plate = nullptr;  // of the right size; its samples are there only once `down` is finished

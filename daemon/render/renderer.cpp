@@ -28,11 +28,10 @@ namespace previz::render {
 namespace {
 
 struct PlateSize {
-  int width = 0, height = 0, bits = 8;  // no pixel: any size will do
+  int width = 0, height = 0, bits = 8;  // without a plate: no pixel
 };
 
 PlateSize size_of(const FrameInput& input) {
-  if (input.camera && input.is_scaled) return {0, 0, plate_bits(input.camera->format)};
   if (input.camera)
     return {input.camera->width, input.camera->height, plate_bits(input.camera->format)};
   if (input.plate && !input.plate->samples.empty())
@@ -332,7 +331,9 @@ void Renderer::Impl::take(FrameInput input) {
   const PinholeIntrinsics& lens = calibration.intrinsics;
   if (input.camera) check_size(*input.camera);
   const PlateSize taken = size_of(input);
-  if (taken.width > 0 && (taken.width != lens.width || taken.height != lens.height))
+  const bool fits = input.is_scaled ? taken.width >= lens.width && taken.height >= lens.height
+                                    : taken.width == lens.width && taken.height == lens.height;
+  if (taken.width > 0 && !fits)
     throw Error("observer: a frame of " + std::to_string(taken.width) + "x" +
                 std::to_string(taken.height) + " does not fit the calibration's " +
                 std::to_string(lens.width) + "x" + std::to_string(lens.height));

@@ -26,7 +26,7 @@ namespace previz::render {
 struct KeptFrame;
 using KeptFramePtr = std::shared_ptr<const KeptFrame>;
 
-// Where a picture is wanted.
+// Says where a picture is wanted.
 struct ShowTo {
   bool computer = true;  // as a Plate
   bool card = false;     // in the card's memory; if it cannot be there, it comes down

@@ -95,6 +95,7 @@ void Submissions::await(std::uint64_t submission) {
 }
 
 void Submissions::wait(std::uint64_t submission) {
+  const auto start = std::chrono::steady_clock::now();
   if (submission == next_) {
     flush();
     refuse_after_failure();
@@ -103,7 +104,6 @@ void Submissions::wait(std::uint64_t submission) {
   if (submission <= done_) return;
   ++work.waits;
   named(options_.name, [&] {
-    const auto start = std::chrono::steady_clock::now();
     await(submission);
     const std::chrono::duration<double, std::milli> waited =
         std::chrono::steady_clock::now() - start;

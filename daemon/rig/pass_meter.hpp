@@ -10,7 +10,7 @@
 
 namespace previz::rig {
 
-// What the graphics card did for a frame, on average over the last second.
+// Holds what the graphics card did for a frame, on average over the last second.
 struct PassTimes {
   struct Pass {
     std::string name;

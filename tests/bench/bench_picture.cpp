@@ -18,7 +18,7 @@ namespace {
 constexpr int rounds = 3;
 constexpr int width = 1920, height = 1080;
 
-// What a camera with colour filters gives.
+// Returns what a camera with colour filters gives.
 FramePtr noise() {
   Frame frame;
   frame.format = PixelFormat::gray8;

@@ -96,7 +96,7 @@ VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
   return result;
 }
 
-// What is below an instance, a device or what belongs to it.
+// Returns the layer or driver below this one, by an instance, a device or what belongs to it.
 Below below_of(const void* handle) {
   const std::lock_guard lock(mutex);
   return known.at(key_of(handle));

@@ -174,6 +174,18 @@ TEST(DevicePlate, OfModestColoursDoesNotClip) {
   EXPECT_TRUE(render::has_at_least(frame, 240));
 }
 
+TEST(DevicePlate, IsNotMadeLarger) {
+  const View view = empty_view({0, -0.8, 1}, {0, 0, 0}, pinhole(8, 8, 0.8), glm::vec3(0.3f));
+  SetRenderer renderer(view, {.max_depth = 1});
+  const auto begin = [&](int width, int height) {
+    renderer.begin(
+        {.camera = std::make_shared<const Frame>(random_frame({PixelFormat::rgb8}, width, height)),
+         .is_scaled = true});
+  };
+  EXPECT_THAT(error_of([&] { begin(16, 7); }), HasSubstr("16x7 does not fit"));
+  EXPECT_NO_THROW(begin(16, 9));
+}
+
 TEST(DevicePlate, IsNotMadeOfAFrameThatIsCutShort) {
   const View view = empty_view({0, -0.8, 1}, {0, 0, 0}, pinhole(8, 8, 0.8), glm::vec3(0.3f));
   SetRenderer renderer(view, {.max_depth = 1});

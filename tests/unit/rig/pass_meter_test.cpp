@@ -1,4 +1,4 @@
-// What passes take on average, with the clock in the test's hand.
+// The meter shows what passes take on average. The test holds the clock.
 #include "daemon/rig/pass_meter.hpp"
 
 #include "tests/support/test.hpp"
