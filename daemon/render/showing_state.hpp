@@ -1,4 +1,5 @@
-// This header has what a picture on its way from the device consists of. Internal to the render room.
+// This header has what a picture on its way from the device consists of. Internal to the render
+// room.
 #pragma once
 
 #include <memory>
