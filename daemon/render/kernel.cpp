@@ -65,9 +65,9 @@ const std::vector<std::uint32_t>& specialised(std::span<const std::uint32_t> spi
   return modules.try_emplace(key, std::move(module)).first->second;
 }
 
-std::vector<std::uint32_t> values_of(const Pass& pass, std::uint32_t features) {
+std::vector<std::uint32_t> values_of(const Pass& pass, std::uint32_t features, bool on_card) {
   if (!pass.has_features) return {};
-  return {features};
+  return {features, on_card ? 1u : 0u};
 }
 
 // A pass with the constants that it reads something of, and the way to compile it.
@@ -97,7 +97,7 @@ Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> 
 
 Kernel::Kernel(Device& device, const Pass& pass, std::uint32_t features)
     : device_(&device), name_(pass.name) {
-  use(pass, values_of(pass, features));
+  use(pass, values_of(pass, features, !device.shares_host_memory()));
 }
 
 void Kernel::use(const Pass& pass, std::vector<std::uint32_t> constants) {
@@ -113,8 +113,14 @@ void make_kernels(std::initializer_list<Kernel*> kernels, Device& device,
   for (Kernel* const kernel : kernels) *kernel = Kernel(device, *pass++, features);
 }
 
+std::vector<std::uint32_t> module_of(const Pass& pass, std::uint32_t features, bool on_card) {
+  std::vector<std::uint32_t> values = values_of(pass, features, on_card);
+  if (!values.empty()) values.front() &= describe_spirv(pass.spirv).asked_bits;
+  return specialised(pass.spirv, values);
+}
+
 void compile_ahead(Device& device, const Pass& pass, std::uint32_t features) {
-  const ToCompile wanted(device, pass, values_of(pass, features));
+  const ToCompile wanted(device, pass, values_of(pass, features, !device.shares_host_memory()));
   device.program_ahead(pass.spirv.data(), wanted.values, wanted.compile_now);
 }
 

@@ -4,34 +4,16 @@
 #include <unistd.h>
 
 #include <exception>
-#include <span>
 #include <string>
 #include <utility>
 
-#include "daemon/render/denoiser.hpp"
-#include "daemon/render/device_plate.hpp"
-#include "daemon/render/history.hpp"
-#include "daemon/render/presenter.hpp"
-#include "daemon/render/wavefront.hpp"
+#include "daemon/render/passes.hpp"
 #include "daemon/report/log.hpp"
 
 namespace previz::render {
 namespace {
 
 constexpr int niceness = 10;  // cameras, recording and pictures go before
-
-// Returns what a shown picture with these features is made by, and then what averages it.
-std::vector<Pass> passes_for(std::uint32_t features) {
-  std::vector<Pass> passes = Wavefront::passes_for(features);
-  const auto add = [&](std::span<const Pass> more) {
-    passes.insert(passes.end(), more.begin(), more.end());
-  };
-  add(DevicePlate::passes());
-  add(Presenter::passes());
-  add(Denoiser::passes());
-  add(History::passes());
-  return passes;
-}
 
 // Reports the first failure only: the others most often have the same cause.
 class Failures {

@@ -55,7 +55,6 @@ PREVIZ_CONST uint SAMPLED_BLOCK = 8u;
 PREVIZ_CONST uint SAMPLED_PARTS = 4u;
 PREVIZ_CONST uint UNLIMITED = 0xffffffffu;
 
-PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 PREVIZ_CONST uint NO_INDEX = 0xffffffffu;
 
 // These bits are a path's state.

@@ -26,6 +26,9 @@ PREVIZ_CONST uint WORLD_MIXED = 1u;
 PREVIZ_CONST uint WORLD_REAL = 2u;
 PREVIZ_CONST uint WORLD_BOTH = 3u;
 
+// Every pass has this many invocations in a work group.
+PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
+
 // The scene as lib/trace.glsl reads it is one texel buffer of RGBA32UI in set 0, made by
 // daemon/scene/bvh.hpp (on lavapipe a texel buffer is 1.4 to 1.7 times as fast as a storage
 // buffer). It consists of records of four texels, one cache line, in blocks of eight; the children

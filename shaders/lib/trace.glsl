@@ -24,6 +24,28 @@ struct Hit {
 // instance.
 const uint TRACE_STACK_SIZE = TOP_BVH_DEPTH + MESH_BVH_DEPTH;
 
+// The stack of groups: block of children << 8 | children still to visit. On a card its lower levels are
+// in the memory that a work group shares: an invocation's own array would take that many registers.
+// Only deep trees use the others, which are in an array that is too large for registers. A CPU device
+// has its own array in the cache as well.
+layout(constant_id = 1) const uint ON_CARD = 0u;
+const uint SHARED_LEVELS = 8u;
+const uint OWN_LEVELS = 65u;
+uint own_stack[OWN_LEVELS];
+shared uint shared_stack[SHARED_LEVELS * WORKGROUP_SIZE];
+
+uint shared_level(uint level) { return level * WORKGROUP_SIZE + gl_LocalInvocationIndex; }
+
+void trace_keep(uint level, uint group) {
+  if (ON_CARD != 0u && level < SHARED_LEVELS) shared_stack[shared_level(level)] = group;
+  else own_stack[level] = group;
+}
+
+uint trace_kept(uint level) {
+  if (ON_CARD != 0u && level < SHARED_LEVELS) return shared_stack[shared_level(level)];
+  return own_stack[level];
+}
+
 // Rounding may move a ray sideways by this share of the largest coordinate. It is 16 half ulps; the
 // projection of a vertex needs 5 of them and the planes of a box need 4.
 const float TRACE_SLACK = 9.5367432e-7;  // 2^-20
@@ -42,7 +64,9 @@ struct TraceSpace {
   vec3 origin;
   vec3 x, y, z;      // rows: x and y across the ray, z along it, so that dot(p - origin, z) is t
   vec3 inverse;      // 1 / direction, finite
-  vec3 near, far;    // origin moved back and forth by the slack, for near and far planes
+  vec3 towards;      // the slack, with the signs of the direction
+  vec3 near, far;    // origin moved back and forth by it, for near and far planes; unused on a card,
+                     // which works them out for each record rather than keep them
   uint octant;       // bit i is set if component i of the direction is negative
   uint first_texel;  // of the tree
   uint presence, instance;
@@ -83,9 +107,9 @@ TraceSpace trace_enter(uint record, vec3 world_origin, vec3 world_direction) {
   s.inverse = 1.0 / steep;
   const vec3 reach = abs(s.origin);
   const float slack = TRACE_SLACK * (max(reach.x, max(reach.y, reach.z)) + 8388608.0);
-  const vec3 towards = mix(vec3(slack), vec3(-slack), lessThan(steep, vec3(0.0)));
-  s.near = s.origin + towards;
-  s.far = s.origin - towards;
+  s.towards = mix(vec3(slack), vec3(-slack), lessThan(steep, vec3(0.0)));
+  s.near = ON_CARD != 0u ? vec3(0.0) : s.origin + s.towards;
+  s.far = ON_CARD != 0u ? vec3(0.0) : s.origin - s.towards;
   s.octant = (steep.x < 0.0 ? 1u : 0u) | (steep.y < 0.0 ? 2u : 0u) | (steep.z < 0.0 ? 4u : 0u);
   return s;
 }
@@ -98,12 +122,23 @@ uint trace_box(vec3 near, vec3 far, int t_min, int t_max, uint bit) {
   return max(max(n.x, n.y), max(n.z, t_min)) <= min(min(f.x, f.y), min(f.z, t_max)) ? bit : 0u;
 }
 
-// These return one byte of each component. Bytes 0 and 3 have their own value, bytes 1 and 2 are
-// multiplied by 2^8 and 2^16, which the callers' scales make up for.
+// These return one byte of each component. On a CPU device bytes 1 and 2 are multiplied by 2^8 and
+// 2^16, which the callers' scales make up for; cards turn any byte into a float at once.
 vec3 trace_byte0(uvec3 planes) { return vec3(ivec3(planes & 0xffu)); }
-vec3 trace_byte1(uvec3 planes) { return vec3(ivec3(planes & 0xff00u)); }
-vec3 trace_byte2(uvec3 planes) { return vec3(ivec3(planes & 0xff0000u)); }
+vec3 trace_byte1(uvec3 planes) {
+  return ON_CARD != 0u ? vec3((planes >> 8) & 0xffu) : vec3(ivec3(planes & 0xff00u));
+}
+vec3 trace_byte2(uvec3 planes) {
+  return ON_CARD != 0u ? vec3((planes >> 16) & 0xffu) : vec3(ivec3(planes & 0xff0000u));
+}
 vec3 trace_byte3(uvec3 planes) { return vec3(ivec3(planes >> 24)); }
+
+// Returns the bits of slots as bits of slots ^ octant.
+uint trace_from_octant(uint slots, uint octant) {
+  slots = (octant & 1u) != 0u ? (slots & 0x55u) << 1 | ((slots >> 1) & 0x55u) : slots;
+  slots = (octant & 2u) != 0u ? (slots & 0x33u) << 2 | ((slots >> 2) & 0x33u) : slots;
+  return (octant & 4u) != 0u ? (slots & 0x0fu) << 4 | ((slots >> 4) & 0x0fu) : slots;
+}
 
 struct TraceTriangle {
   float t;
@@ -140,7 +175,6 @@ vec3 trace_project(vec3 vertex, const TraceSpace s) {
 // or returns 0.
 uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, float t_max,
                 uint worlds, uvec2 source, inout Hit hit) {
-  uint stack[TRACE_STACK_SIZE + 1u];  // groups: block of children << 8 | children still to visit
   uint top = 0u;
   uint bottom = 0u;  // where the stack of the tree that is being traversed begins
   uint record = 0u;
@@ -156,25 +190,27 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
 
   for (;;) {  // one tree per turn: the top level, an instance, the top level again
     const TraceSpace s = trace_enter(record, origin, direction);
-    const uint b0 = 1u << s.octant;
-    const uint b1 = 1u << (s.octant ^ 1u);
-    const uint b2 = 1u << (s.octant ^ 2u);
-    const uint b3 = 1u << (s.octant ^ 3u);
-    const uint b4 = 1u << (s.octant ^ 4u);
-    const uint b5 = 1u << (s.octant ^ 5u);
-    const uint b6 = 1u << (s.octant ^ 6u);
-    const uint b7 = 1u << (s.octant ^ 7u);
+    // On a card the children that are hit are collected by slot, which takes fewer registers.
+    const uint octant = ON_CARD != 0u ? 0u : s.octant;
+    const uint b0 = 1u << octant;
+    const uint b1 = 1u << (octant ^ 1u);
+    const uint b2 = 1u << (octant ^ 2u);
+    const uint b3 = 1u << (octant ^ 3u);
+    const uint b4 = 1u << (octant ^ 4u);
+    const uint b5 = 1u << (octant ^ 5u);
+    const uint b6 = 1u << (octant ^ 6u);
+    const uint b7 = 1u << (octant ^ 7u);
     const bvec3 backwards = lessThan(s.inverse, vec3(0.0));
     // A pair's primitive is stored above eight other bits.
     const uint left_out = s.instance == source.x ? source.y << 8 : 0xffffffffu;
-    uint group = fresh && (s.presence & worlds & ~blocked) != 0u ? b0 : 0u;
+    uint group = fresh && (s.presence & worlds & ~blocked) != 0u ? 1u << s.octant : 0u;
     uint entered = 0u;
 
     for (;;) {  // one record per turn
       if ((group & 0xffu) == 0u) {
         if (top == bottom) break;
         top--;
-        group = stack[top];
+        group = trace_kept(top);
       }
       // The lowest bit belongs to the nearest child; bit i stands for slot i ^ octant.
       const uint bit = group & (~group + 1u);
@@ -188,13 +224,15 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
       const uint kind = head.z & 0xffu;
 
       // The record is tested as a node.
-      {
+      if (ON_CARD == 0u || kind >= RECORD_NODE) {
         const vec3 corner = vec3(ivec3(head.xyz) >> 8);
         const vec3 scale = uintBitsToFloat((head.xyz << 23) & 0x7f800000u) * s.inverse;
-        const vec3 scale1 = scale * 0.00390625;
-        const vec3 scale2 = scale * 1.52587890625e-5;
-        const vec3 near = (corner - s.near) * s.inverse;
-        const vec3 far = (corner - s.far) * s.inverse;
+        const vec3 scale1 = ON_CARD != 0u ? scale : scale * 0.00390625;
+        const vec3 scale2 = ON_CARD != 0u ? scale : scale * 1.52587890625e-5;
+        const vec3 before = ON_CARD != 0u ? s.origin + s.towards : s.near;
+        const vec3 behind = ON_CARD != 0u ? s.origin - s.towards : s.far;
+        const vec3 near = (corner - before) * s.inverse;
+        const vec3 far = (corner - behind) * s.inverse;
         const uvec3 low0 = uvec3(w1.x, w2.x, w3.x);
         const uvec3 low1 = uvec3(w1.y, w2.y, w3.y);
         const uvec3 high0 = uvec3(w1.z, w2.z, w3.z);
@@ -212,14 +250,15 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
         hits |= trace_box(trace_byte1(n1) * scale1 + near, trace_byte1(f1) * scale1 + far, t_min_bits, cull, b5);
         hits |= trace_box(trace_byte2(n1) * scale2 + near, trace_byte2(f1) * scale2 + far, t_min_bits, cull, b6);
         hits |= trace_box(trace_byte3(n1) * scale + near, trace_byte3(f1) * scale + far, t_min_bits, cull, b7);
-        stack[top] = group;
+        if (ON_CARD != 0u) hits = trace_from_octant(hits, s.octant);
+        trace_keep(top, group);
         const bool descend = kind >= RECORD_NODE && hits != 0u;
         top += descend && (group & 0xffu) != 0u ? 1u : 0u;
         group = descend ? head.w << 8 | hits : group;
       }
 
       // The record is tested as a pair of triangles.
-      {
+      if (ON_CARD == 0u || kind == RECORD_PAIR) {
         const vec3 p0 = trace_project(uintBitsToFloat(w1.xyz), s);
         const vec3 p1 = trace_project(uintBitsToFloat(uvec3(w1.w, w2.xy)), s);
         const vec3 p2 = trace_project(uintBitsToFloat(uvec3(w2.zw, w3.x)), s);
@@ -264,7 +303,7 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
 
     if (entered != 0u) {
       if ((group & 0xffu) != 0u) {
-        stack[top] = group;
+        trace_keep(top, group);
         top++;
       }
       bottom = top;

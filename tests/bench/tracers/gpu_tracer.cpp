@@ -43,10 +43,13 @@ std::vector<glm::uvec4> scene_texels(const scene::Scene& scene, scene::BvhQualit
 }
 
 GpuTracer::GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels)
+    : GpuTracer(device, texels, !device.shares_host_memory()) {}
+
+GpuTracer::GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels, bool on_card)
     : device_(device),
-      hits_pass_(device, "closest_hits", closest_hits_spv),
-      distances_pass_(device, "closest_distances", closest_distances_spv),
-      blocked_pass_(device, "blocked_worlds", blocked_worlds_spv) {
+      hits_pass_(device, "closest_hits", closest_hits_spv, {0, on_card}),
+      distances_pass_(device, "closest_distances", closest_distances_spv, {0, on_card}),
+      blocked_pass_(device, "blocked_worlds", blocked_worlds_spv, {0, on_card}) {
   render::upload_texels(device, bvh_, texels, vk::Format::eR32G32B32A32Uint);
 }
 

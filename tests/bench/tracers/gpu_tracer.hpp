@@ -33,7 +33,9 @@ std::vector<glm::uvec4> scene_texels(const scene::Scene& scene,
 
 class GpuTracer {
  public:
+  // Traces as the renderer does on this device, or as it does on a card or a CPU device.
   GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels);
+  GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels, bool on_card);
 
   std::vector<TracedHit> closest(std::span<const Ray> rays, std::uint32_t worlds);
   std::vector<std::uint32_t> blocked(std::span<const Ray> rays, std::uint32_t worlds);

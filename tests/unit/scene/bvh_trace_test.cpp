@@ -256,6 +256,65 @@ std::size_t leaks(render::Device& device, const Scene& scene, std::span<const Ra
   return result;
 }
 
+// Squares around the origin, each twice as large as the last and a little behind it: their tree is
+// as deep as one may be.
+scene::Mesh nested_squares(int count) {
+  scene::Mesh mesh;
+  for (int i = 0; i < count; ++i) {
+    const float half_edge = std::ldexp(1.0f, i - count);
+    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+    for (const glm::vec2 corner : {glm::vec2(-1, -1), {1, -1}, {1, 1}, {-1, 1}})
+      mesh.positions.emplace_back(half_edge * corner, -half_edge);
+    mesh.triangles.emplace_back(first, first + 1, first + 2);
+    mesh.triangles.emplace_back(first, first + 2, first + 3);
+  }
+  return mesh;
+}
+
+void expect_the_same_on_a_card(render::Device& device, const Scene& scene,
+                               std::span<const Ray> rays) {
+  const auto texels = bench::scene_texels(scene, BvhQuality::medium);
+  bench::GpuTracer on_cpu(device, texels, false), on_card(device, texels, true);
+  std::size_t found = 0, other = 0;
+  const std::vector<TracedHit> expected = on_cpu.closest(rays, scene::world_both);
+  const std::vector<TracedHit> hits = on_card.closest(rays, scene::world_both);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    found += expected[i].t >= 0;
+    other += std::memcmp(&expected[i], &hits[i], sizeof(TracedHit)) != 0;
+  }
+  EXPECT_EQ(other, 0u);
+  EXPECT_GT(found, rays.size() / 10);
+  EXPECT_EQ(on_cpu.blocked(rays, scene::world_both), on_card.blocked(rays, scene::world_both));
+}
+
+TEST_F(BvhTrace, IsTheSameOnACard) {
+  Scene scene = bench::scene_of(bench::random_triangles(3000, 1, 0.2f, 1));
+  for (int i = 1; i < 40; ++i) {
+    scene.instances.push_back(scene.instances[0]);
+    scene.instances.back().world_from_object =
+        glm::rotate(glm::dmat4(1), 0.1 * i, glm::dvec3(1, 2, 3));
+  }
+  expect_the_same_on_a_card(device(), scene, rays_across(20'000, 2, 1, 2));
+}
+
+TEST_F(BvhTrace, IsTheSameOnACardInADeepTree) {
+  Scene scene = bench::scene_of(nested_squares(100));
+  EXPECT_GE(scene::build_mesh_bvh(scene.meshes[0]).depth, 12u);
+  for (int i = 1; i < 30; ++i) {  // the levels above
+    scene.instances.push_back(scene.instances[0]);
+    scene.instances.back().world_from_object =
+        glm::scale(glm::dmat4(1), glm::dvec3(std::ldexp(1.0, -i)));
+  }
+  std::vector<Ray> rays;
+  Random random(23);
+  for (int i = 0; i < 20'000; ++i) {
+    const float far = std::ldexp(1.0f, -static_cast<int>(random.below(150)));
+    rays.push_back(
+        {far * random.in_cube(1), 0, {random.in_cube(0.3f) - glm::vec3(0, 0, 1)}, 1e30f});
+  }
+  expect_the_same_on_a_card(device(), scene, rays);
+}
+
 TEST_F(BvhTrace, NothingLeaksThroughAClosedMesh) {
   Scene scene = bench::scene_of(bench::bumpy_sphere(4, 1.0, 0.3, 1));
   const scene::Mesh& mesh = scene.meshes[0];

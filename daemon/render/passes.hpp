@@ -1,0 +1,15 @@
+// Lists the passes that pictures are made by.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "daemon/render/kernel.hpp"
+
+namespace previz::render {
+
+// Returns what a shown picture with these features (FEATURE_* bits) is made by, and then what
+// averages it. What bends meshes is not among them: it has one pipeline for all pictures.
+std::vector<Pass> passes_for(std::uint32_t features);
+
+}  // namespace previz::render

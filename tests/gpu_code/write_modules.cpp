@@ -1,0 +1,63 @@
+// Writes every pass of the renderer as the driver of a graphics card gets it:
+//   gpu_code_modules SET_FILE FOLDER
+// makes FOLDER/<features>.<pass>.spv, and beside each a file .bindings with a line for each buffer,
+// "number storage" or "number texels". The features are those of the set, and all that there are.
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "daemon/render/feature.hpp"
+#include "daemon/render/passes.hpp"
+#include "daemon/render/spirv.hpp"
+#include "daemon/scene/load.hpp"
+#include "daemon/set/load.hpp"
+#include "shaders/deform.spv.h"
+#include "shaders/refit_leaves.spv.h"
+#include "shaders/refit_nodes.spv.h"
+
+namespace {
+
+using previz::render::Pass;
+
+void write(const std::filesystem::path& stem, const Pass& pass, std::uint32_t features) {
+  const std::vector<std::uint32_t> module = previz::render::module_of(pass, features, true);
+  std::ofstream code(stem.string() + ".spv", std::ios::binary);
+  code.write(reinterpret_cast<const char*>(module.data()),
+             static_cast<std::streamsize>(module.size() * sizeof(std::uint32_t)));
+  std::ofstream bindings(stem.string() + ".bindings");
+  for (const auto& binding : previz::render::describe_spirv(pass.spirv).bindings)
+    bindings << binding.number << (binding.is_storage ? " storage\n" : " texels\n");
+  code.close();
+  bindings.close();
+  if (!code || !bindings) throw std::runtime_error(stem.string() + ": cannot be written");
+}
+
+void write_all(const std::filesystem::path& folder, const std::string& name,
+               std::uint32_t features) {
+  std::vector<Pass> passes = previz::render::passes_for(features);
+  passes.push_back({"deform", deform_spv, false});
+  passes.push_back({"refit_leaves", refit_leaves_spv, false});
+  passes.push_back({"refit_nodes", refit_nodes_spv, false});
+  for (const Pass& pass : passes) write(folder / (name + "." + pass.name), pass, features);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    if (argc != 3) throw std::runtime_error("gpu_code_modules SET_FILE FOLDER");
+    const previz::set::Set set = previz::set::load_set(argv[1]);
+    const auto scene = previz::scene::load_scene(set);
+    const std::filesystem::path folder = argv[2];
+    std::filesystem::create_directories(folder);
+    write_all(folder, "demo", previz::render::reachable_bits(set, scene, true).front());
+    write_all(folder, "all", ~0u);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "gpu_code_modules: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
