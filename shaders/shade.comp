@@ -171,30 +171,39 @@ float combined_pdf(Technique t, Surface s, vec3 direction, float bsdf_pdf) {
   return mix(bsdf_pdf, bounds_pdf(s.position, t.total, direction), t.share);
 }
 
-bool sample_lobes(Surface s, Lobes l, vec2 u, float choice, out vec3 direction, out vec3 weight,
-                  out float pdf) {
+bool sample_lobes(Surface s, inout Lobes l, vec2 u, float choice, out vec3 direction, out vec3 weight,
+                  out bool is_dirac, out float others) {
+  others = 1.0;
   if (has_feature(FEATURE_PANES) && any(greaterThan(pane_transmittance(s), vec3(0.0))))
-    return sample_met_pane(s, l, u, choice, direction, weight, pdf);
-  return bsdf_sample(s, l, u, choice, direction, weight, pdf);
+    return sample_met_pane(s, l, u, choice, direction, weight, is_dirac, others);
+  return bsdf_sample(s, l, u, choice, direction, weight, is_dirac);
 }
 
-// Samples a direction by either technique, with the results of bsdf_sample().
+// Samples a direction by either technique. `weight` is its throughput, and `pdf` the density per
+// steradian over both, 0 for a Dirac lobe. The result is false where the light is absorbed.
 bool sample_direction(Technique t, Surface s, Lobes l, vec2 u, float choice, out vec3 direction,
                       out vec3 weight, out float pdf) {
-  if (!choose(u.x, t.share)) {
-    if (!sample_lobes(s, l, u, choice, direction, weight, pdf)) return false;
-    if (t.share <= 0.0) return true;
-    const float all = pdf > 0.0 ? combined_pdf(t, s, direction, pdf) : 1.0 - t.share;
-    weight *= (pdf > 0.0 ? pdf : 1.0) / all;
-    if (pdf > 0.0) pdf = all;
+  const bool aimed = choose(u.x, t.share);
+  bool is_dirac = false;
+  float others = 1.0;
+  pdf = 0.0;
+  if (aimed) direction = bounds_sample(s.position, t.total, u);
+  else if (!sample_lobes(s, l, u, choice, direction, weight, is_dirac, others)) return false;
+  if (is_dirac) {
+    if (t.share > 0.0) weight *= 1.0 / (1.0 - t.share);
     return true;
   }
-  direction = bounds_sample(s.position, t.total, u);
   float bsdf_pdf;
   const vec3 value = bsdf_evaluate(s, l, direction, bsdf_pdf);
   if (bsdf_pdf <= 0.0) return false;
-  pdf = combined_pdf(t, s, direction, bsdf_pdf);
-  weight = value / pdf;
+  const float own_pdf = bsdf_pdf * others;
+  pdf = combined_pdf(t, s, direction, own_pdf);
+  if (aimed) {
+    weight = value / pdf;
+  } else {
+    weight = value / bsdf_pdf / others;
+    if (t.share > 0.0) weight *= own_pdf / pdf;
+  }
   return true;
 }
 
@@ -447,11 +456,11 @@ void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, o
   if (ends_far_off(p, s, chance.x)) return;
   Lobes l = make_lobes(s);
   if (has_feature(FEATURE_PANES)) l = without_passing(s, l, pane_transmittance(s));
-  const Technique t = make_technique(p, s, l);
   if (has_feature(FEATURE_MANY_LIGHTS))
     p.receiver = has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l) ? NO_NORMAL
                                                                          : pack_normal(s.normal);
   if (has_feature(FEATURE_PHOTONS)) meet_photons(p, s, l);
+  const Technique t = make_technique(p, s, l);
   lit = light_ray(p, s, l, t, random, ray);
   scattered = scatter(p, s, l, t, random, chance);
   p.depth += 1u;

@@ -93,7 +93,7 @@ struct Lobes {
   vec3 coat_color;      // the channels' share of it
   vec3 conductor;       // reflectance at normal incidence times its weight
   float conductor_weight;
-  vec3 conductor_gain;  // returns the energy that single scattering loses
+  float conductor_loss; // what single scattering loses, over what it keeps
   float glass;
   float glass_gain;
   vec3 sheen;           // weight of the fibres' reflection
@@ -171,7 +171,7 @@ Lobes make_lobes(Surface s) {
   l.coat_color = vec3(1.0);
   l.conductor = vec3(0.0);
   l.conductor_weight = 0.0;
-  l.conductor_gain = vec3(1.0);
+  l.conductor_loss = 0.0;
   l.smooth_reflection = false;
   l.smooth_glass = true;
   l.glass_gain = 1.0;
@@ -185,8 +185,7 @@ Lobes make_lobes(Surface s) {
     if (has_coat_color(s)) reflection *= luminance(l.coat_color);
     if (s.metallic > 0.0) {
       reflection += s.metallic * luminance(fresnel_schlick(s.base_color, nv));
-      if (!l.smooth_reflection)
-        l.conductor_gain += s.base_color * (1.0 / reflection_albedo(s, nv) - 1.0);
+      if (!l.smooth_reflection) l.conductor_loss = 1.0 / reflection_albedo(s, nv) - 1.0;
     }
   }
   l.diffuse = opaque * (1.0 - l.coat) * s.base_color;
@@ -242,8 +241,8 @@ Lobes make_lobes(Surface s) {
 // half vector and the light.
 vec3 reflection_color(Lobes l, float cos_half) {
   const vec3 coat = has_feature(FEATURE_COAT_COLOR) ? l.coat * l.coat_color : vec3(l.coat);
-  return coat +
-         l.conductor_weight * l.conductor_gain * fresnel_schlick(l.conductor, cos_half);
+  const vec3 gain = 1.0 + l.conductor * l.conductor_loss;  // returns what is lost
+  return coat + l.conductor_weight * gain * fresnel_schlick(l.conductor, cos_half);
 }
 
 // Returns the colour of all reflections that are Dirac deltas and follow the base's normal: that of
@@ -444,12 +443,12 @@ bool sample_rough_glass(Surface s, float choice, vec2 u, out vec3 wi) {
   return reflected == (i.z > 0.0);
 }
 
-// Samples a direction. `weight` is its throughput: f * cos / pdf over all lobes that are not Dirac
-// deltas, or the weight of the Dirac lobe. `pdf` is the density per steradian, 0 for a Dirac lobe.
-// `choice` decides whether rough glass reflects. The result is false where the light is absorbed.
+// Samples the direction of a lobe. `weight` is the throughput of a Dirac lobe; that of the others is
+// f * cos / pdf of bsdf_evaluate(). `choice` decides whether rough glass reflects. The result is false
+// where the light is absorbed.
 bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3 weight,
-                 out float pdf) {
-  pdf = 0.0;
+                 out bool is_dirac) {
+  is_dirac = false;
   wi = vec3(0.0);
   weight = vec3(0.0);
   if (choose(u.x, l.p_diffuse)) {
@@ -463,6 +462,7 @@ bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3
     const float cos_o = dot(normal, s.wo);
     if (cos_o <= 0.0) return false;
     if (l.smooth_clear) {
+      is_dirac = true;
       wi = 2.0 * cos_o * normal - s.wo;
       weight = vec3(l.clear / l.p_clear);
       return reflects_to(s, wi, normal);
@@ -474,6 +474,7 @@ bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3
   } else if (has_feature(FEATURE_TRANSMISSION) && l.p_glass > 0.0 &&
              choose(u.x, l.p_glass / (l.p_glass + l.p_reflection))) {
     if (l.smooth_glass) {
+      is_dirac = true;
       if (!sample_glass(s, u.x, wi, weight)) return false;
       if (has_sheen(s)) l = under_sheen(s, l, wi);
       weight *= l.glass / l.p_glass;
@@ -484,6 +485,7 @@ bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3
     const float cos_o = dot(s.normal, s.wo);
     if (cos_o <= 0.0) return false;
     if (l.smooth_reflection) {
+      is_dirac = true;
       wi = 2.0 * cos_o * s.normal - s.wo;
       weight = reflection_color(l, cos_o) / l.p_reflection;
       if (has_feature(FEATURE_SHEEN)) weight *= l.below_sheen;
@@ -497,9 +499,6 @@ bool bsdf_sample(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3
     return false;
   }
   wi = normalize(wi);
-  const vec3 value = bsdf_evaluate(s, l, wi, pdf);
-  if (pdf <= 0.0) return false;
-  weight = value / pdf;
   return true;
 }
 

@@ -76,11 +76,12 @@ ivec3 neighbour_cell(ivec3 first, uint corner) {
   return first + ivec3(corner & 1u, (corner >> 1) & 1u, corner >> 2);
 }
 
-// Adds the photons of one cell that lie on the disc and met no more than `most_vertices` Dirac
-// vertices.
-void gather_cell(ivec3 cell, int level, float radius, Surface s, Lobes l, uint most_vertices,
+// Adds the photons of one of the eight cells whose lowest is `first` that lie on the disc and met no
+// more than `most_vertices` Dirac vertices.
+void gather_cell(ivec3 first, uint corner, int level, float radius, Surface s, Lobes l, uint most_vertices,
                  bool differing, inout GatheredPair sum) {
-  const uvec2 bucket = texelFetch(found_buckets, int(photon_bucket(cell, level))).xy;
+  const uvec2 bucket =
+      texelFetch(found_buckets, int(photon_bucket(neighbour_cell(first, corner), level))).xy;
   const uint end = bucket.x + bucket.y;
   for (uint chunk = bucket.x; chunk < end; chunk += LOOP_CHUNK) {
     for (uint i = chunk; i < min(chunk + LOOP_CHUNK, end); ++i) {
@@ -90,7 +91,8 @@ void gather_cell(ivec3 cell, int level, float radius, Surface s, Lobes l, uint m
       if (closeness <= 0.0 || uint(photon.w) > most_vertices) continue;
       if (abs(dot(off, s.geometric_normal)) > SAME_SURFACE_HEIGHT * radius) continue;
       // Other cells, even two of those that are searched, may share the bucket.
-      if (photon_level(photon.xyz) != level || photon_cell(photon.xyz, level) != cell) continue;
+      if (photon_level(photon.xyz) != level || photon_cell(photon.xyz, level) != neighbour_cell(first, corner))
+        continue;
       gather_photon(i, closeness, s, l, differing, sum);
     }
   }
@@ -116,8 +118,8 @@ GatheredPair gather_photons(Surface s, Lobes l, uint most_vertices, bool differi
       if (reaches_cell(s, radius, neighbour_cell(first_cell, corner), width))
         reached |= 1u << corner;
     for (; reached != 0u; reached &= reached - 1u)
-      gather_cell(neighbour_cell(first_cell, uint(findLSB(reached))), level, radius, s, l,
-                  most_vertices, differing, sum);
+      gather_cell(first_cell, uint(findLSB(reached)), level, radius, s, l, most_vertices, differing,
+                  sum);
   }
   // The kernel is Epanechnikov's on a disc, 2 / (pi r^2) (1 - d^2 / r^2).
   const float scale = 2.0 / (PI * radius * radius * float(frame.photon_count));

@@ -72,23 +72,24 @@ Lobes without_passing(Surface s, Lobes l, vec3 through) {
   return l;
 }
 
-// Samples a direction from the lobes of without_passing(), with the results of bsdf_sample().
-bool sample_met_pane(Surface s, Lobes l, vec2 u, float choice, out vec3 wi, out vec3 weight,
-                     out float pdf) {
+// Samples a direction from the lobes of without_passing(), with the results of bsdf_sample(). Unless
+// the pane reflects, only the other lobes are left in `l`, and `others` is the probability that it is
+// one of them.
+bool sample_met_pane(Surface s, inout Lobes l, vec2 u, float choice, out vec3 wi, out vec3 weight,
+                     out bool is_dirac, out float others) {
+  others = 1.0 - l.p_glass;
   if (choose(u.x, l.p_glass)) {
     wi = 2.0 * dot(s.normal, s.wo) * s.normal - s.wo;
     weight = vec3(l.glass / l.p_glass);
-    pdf = 0.0;
+    is_dirac = true;
     return reflects_to(s, wi);
   }
-  const float others = 1.0 - l.p_glass;
   l.p_diffuse /= others;
   l.p_reflection /= others;
   l.p_glass = 0.0;
   l.glass = 0.0;
-  if (!bsdf_sample(s, l, u, choice, wi, weight, pdf)) return false;
+  if (!bsdf_sample(s, l, u, choice, wi, weight, is_dirac)) return false;
   weight /= others;
-  pdf *= others;
   return true;
 }
 
