@@ -1,4 +1,4 @@
-// Assigns each bucket its range of the order.
+// Assigns each bucket its range of the order, and asks for photon_merge.comp where a bucket is large.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -10,4 +10,9 @@ void main() {
   if (bucket >= photon_bucket_count()) return;
   const uint count = buckets[bucket].count;
   if (count > 0u) buckets[bucket].first = atomicAdd(photon_control.stored, count);
+  if (count <= SMALL_BUCKET) return;
+  atomicMax(photon_control.merge_groups[0],
+            (2u * frame.photon_count + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE);
+  atomicMax(photon_control.merge_groups[1], 1u);
+  atomicMax(photon_control.merge_groups[2], 1u);
 }

@@ -238,7 +238,7 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
     for (Kernel* pass : {&surface_, &cover_})
       for (std::uint32_t y = 0; y < height; y += most_rows) {
         const std::uint32_t rows = std::min(most_rows, height - y);
-        pass->dispatch({commands, gpu::GpuBatch{0, y, width, rows, 0, 0, 0}, buffers},
+        pass->dispatch({commands, gpu::GpuBatch{0, y, width, rows, 0, 0, 0, 0}, buffers},
                        width * rows);
       }
     keep_points(commands, *buffers.at("vertices"));

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "daemon/render/kernel.hpp"
+#include "shaders/lib/render_shared.h"
 
 namespace previz::render {
 
@@ -24,15 +25,17 @@ class PhotonMap {
   // These record a pass of photons, in this order: emission fills the queue of paths; after each
   // extension, as many work groups as `groups` holds at `offset` bounce the photons off what they
   // hit; sorting makes the map. All take the buffers of the scene and of the paths, and a GpuBatch
-  // whose first_sample is the pass and whose photon_radius is the radius.
+  // whose first_sample is the pass and whose photon_radius is the radius. No invocation of these
+  // passes has more to do where many photons are in one place.
   std::uint32_t count() const { return photons_; }  // emitted a pass
   void record_emission(const Recording& recording);
   void record_bounce(const Recording& recording, const Buffer& groups, vk::DeviceSize offset);
-  void record_sorting(const Recording& recording);
+  void record_sorting(const vk::raii::CommandBuffer& commands, gpu::GpuBatch batch,
+                      const Buffers& buffers);
 
  private:
   Device& device_;
-  Kernel emit_, bounce_, share_out_, scatter_, sort_;
+  Kernel emit_, bounce_, share_out_, scatter_, sort_, merge_;
   std::uint32_t photons_ = 0, bucket_count_ = 0;
   std::uint32_t room_ = 0;  // photons that the buffers have room for
   Buffer photon_buffer_, order_, filled_, control_, sorted_, buckets_;

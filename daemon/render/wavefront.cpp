@@ -98,7 +98,7 @@ void Wavefront::create_tiles() {
     const std::uint32_t band_rows = round_up((rows + bands - 1) / bands, block_height);
     tiles_.clear();
     for (std::uint32_t y = 0; y < rows; y += band_rows)
-      tiles_.push_back({{0, y, columns, std::min(band_rows, rows - y), 0, 0, 0}});
+      tiles_.push_back({{0, y, columns, std::min(band_rows, rows - y), 0, 0, 0, 0}});
   };
   const auto fits = [&] {
     for (std::size_t i = 0; i < tiles_.size(); ++i)
@@ -273,13 +273,15 @@ void Wavefront::record_batch(const Recording& recording, const gpu::GpuBatch& ba
 
 // Photons are paths of their own, traced before those of the sample. Here too a fork continues one
 // round later, and so does what passes a pane.
-void Wavefront::record_photons(const Recording& recording, std::uint32_t max_depth) {
+void Wavefront::record_photons(const vk::raii::CommandBuffer& commands, const gpu::GpuBatch& batch,
+                               const Buffers& buffers, std::uint32_t max_depth) {
+  const Recording recording{commands, batch, buffers};
   photons_.record_emission(recording);
   for (std::uint32_t segment = 0; segment < max_depth + 1 + passes(); ++segment) {
     record_extension(recording);
     photons_.record_bounce(recording, control_, offsetof(gpu::GpuControl, extend_groups));
   }
-  photons_.record_sorting(recording);
+  photons_.record_sorting(commands, batch, buffers);
 }
 
 bool Wavefront::render(std::uint32_t first_sample, std::uint32_t samples, std::uint32_t max_depth,
@@ -337,9 +339,8 @@ bool Wavefront::render_with_photons(std::uint32_t first_sample, std::uint32_t sa
       batch.photon_radius = static_cast<float>(traced_radius_);
       const Buffers buffers = buffers_of(i);
       device_.record([&](const vk::raii::CommandBuffer& commands) {
-        const Recording recording{commands, batch, buffers};
-        if (trace_photons) record_photons(recording, max_depth);
-        record_batch(recording, batch, max_depth);
+        if (trace_photons) record_photons(commands, batch, buffers, max_depth);
+        record_batch({commands, batch, buffers}, batch, max_depth);
       });
       device_.submissions().add_work(slots_of(batch) +
                                      (trace_photons ? std::uint64_t{photons_.count()} : 0));

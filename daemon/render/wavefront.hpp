@@ -92,7 +92,8 @@ class Wavefront {
                            std::uint32_t max_depth, const std::function<bool()>& cancelled);
   void count();
   void record_extension(const Recording& recording);
-  void record_photons(const Recording& recording, std::uint32_t max_depth);
+  void record_photons(const vk::raii::CommandBuffer& commands, const gpu::GpuBatch& batch,
+                      const Buffers& buffers, std::uint32_t max_depth);
   void record_batch(const Recording& recording, const gpu::GpuBatch& batch,
                     std::uint32_t max_depth);
 

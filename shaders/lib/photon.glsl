@@ -7,7 +7,8 @@
 
 layout(scalar) buffer Photons { GpuPhoton photons[]; };  // 2 * photon_count; two, for a fork
 layout(scalar) buffer Order { uint photon_order[]; };    // photons, those of a bucket together
-layout(scalar) buffer Filled { uint filled[]; };         // of a bucket, while the order is made
+layout(scalar) buffer Filled { uint filled[]; };         // of a bucket, while the order is made; then
+                                                         // the order in turns with photon_order
 layout(scalar) buffer PhotonControl { GpuPhotonControl photon_control; };
 layout(scalar) buffer Sorted { vec4 sorted_photons[]; };  // found_photons, to write
 layout(scalar) buffer Buckets { GpuPhotonBucket buckets[]; };  // a power of two; found_buckets

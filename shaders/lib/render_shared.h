@@ -108,8 +108,14 @@ struct GpuPhotonBucket {
 };
 
 struct GpuPhotonControl {
+  uint merge_groups[4];  // indirect dispatch arguments, padding; 0 unless some bucket is large
   uint stored;
 };
+
+// One invocation sorts a bucket of no more photons than these; larger ones are merged by all, in runs
+// that grow by PHOTON_RUNS_MERGED from pass to pass, from 1.
+PREVIZ_CONST uint SMALL_BUCKET = 64u;
+PREVIZ_CONST uint PHOTON_RUNS_MERGED = 8u;
 
 // The sums of a pixel's samples. They are two-float sums (value = high + low), so that 1e7 samples
 // lose nothing (shaders/README.md, "Accumulation").
@@ -273,6 +279,7 @@ struct GpuBatch {
   uint first_sample, samples;
   float photon_radius;        // over the distance from the camera; the photons of a pass serve the
                               // sample of the same index
+  uint photon_merge;          // number of the pass of photon_merge.comp
 };
 
 // Push constants of the denoiser's passes.
@@ -462,7 +469,7 @@ static_assert(sizeof(GpuLight) == 160);
 static_assert(offsetof(GpuLight, uv0) == 112);
 static_assert(sizeof(GpuFrame) == 240);
 static_assert(sizeof(GpuLightNode) == 48);
-static_assert(sizeof(GpuBatch) == 28);
+static_assert(sizeof(GpuBatch) == 32);
 static_assert(sizeof(GpuPhoton) == 64);
 static_assert(sizeof(GpuPhotonBucket) == 8);
 static_assert(sizeof(GpuInfluence) == 24);

@@ -31,7 +31,7 @@ class Accumulator {
   void add(const std::vector<gpu::vec4>& mixed, const std::vector<gpu::vec4>& real) {
     render::upload_bytes(device_, mixed_, std::as_bytes(std::span(spread(mixed))));
     render::upload_bytes(device_, real_, std::as_bytes(std::span(spread(real))));
-    const gpu::GpuBatch batch{0, 0, 1, 1, 0, static_cast<std::uint32_t>(mixed.size()), 0};
+    const gpu::GpuBatch batch{0, 0, 1, 1, 0, static_cast<std::uint32_t>(mixed.size()), 0, 0};
     const render::Buffers buffers{
         {"frame", &frame_},          {"sample_mixed", &mixed_},   {"sample_real", &real_},
         {"sample_landed", &landed_}, {"sample_aov", &aov_},       {"sample_albedo", &albedo_},
