@@ -75,6 +75,7 @@ void describe(const set::CheckedSet& checked, const scene::Scene& scene, std::os
   set::describe_estimator(set, out);
   if (!checked.is_take) output::describe(set, out);
   render::describe(set, scene, out);
+  render::describe_computer(out);
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "daemon/render/feature.hpp"
+#include "daemon/render/gpu.hpp"
+#include "daemon/render/graphics_cards.hpp"
 #include "daemon/render/photon_schedule.hpp"
 #include "daemon/render/picture_memory.hpp"
 #include "daemon/set/check.hpp"
@@ -91,6 +93,21 @@ void describe(const set::Set& set, const scene::Scene& scene, std::ostream& out)
       demand_of(set, scene, material_features(scene, set.estimation.specular_roughness));
   print_features(demand, size, out);
   print_costs(set, needed_bits(demand), size, out);
+}
+
+void describe_computer(std::ostream& out) {
+  out << "\nthis computer\n";
+  try {
+    const DeviceFacts facts = facts_of(*open_device({}));
+    const std::string name = facts.name + " (" + facts.driver + ")";
+    out << (facts.is_gpu ? "  draws with " + name
+                         : "  draws on the processor, by " + name + ": no graphics card is used")
+        << words("; memory: ",
+                 std::floor(static_cast<double>(facts.memory_bytes) / (1024 * mebibyte)), " GiB\n");
+  } catch (const Error& error) {
+    out << "  " << error.what() << '\n';
+  }
+  if (const std::string advice = screen_advice(); !advice.empty()) out << "  " << advice << '\n';
 }
 
 }  // namespace previz::render

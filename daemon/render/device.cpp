@@ -7,6 +7,7 @@
 #include <cstring>
 #include <utility>
 
+#include "daemon/render/graphics_cards.hpp"
 #include "daemon/report/log.hpp"
 #include "drivers/error.hpp"
 
@@ -284,6 +285,7 @@ void Device::create_instance() {
 
 void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) {
   std::string found;
+  std::vector<std::uint32_t> vendors;
   int best = 1000;
   for (auto& physical : vk::raii::PhysicalDevices(instance_)) {
     const auto properties = physical.getProperties();
@@ -292,6 +294,7 @@ void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) 
     const bool is_cpu = properties.deviceType == vk::PhysicalDeviceType::eCpu;
     if (lack.empty() && is_cpu && !cpu_too) lack = "a CPU; waiting for a GPU";
     found += "\n  " + name + (lack.empty() ? "" : " (" + lack + ")");
+    if (!is_cpu) vendors.push_back(properties.vendorID);
     if (!lack.empty() || name.find(wanted_name) == std::string::npos) continue;
     if (rank(properties.deviceType) >= best) continue;
     best = rank(properties.deviceType);
@@ -300,10 +303,17 @@ void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) 
     limits_ = properties.limits;
     is_cpu_ = is_cpu;
   }
+  if (best < 1000 && !(is_cpu_ && wanted_name.empty())) return;
+  std::string missing;
+  for (const std::string& advice : drivers_missing(graphics_cards(), vendors))
+    missing += "\n  " + advice;
   if (best == 1000)
     throw Error("Vulkan: no usable device" +
                 (wanted_name.empty() ? "" : " named \"" + wanted_name + "\"") +
-                "; found:" + (found.empty() ? " none" : found));
+                "; found:" + (found.empty() ? " none" : found) + missing);
+  if (!missing.empty() && !std::exchange(missing_is_said_, true))
+    report::log({report::Severity::warning, "render",
+                 "pictures are made by the processor (" + name_ + "), although" + missing});
 }
 
 void Device::create_device() {

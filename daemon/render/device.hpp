@@ -158,7 +158,8 @@ class Device {
   vk::PhysicalDeviceLimits limits_;
   DeviceLimits allows_{};
   bool is_cpu_ = false;
-  bool had_gpu_ = false;  // since it was first opened
+  bool had_gpu_ = false;          // since it was first opened
+  bool missing_is_said_ = false;  // that a card has no driver
   mutable std::mutex drawing_mutex_;
   Drawing drawing_;
   vk::raii::Device device_{nullptr};

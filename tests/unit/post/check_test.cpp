@@ -199,6 +199,11 @@ samples = 1500
   expect_said("no film camera calibration here");
 }
 
+TEST_F(Check, SaysWhatDraws) {
+  ASSERT_EQ(check_material(""), 0) << said_;
+  EXPECT_THAT(said_, testing::ContainsRegex("this computer\n  draws .*[(].*; memory: [0-9]"));
+}
+
 // 1920x1080 pixels of 1310 bytes with two frames on each side, and of 866 with one. On the card a
 // pixel has 190 bytes and 226 of a band, and 168 of history where it is averaged.
 TEST_F(Check, SaysHowMuchMemoryFramesTakeThatAreAveraged) {
