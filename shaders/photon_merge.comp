@@ -1,7 +1,7 @@
 // Sorts the photons of large buckets by index, as photon_sort.comp does those of small ones. Each pass
 // merges sorted runs; each invocation moves one photon to where it lies among those of its own run and
-// of the others, which it finds by binary search. So no invocation has more to do than another, however
-// many photons a focus has. The last pass of a bucket writes its photons as gathering reads them.
+// of the others, which it finds by binary search. So the work of an invocation grows with the logarithm
+// of the photons of a focus only. The last pass of a bucket writes its photons as gathering reads them.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

@@ -104,10 +104,12 @@ void describe_computer(std::ostream& out) {
                          : "  draws on the processor, by " + name + ": no graphics card is used")
         << words("; memory: ",
                  std::floor(static_cast<double>(facts.memory_bytes) / (1024 * mebibyte)), " GiB\n");
+    for (const std::string& missing : facts.missing_drivers) out << "  " << missing << '\n';
   } catch (const Error& error) {
     out << "  " << error.what() << '\n';
   }
-  if (const std::string advice = screen_advice(); !advice.empty()) out << "  " << advice << '\n';
+  const std::string advice = screen_advice(graphics_cards());
+  if (!advice.empty()) out << "  " << advice << '\n';
 }
 
 }  // namespace previz::render

@@ -12,7 +12,8 @@ namespace previz::render {
 // asks of the GPU without measuring it; `previzd trade` measures.
 void describe(const set::Set& set, const scene::Scene& scene, std::ostream& out);
 
-// Says which device of this computer draws, and what its graphics cards lack.
+// Says which device of this computer draws unless another is named, and what its graphics cards
+// lack.
 void describe_computer(std::ostream& out);
 
 }  // namespace previz::render

@@ -97,13 +97,26 @@ bool can_export_pictures(const vk::raii::PhysicalDevice& physical) {
   }
 }
 
+bool has_extension(const vk::raii::PhysicalDevice& physical, std::string_view name) {
+  return std::ranges::any_of(physical.enumerateDeviceExtensionProperties(),
+                             [&](const vk::ExtensionProperties& extension) {
+                               return std::string_view(extension.extensionName) == name;
+                             });
+}
+
+bool has_uniform_subgroups(const vk::raii::PhysicalDevice& physical) {
+  if (!has_extension(physical, VK_KHR_SHADER_SUBGROUP_UNIFORM_CONTROL_FLOW_EXTENSION_NAME))
+    return false;
+  using Feature = vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR;
+  return physical.getFeatures2<vk::PhysicalDeviceFeatures2, Feature>()
+      .get<Feature>()
+      .shaderSubgroupUniformControlFlow;
+}
+
 // Returns what names the device for OpenGL ES, if images that it makes can be shared with that.
 std::optional<CardIdentity> card_of(const vk::raii::PhysicalDevice& physical) {
-  const auto extensions = physical.enumerateDeviceExtensionProperties();
-  const auto is_sharing = [](const vk::ExtensionProperties& extension) {
-    return std::string_view(extension.extensionName) == VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME;
-  };
-  if (std::ranges::none_of(extensions, is_sharing) || !can_export_pictures(physical))
+  if (!has_extension(physical, VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME) ||
+      !can_export_pictures(physical))
     return std::nullopt;
   const auto ids =
       physical.getProperties2<vk::PhysicalDeviceProperties2, vk::PhysicalDeviceIDProperties>()
@@ -248,7 +261,9 @@ void Device::open(bool cpu_too) {
     publish({name_, is_cpu_, is_cpu_ && had_gpu_});
     had_gpu_ |= !is_cpu_;
   } catch (const vk::SystemError& error) {
-    throw Error(std::string("Vulkan: ") + error.what());
+    // Without any driver there is not even an instance.
+    if (!*instance_) note_missing_drivers({});
+    throw Error(std::string("Vulkan: ") + error.what() + missing_lines());
   }
 }
 
@@ -303,17 +318,24 @@ void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) 
     limits_ = properties.limits;
     is_cpu_ = is_cpu;
   }
-  if (best < 1000 && !(is_cpu_ && wanted_name.empty())) return;
-  std::string missing;
-  for (const std::string& advice : drivers_missing(graphics_cards(), vendors))
-    missing += "\n  " + advice;
+  note_missing_drivers(vendors);
   if (best == 1000)
     throw Error("Vulkan: no usable device" +
                 (wanted_name.empty() ? "" : " named \"" + wanted_name + "\"") +
-                "; found:" + (found.empty() ? " none" : found) + missing);
-  if (!missing.empty() && !std::exchange(missing_is_said_, true))
-    report::log({report::Severity::warning, "render",
-                 "pictures are made by the processor (" + name_ + "), although" + missing});
+                "; found:" + (found.empty() ? " none" : found) + missing_lines());
+}
+
+void Device::note_missing_drivers(std::span<const std::uint32_t> vendors) {
+  missing_drivers_ = drivers_missing(graphics_cards(options_.sys), vendors);
+  if (!options_.name.empty() || std::exchange(missing_is_said_, true)) return;
+  for (const std::string& missing : missing_drivers_)
+    report::log({report::Severity::warning, "render", missing});
+}
+
+std::string Device::missing_lines() const {
+  std::string lines;
+  for (const std::string& missing : missing_drivers_) lines += "\n  " + missing;
+  return lines;
 }
 
 void Device::create_device() {
@@ -337,6 +359,12 @@ void Device::create_device() {
   std::vector<const char*> extensions;
   card_ = shares_host_memory() ? std::nullopt : card_of(physical_);
   if (card_) extensions.push_back(VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME);
+  vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR uniform(VK_TRUE);
+  lanes_meet_ = has_uniform_subgroups(physical_);
+  if (lanes_meet_) {
+    extensions.push_back(VK_KHR_SHADER_SUBGROUP_UNIFORM_CONTROL_FLOW_EXTENSION_NAME);
+    features13.pNext = &uniform;
+  }
   info.setPEnabledExtensionNames(extensions);
   device_ = vk::raii::Device(physical_, info);
   pipelines_ = PipelineCache(physical_, device_, options_.cache);
@@ -424,7 +452,8 @@ DeviceFacts facts_of(const Device& device) {
           .driver = device.driver(),
           .is_gpu = !device.is_cpu(),
           .memory_bytes = device.memory_bytes(),
-          .shares_host_memory = device.shares_host_memory()};
+          .shares_host_memory = device.shares_host_memory(),
+          .missing_drivers = device.missing_drivers()};
 }
 void keep_programs(Device& device) {
   device.keep_programs();

@@ -52,9 +52,14 @@ class Device {
   std::uint32_t queue_family() const { return queue_family_; }
   const std::string& name() const { return name_; }
   std::string driver() const;  // its name and version, as it gives them
+  // What graphics cards need that Vulkan does not have (drivers_missing()).
+  const std::vector<std::string>& missing_drivers() const { return missing_drivers_; }
   const vk::PhysicalDeviceLimits& limits() const { return limits_; }
   const DeviceLimits& allows() const { return allows_; }
   bool is_cpu() const { return is_cpu_; }
+  // Returns whether the driver can be asked to keep the lanes of a subgroup together
+  // (with_uniform_subgroups()).
+  bool lanes_meet() const { return lanes_meet_; }
   // Returns whether the host works in the device's own memory; otherwise it uploads and downloads
   // by copies, and the device is wide enough to have many samples in flight.
   bool shares_host_memory() const { return is_cpu_ && !options_.as_gpu; }
@@ -140,6 +145,8 @@ class Device {
   void close();
   void publish(Drawing drawing);
   void create_instance();
+  void note_missing_drivers(std::span<const std::uint32_t> vendors);
+  std::string missing_lines() const;
   void pick_physical_device(const std::string& wanted_name, bool cpu_too);
   void create_device();
 
@@ -158,8 +165,10 @@ class Device {
   vk::PhysicalDeviceLimits limits_;
   DeviceLimits allows_{};
   bool is_cpu_ = false;
-  bool had_gpu_ = false;          // since it was first opened
-  bool missing_is_said_ = false;  // that a card has no driver
+  bool lanes_meet_ = false;
+  bool had_gpu_ = false;  // since it was first opened
+  std::vector<std::string> missing_drivers_;
+  bool missing_is_said_ = false;
   mutable std::mutex drawing_mutex_;
   Drawing drawing_;
   vk::raii::Device device_{nullptr};

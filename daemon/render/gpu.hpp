@@ -29,6 +29,9 @@ struct DeviceOptions {
   bool times_passes = false;
   // Folder in which keep_programs() keeps what the driver has compiled; empty: it keeps nothing.
   std::filesystem::path cache = {};
+  // Where sysfs is mounted, by which graphics cards are known that Vulkan does not have. What they
+  // need is logged once, unless a device is asked for by its name, and is part of errors.
+  std::filesystem::path sys = "/sys";
 };
 
 // Returns the folder for files that a program makes again when they are gone, as the XDG Base
@@ -53,8 +56,9 @@ struct DeviceTimes {
 struct DeviceFacts {
   std::string name, driver;  // "NVIDIA H100", "NVIDIA 580.159.04"
   bool is_gpu = false;
-  std::uint64_t memory_bytes = 0;   // all buffers together may take so much
-  bool shares_host_memory = false;  // nothing is copied to it
+  std::uint64_t memory_bytes = 0;            // all buffers together may take so much
+  bool shares_host_memory = false;           // nothing is copied to it
+  std::vector<std::string> missing_drivers;  // what other graphics cards need, a sentence each
 };
 
 // Counts what a device was given to do since it was opened.

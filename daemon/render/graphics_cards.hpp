@@ -1,5 +1,5 @@
-// The graphics cards of the computer as the kernel knows them, and what a card lacks on Debian 12
-// that no Vulkan driver finds.
+// Knows the graphics cards of the computer from the kernel, and what those need on Debian 12 for
+// which there is no Vulkan driver.
 #pragma once
 
 #include <cstdint>
@@ -13,22 +13,21 @@ namespace previz::render {
 // A card on the PCI bus of a maker whose cards Debian has drivers for.
 struct GraphicsCard {
   std::uint32_t vendor;       // its PCI number, by which Vulkan's devices are known too
-  std::string kernel_driver;  // "amdgpu"; empty: none has taken it
+  std::string kernel_driver;  // "amdgpu"; empty: none drives it
+  bool is_for_screens;        // and not for computing alone
+  bool has_connectors;        // the kernel can show pictures on it
 };
 
-// `sys` is where sysfs is mounted. A file that cannot be read is none.
+// `sys` is where sysfs is mounted. What cannot be read there counts as absent.
 std::vector<GraphicsCard> graphics_cards(const std::filesystem::path& sys = "/sys");
 
-// Returns what a card needs before Vulkan finds it: a sentence that names the package.
-std::string driver_advice(const GraphicsCard& card);
-
-// Returns one sentence for each kind of card of which Vulkan has found none: `found` are the
-// vendors of the devices that it has found.
+// Returns what each kind of card needs that Vulkan does not have, a sentence a kind that names it
+// and the packages. `found` are the vendors of the devices that Vulkan has.
 std::vector<std::string> drivers_missing(std::span<const GraphicsCard> cards,
                                          std::span<const std::uint32_t> found);
 
 // Returns what keeps a card from showing pictures on a screen without a window system; empty if
 // nothing does.
-std::string screen_advice(const std::filesystem::path& sys = "/sys");
+std::string screen_advice(std::span<const GraphicsCard> cards);
 
 }  // namespace previz::render

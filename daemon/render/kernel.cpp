@@ -9,6 +9,7 @@
 
 #include "daemon/render/spirv.hpp"
 #include "drivers/error.hpp"
+#include "shaders/lib/shared.h"
 
 namespace previz::render {
 namespace {
@@ -65,9 +66,19 @@ const std::vector<std::uint32_t>& specialised(std::span<const std::uint32_t> spi
   return modules.try_emplace(key, std::move(module)).first->second;
 }
 
-std::vector<std::uint32_t> values_of(const Pass& pass, std::uint32_t features, bool on_card) {
+std::uint32_t device_bits(const Device& device) {
+  return (device.shares_host_memory() ? 0 : gpu::DEVICE_IS_CARD) |
+         (device.lanes_meet() ? gpu::DEVICE_LANES_MEET : 0);
+}
+
+std::vector<std::uint32_t> values_of(const Pass& pass, std::uint32_t features,
+                                     std::uint32_t device) {
   if (!pass.has_features) return {};
-  return {features, on_card ? 1u : 0u};
+  return {features, device};
+}
+
+std::vector<std::uint32_t> as_for(std::uint32_t device, const std::vector<std::uint32_t>& module) {
+  return (device & gpu::DEVICE_LANES_MEET) != 0 ? with_uniform_subgroups(module) : module;
 }
 
 // A pass with the constants that it reads something of, and the way to compile it.
@@ -76,7 +87,8 @@ struct ToCompile {
       : info(describe_spirv(pass.spirv)), values(std::move(constants)) {
     if (!values.empty()) values.front() &= info.asked_bits;
     compile_now = [this, &device, &pass] {
-      return compile(device, pass.name, info, specialised(pass.spirv, values));
+      return compile(device, pass.name, info,
+                     as_for(device_bits(device), specialised(pass.spirv, values)));
     };
   }
   ToCompile(const ToCompile&) = delete;
@@ -97,7 +109,7 @@ Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> 
 
 Kernel::Kernel(Device& device, const Pass& pass, std::uint32_t features)
     : device_(&device), name_(pass.name) {
-  use(pass, values_of(pass, features, !device.shares_host_memory()));
+  use(pass, values_of(pass, features, device_bits(device)));
 }
 
 void Kernel::use(const Pass& pass, std::vector<std::uint32_t> constants) {
@@ -113,14 +125,15 @@ void make_kernels(std::initializer_list<Kernel*> kernels, Device& device,
   for (Kernel* const kernel : kernels) *kernel = Kernel(device, *pass++, features);
 }
 
-std::vector<std::uint32_t> module_of(const Pass& pass, std::uint32_t features, bool on_card) {
-  std::vector<std::uint32_t> values = values_of(pass, features, on_card);
+std::vector<std::uint32_t> module_of(const Pass& pass, std::uint32_t features,
+                                     std::uint32_t device) {
+  std::vector<std::uint32_t> values = values_of(pass, features, device);
   if (!values.empty()) values.front() &= describe_spirv(pass.spirv).asked_bits;
-  return specialised(pass.spirv, values);
+  return as_for(device, specialised(pass.spirv, values));
 }
 
 void compile_ahead(Device& device, const Pass& pass, std::uint32_t features) {
-  const ToCompile wanted(device, pass, values_of(pass, features, !device.shares_host_memory()));
+  const ToCompile wanted(device, pass, values_of(pass, features, device_bits(device)));
   device.program_ahead(pass.spirv.data(), wanted.values, wanted.compile_now);
 }
 

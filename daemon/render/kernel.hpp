@@ -56,8 +56,8 @@ struct Program {
 struct Pass {
   const char* name;
   std::span<const std::uint32_t> spirv;  // static
-  bool has_features = true;  // specialisation constant 0 has the FEATURE_* bits, and 1 says
-                             // whether the device is a card; otherwise no constant is set
+  bool has_features = true;  // specialisation constant 0 has the FEATURE_* bits, and 1 the
+                             // device's DEVICE_* bits; otherwise no constant is set
 };
 
 class Kernel {
@@ -106,8 +106,9 @@ void make_kernels(std::initializer_list<Kernel*> kernels, Device& device,
                   std::span<const Pass> passes, std::uint32_t features = 0);
 
 // Returns the SPIR-V that a driver gets for a pass: without what the features switch off, and as it
-// is for a card (`on_card`) or a CPU device.
-std::vector<std::uint32_t> module_of(const Pass& pass, std::uint32_t features, bool on_card);
+// is for a device with these DEVICE_* bits.
+std::vector<std::uint32_t> module_of(const Pass& pass, std::uint32_t features,
+                                     std::uint32_t device);
 
 // Compiles the program of a kernel, unless that has been done or is under way, so that the kernel
 // need not wait for it. May be called on any thread while the device is open. Throws

@@ -25,8 +25,8 @@ class PhotonMap {
   // These record a pass of photons, in this order: emission fills the queue of paths; after each
   // extension, as many work groups as `groups` holds at `offset` bounce the photons off what they
   // hit; sorting makes the map. All take the buffers of the scene and of the paths, and a GpuBatch
-  // whose first_sample is the pass and whose photon_radius is the radius. No invocation of these
-  // passes has more to do where many photons are in one place.
+  // whose first_sample is the pass and whose photon_radius is the radius. The work of an
+  // invocation grows only with the logarithm of the photons in one place.
   std::uint32_t count() const { return photons_; }  // emitted a pass
   void record_emission(const Recording& recording);
   void record_bounce(const Recording& recording, const Buffer& groups, vk::DeviceSize offset);

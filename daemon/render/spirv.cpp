@@ -1,8 +1,11 @@
 #include "daemon/render/spirv.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstring>
 #include <spirv-tools/optimizer.hpp>
 #include <unordered_map>
+#include <utility>
 
 #include "drivers/error.hpp"
 
@@ -14,7 +17,10 @@ namespace {
 enum Op : std::uint32_t {
   op_name = 5,
   op_member_name = 6,
+  op_extension = 10,
+  op_entry_point = 15,
   op_execution_mode = 16,
+  op_capability = 17,
   op_type_pointer = 32,
   op_constant = 43,
   op_spec_constant = 50,
@@ -29,6 +35,8 @@ enum Op : std::uint32_t {
 };
 constexpr std::uint32_t spirv_header_words = 5;
 constexpr std::uint32_t mode_local_size = 17, mode_local_size_id = 38;
+constexpr std::uint32_t mode_subgroup_uniform_control_flow = 4421;
+constexpr std::uint32_t capability_group_non_uniform = 61;
 constexpr std::uint32_t decoration_spec_id = 1, decoration_binding = 33;
 constexpr std::uint32_t storage_uniform_constant = 0, storage_storage_buffer = 12;
 
@@ -142,6 +150,29 @@ SpirvInfo describe_spirv(std::span<const std::uint32_t> spirv) {
   }
   info.asked_bits = asked_bits(spirv, ids, feature_id);
   return info;
+}
+
+// Extensions follow the capabilities, and modes the entry point.
+std::vector<std::uint32_t> with_uniform_subgroups(std::span<const std::uint32_t> spirv) {
+  static constexpr char extension[] = "SPV_KHR_subgroup_uniform_control_flow";
+  std::array<std::uint32_t, sizeof(extension) / 4 + 1> name{};
+  std::memcpy(name.data(), extension, sizeof(extension));
+  std::vector<std::uint32_t> result(spirv.begin(), spirv.begin() + spirv_header_words);
+  bool asks = false, named = false;
+  for (std::size_t at = spirv_header_words; at < spirv.size(); at += spirv[at] >> 16) {
+    const std::uint32_t op = spirv[at] & 0xffff;
+    asks |= op == op_capability && spirv[at + 1] == capability_group_non_uniform;
+    if (op != op_capability && !std::exchange(named, true)) {
+      result.push_back(static_cast<std::uint32_t>(name.size() + 1) << 16 | op_extension);
+      result.insert(result.end(), name.begin(), name.end());
+    }
+    result.insert(result.end(), spirv.begin() + static_cast<std::ptrdiff_t>(at),
+                  spirv.begin() + static_cast<std::ptrdiff_t>(at + (spirv[at] >> 16)));
+    if (op == op_entry_point)
+      result.insert(result.end(), {3u << 16 | op_execution_mode, spirv[at + 2],
+                                   mode_subgroup_uniform_control_flow});
+  }
+  return asks ? result : std::vector<std::uint32_t>(spirv.begin(), spirv.end());
 }
 
 std::vector<std::uint32_t> specialise_spirv(std::span<const std::uint32_t> spirv,

@@ -31,4 +31,10 @@ SpirvInfo describe_spirv(std::span<const std::uint32_t> spirv);
 std::vector<std::uint32_t> specialise_spirv(std::span<const std::uint32_t> spirv,
                                             std::span<const std::uint32_t> constants);
 
+// Returns the module with a promise to the driver's compiler that it rests on: the lanes of a
+// subgroup are together again behind a branch that only some of them took
+// (SPV_KHR_subgroup_uniform_control_flow). A module that asks nothing of its subgroup stays as it
+// is.
+std::vector<std::uint32_t> with_uniform_subgroups(std::span<const std::uint32_t> spirv);
+
 }  // namespace previz::render

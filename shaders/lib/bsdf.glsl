@@ -91,7 +91,7 @@ struct Lobes {
   vec3 diffuse;         // albedo
   float coat;           // weight of the dielectric reflection, in its strongest channel
   vec3 coat_color;      // the channels' share of it
-  vec3 conductor;       // reflectance at normal incidence times its weight
+  vec3 conductor;       // reflectance at normal incidence
   float conductor_weight;
   float conductor_loss; // what single scattering loses, over what it keeps
   float glass;

@@ -472,6 +472,7 @@ static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 32);
 static_assert(sizeof(GpuPhoton) == 64);
 static_assert(sizeof(GpuPhotonBucket) == 8);
+static_assert(sizeof(GpuPhotonControl) == 20);
 static_assert(sizeof(GpuInfluence) == 24);
 static_assert(sizeof(GpuMorphOffset) == 24);
 static_assert(sizeof(GpuDeform) == 40);

@@ -29,6 +29,10 @@ PREVIZ_CONST uint WORLD_BOTH = 3u;
 // Every pass has this many invocations in a work group.
 PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 
+// Bits of specialisation constant 1: what the device is (lib/device.glsl).
+PREVIZ_CONST uint DEVICE_IS_CARD = 1u;
+PREVIZ_CONST uint DEVICE_LANES_MEET = 2u;
+
 // The scene as lib/trace.glsl reads it is one texel buffer of RGBA32UI in set 0, made by
 // daemon/scene/bvh.hpp (on lavapipe a texel buffer is 1.4 to 1.7 times as fast as a storage
 // buffer). It consists of records of four texels, one cache line, in blocks of eight; the children
@@ -50,7 +54,7 @@ PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 //            y: presence << 8 | RECORD_FILL; w: index of the instance. Texels 1..3: the rows of
 //            grid_from_world.
 //
-// The lanes of a subgroup test every record as a node and as a pair, whatever it is. RECORD_FILL
+// On a CPU device every record is tested as a node and as a pair, whatever it is. RECORD_FILL
 // and the numbers of the kinds make what is no node's exponent a harmless one: with denormal
 // numbers there, lavapipe traced at a third of the speed.
 PREVIZ_CONST uint RECORD_NOTHING = 0u;

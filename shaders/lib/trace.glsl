@@ -1,14 +1,14 @@
 // Closest hits and shadow rays through the two-level tree of daemon/scene/bvh.hpp, in compute.
 //
-// The loop visits one record per turn, whatever its kind, and all lanes of a subgroup fetch it,
-// test eight boxes and test two triangles side by side. A CPU device gains nothing from branches,
-// and on a GPU the two tests diverge only where the rays do. The includer must enable
+// The loop visits one record per turn, whatever its kind. On a CPU device, which gains nothing from
+// branches, all lanes of a subgroup test its eight boxes and its two triangles side by side; on a card
+// each lane makes the test that its record is for. The includer must enable
 // GL_GOOGLE_include_directive.
 #ifndef PREVIZ_TRACE_GLSL
 #define PREVIZ_TRACE_GLSL
 #extension GL_EXT_samplerless_texture_functions : require
 
-#include "shaders/lib/shared.h"
+#include "shaders/lib/device.glsl"
 
 uniform utextureBuffer bvh;
 
@@ -26,23 +26,22 @@ const uint TRACE_STACK_SIZE = TOP_BVH_DEPTH + MESH_BVH_DEPTH;
 
 // The stack of groups: block of children << 8 | children still to visit. On a card its lower levels are
 // in the memory that a work group shares: an invocation's own array would take that many registers.
-// Only deep trees use the others, which are in an array that is too large for registers. A CPU device
-// has its own array in the cache as well.
-layout(constant_id = 1) const uint ON_CARD = 0u;
+// Only deep trees use the others, which are in an array that is too large for registers. On a CPU
+// device all are in that array, which its cache holds.
 const uint SHARED_LEVELS = 8u;
-const uint OWN_LEVELS = 65u;
+const uint OWN_LEVELS = max(TRACE_STACK_SIZE + 1u, 65u);
 uint own_stack[OWN_LEVELS];
 shared uint shared_stack[SHARED_LEVELS * WORKGROUP_SIZE];
 
 uint shared_level(uint level) { return level * WORKGROUP_SIZE + gl_LocalInvocationIndex; }
 
 void trace_keep(uint level, uint group) {
-  if (ON_CARD != 0u && level < SHARED_LEVELS) shared_stack[shared_level(level)] = group;
+  if (on_card() && level < SHARED_LEVELS) shared_stack[shared_level(level)] = group;
   else own_stack[level] = group;
 }
 
 uint trace_kept(uint level) {
-  if (ON_CARD != 0u && level < SHARED_LEVELS) return shared_stack[shared_level(level)];
+  if (on_card() && level < SHARED_LEVELS) return shared_stack[shared_level(level)];
   return own_stack[level];
 }
 
@@ -108,8 +107,8 @@ TraceSpace trace_enter(uint record, vec3 world_origin, vec3 world_direction) {
   const vec3 reach = abs(s.origin);
   const float slack = TRACE_SLACK * (max(reach.x, max(reach.y, reach.z)) + 8388608.0);
   s.towards = mix(vec3(slack), vec3(-slack), lessThan(steep, vec3(0.0)));
-  s.near = ON_CARD != 0u ? vec3(0.0) : s.origin + s.towards;
-  s.far = ON_CARD != 0u ? vec3(0.0) : s.origin - s.towards;
+  s.near = on_card() ? vec3(0.0) : s.origin + s.towards;
+  s.far = on_card() ? vec3(0.0) : s.origin - s.towards;
   s.octant = (steep.x < 0.0 ? 1u : 0u) | (steep.y < 0.0 ? 2u : 0u) | (steep.z < 0.0 ? 4u : 0u);
   return s;
 }
@@ -126,10 +125,10 @@ uint trace_box(vec3 near, vec3 far, int t_min, int t_max, uint bit) {
 // 2^16, which the callers' scales make up for; cards turn any byte into a float at once.
 vec3 trace_byte0(uvec3 planes) { return vec3(ivec3(planes & 0xffu)); }
 vec3 trace_byte1(uvec3 planes) {
-  return ON_CARD != 0u ? vec3((planes >> 8) & 0xffu) : vec3(ivec3(planes & 0xff00u));
+  return on_card() ? vec3((planes >> 8) & 0xffu) : vec3(ivec3(planes & 0xff00u));
 }
 vec3 trace_byte2(uvec3 planes) {
-  return ON_CARD != 0u ? vec3((planes >> 16) & 0xffu) : vec3(ivec3(planes & 0xff0000u));
+  return on_card() ? vec3((planes >> 16) & 0xffu) : vec3(ivec3(planes & 0xff0000u));
 }
 vec3 trace_byte3(uvec3 planes) { return vec3(ivec3(planes >> 24)); }
 
@@ -191,7 +190,7 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
   for (;;) {  // one tree per turn: the top level, an instance, the top level again
     const TraceSpace s = trace_enter(record, origin, direction);
     // On a card the children that are hit are collected by slot, which takes fewer registers.
-    const uint octant = ON_CARD != 0u ? 0u : s.octant;
+    const uint octant = on_card() ? 0u : s.octant;
     const uint b0 = 1u << octant;
     const uint b1 = 1u << (octant ^ 1u);
     const uint b2 = 1u << (octant ^ 2u);
@@ -224,13 +223,13 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
       const uint kind = head.z & 0xffu;
 
       // The record is tested as a node.
-      if (ON_CARD == 0u || kind >= RECORD_NODE) {
+      if (!on_card() || kind >= RECORD_NODE) {
         const vec3 corner = vec3(ivec3(head.xyz) >> 8);
         const vec3 scale = uintBitsToFloat((head.xyz << 23) & 0x7f800000u) * s.inverse;
-        const vec3 scale1 = ON_CARD != 0u ? scale : scale * 0.00390625;
-        const vec3 scale2 = ON_CARD != 0u ? scale : scale * 1.52587890625e-5;
-        const vec3 before = ON_CARD != 0u ? s.origin + s.towards : s.near;
-        const vec3 behind = ON_CARD != 0u ? s.origin - s.towards : s.far;
+        const vec3 scale1 = on_card() ? scale : scale * 0.00390625;
+        const vec3 scale2 = on_card() ? scale : scale * 1.52587890625e-5;
+        const vec3 before = on_card() ? s.origin + s.towards : s.near;
+        const vec3 behind = on_card() ? s.origin - s.towards : s.far;
         const vec3 near = (corner - before) * s.inverse;
         const vec3 far = (corner - behind) * s.inverse;
         const uvec3 low0 = uvec3(w1.x, w2.x, w3.x);
@@ -250,7 +249,7 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
         hits |= trace_box(trace_byte1(n1) * scale1 + near, trace_byte1(f1) * scale1 + far, t_min_bits, cull, b5);
         hits |= trace_box(trace_byte2(n1) * scale2 + near, trace_byte2(f1) * scale2 + far, t_min_bits, cull, b6);
         hits |= trace_box(trace_byte3(n1) * scale + near, trace_byte3(f1) * scale + far, t_min_bits, cull, b7);
-        if (ON_CARD != 0u) hits = trace_from_octant(hits, s.octant);
+        if (on_card()) hits = trace_from_octant(hits, s.octant);
         trace_keep(top, group);
         const bool descend = kind >= RECORD_NODE && hits != 0u;
         top += descend && (group & 0xffu) != 0u ? 1u : 0u;
@@ -258,7 +257,7 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
       }
 
       // The record is tested as a pair of triangles.
-      if (ON_CARD == 0u || kind == RECORD_PAIR) {
+      if (!on_card() || kind == RECORD_PAIR) {
         const vec3 p0 = trace_project(uintBitsToFloat(w1.xyz), s);
         const vec3 p1 = trace_project(uintBitsToFloat(uvec3(w1.w, w2.xy)), s);
         const vec3 p2 = trace_project(uintBitsToFloat(uvec3(w2.zw, w3.x)), s);

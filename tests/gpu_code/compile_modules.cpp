@@ -8,6 +8,7 @@
 // how many threads a SIMD of AMD holds (of 1024), how many an instruction of Intel has, how many
 // warps the registers of an SM of NVIDIA hold (of 48, as of Ada). seconds: to compile it.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -91,11 +92,14 @@ vk::raii::Device open(const vk::raii::PhysicalDevice& physical) {
   vk::PhysicalDeviceVulkan13Features features13;
   features13.synchronization2 = features13.maintenance4 = VK_TRUE;
   features13.pNext = &told;
+  vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR uniform(VK_TRUE);
+  told.pNext = &uniform;
   vk::PhysicalDeviceVulkan12Features features12;
   features12.scalarBlockLayout = features12.timelineSemaphore = VK_TRUE;
   features12.pNext = &features13;
-  const char* const extension = VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME;
-  vk::DeviceCreateInfo info({}, queue, {}, extension);
+  const std::array extensions = {VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME,
+                                 VK_KHR_SHADER_SUBGROUP_UNIFORM_CONTROL_FLOW_EXTENSION_NAME};
+  vk::DeviceCreateInfo info({}, queue, {}, extensions);
   info.pNext = &features12;
   return {physical, info};
 }

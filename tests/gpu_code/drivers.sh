@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The compilers of AMD's, Intel's and NVIDIA's GPUs, on a machine without any: Mesa's drivers as Debian
-# 13 has them, and stubs of the kernel's drivers for Intel and NVIDIA, which are in Mesa's source for
+# Brings the compilers of AMD's, Intel's and NVIDIA's GPUs to a machine without any: Mesa's drivers as
+# Debian 13 has them, and stubs of the kernel's drivers for Intel and NVIDIA, which are in Mesa's source for
 # this purpose (RADV needs none). As root; five minutes, the network and 1.5 GB.
 #   tests/gpu_code/drivers.sh FOLDER                        makes them
 #   tests/gpu_code/drivers.sh FOLDER GPU INSIDE COMMAND...  runs a command on one of them, in that
@@ -12,13 +12,14 @@ shift
 
 make_drivers() {
   local mirror
-  mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' | head -n 1)
+  mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Label: Debian' | head -n 1)
+  [[ -n $mirror ]] || { echo "gpu_code: the package sources have no archive of Debian" >&2; exit 1; }
   rm -rf "$root.part"
   mmdebstrap --quiet --variant=minbase --aptopt='APT::Install-Recommends "false"' \
     --include=ca-certificates,mesa-vulkan-drivers,libvulkan1 trixie "$root.part" \
     "deb $mirror trixie main" "deb-src $mirror trixie main"
   cat >"$root.part/root/stubs.sh" <<'STUBS'
-set -e
+set -eo pipefail
 export DEBIAN_FRONTEND=noninteractive
 apt-get update -qq
 apt-get install -y --no-install-recommends dpkg-dev meson ninja-build gcc g++ python3-mako \
@@ -42,7 +43,7 @@ dpkg-query -W -f '${Version}\n' mesa-vulkan-drivers >/opt/stubs/mesa_version
 rm -rf /root/source
 STUBS
   mkdir -p "$root.part/work"
-  chroot "$root.part" sh /root/stubs.sh
+  chroot "$root.part" bash /root/stubs.sh
   rm -rf "$root"
   mv "$root.part" "$root"
 }
@@ -64,7 +65,7 @@ run_on() {
       ;;
   esac
   # shellcheck disable=SC2016  # the inner shell expands them
-  unshare --mount bash -c '
+  unshare --mount bash -ec '
     root=$1 inside=$2
     mount --bind "$inside" "$root/work"
     mount --bind /dev "$root/dev"

@@ -1,7 +1,7 @@
 # Prints the demo's rows of a table of compile_modules.cpp as Markdown, a column for each GPU:
 # registers / spills / scratch / lanes / instructions; of NVIDIA's registers / local bytes / warps.
 BEGIN { FS = "\t" }
-/^#/ { print substr($0, 3) ":\n"; next }
+/^#/ { print "Mesa " substr($0, 3) ":\n"; next }
 $2 != "demo" { next }
 {
   if (!($1 in column)) { column[$1] = ++columns; gpus[columns] = $1 }

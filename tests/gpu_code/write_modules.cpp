@@ -15,6 +15,7 @@
 #include "daemon/scene/load.hpp"
 #include "daemon/set/load.hpp"
 #include "shaders/deform.spv.h"
+#include "shaders/lib/shared.h"
 #include "shaders/refit_leaves.spv.h"
 #include "shaders/refit_nodes.spv.h"
 
@@ -22,8 +23,11 @@ namespace {
 
 using previz::render::Pass;
 
+// All five GPUs keep their lanes together.
+constexpr std::uint32_t card = previz::gpu::DEVICE_IS_CARD | previz::gpu::DEVICE_LANES_MEET;
+
 void write(const std::filesystem::path& stem, const Pass& pass, std::uint32_t features) {
-  const std::vector<std::uint32_t> module = previz::render::module_of(pass, features, true);
+  const std::vector<std::uint32_t> module = previz::render::module_of(pass, features, card);
   std::ofstream code(stem.string() + ".spv", std::ios::binary);
   code.write(reinterpret_cast<const char*>(module.data()),
              static_cast<std::streamsize>(module.size() * sizeof(std::uint32_t)));

@@ -1,6 +1,8 @@
 // What a SPIR-V module says about itself, and what is left of it when features are switched off.
 #include "daemon/render/spirv.hpp"
 
+#include <spirv-tools/libspirv.hpp>
+
 #include "daemon/render/feature.hpp"
 #include "daemon/render/kernel.hpp"
 #include "shaders/accumulate.spv.h"
@@ -54,6 +56,28 @@ TEST(Spirv, LeavesOutWhatIsSwitchedOff) {
   const std::size_t plain = specialise_spirv(shade_spv, none).size();
   EXPECT_LT(4 * plain, whole);
   EXPECT_EQ(specialise_spirv(shade_spv, none), specialise_spirv(shade_spv, none));
+}
+
+// A card whose driver can be asked to keeps the lanes of a subgroup together, on which the queues
+// rest.
+TEST(Spirv, AsksForSubgroupsThatMeetAgain) {
+  spvtools::SpirvTools tools(SPV_ENV_VULKAN_1_3);
+  std::string complaint;
+  tools.SetMessageConsumer([&](spv_message_level_t, const char*, const spv_position_t&,
+                               const char* message) { complaint += message; });
+  spvtools::ValidatorOptions options;
+  options.SetScalarBlockLayout(true);
+  const auto text = [&](const std::vector<std::uint32_t>& module) {
+    EXPECT_TRUE(tools.Validate(module.data(), module.size(), options)) << complaint;
+    std::string result;
+    EXPECT_TRUE(tools.Disassemble(module, &result));
+    return result;
+  };
+  EXPECT_THAT(text(render::with_uniform_subgroups(shade_spv)),
+              AllOf(HasSubstr("OpExtension \"SPV_KHR_subgroup_uniform_control_flow\""),
+                    HasSubstr("OpExecutionMode %main SubgroupUniformControlFlowKHR")));
+  const std::vector<std::uint32_t> extend(std::begin(extend_spv), std::end(extend_spv));
+  EXPECT_EQ(render::with_uniform_subgroups(extend), extend);  // it asks nothing of its subgroup
 }
 
 TEST(Spirv, APassIsCompiledOnceForFeaturesThatItDoesNotAskAbout) {

@@ -2,7 +2,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #include "shaders/lib/trace.glsl"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = WORKGROUP_SIZE) in;
 uniform textureBuffer rays;  // origin, t_min; direction, t_max
 layout(push_constant) uniform Batch {
   uint count;
