@@ -56,9 +56,9 @@ struct DeviceTimes {
 struct DeviceFacts {
   std::string name, driver;  // "NVIDIA H100", "NVIDIA 580.159.04"
   bool is_gpu = false;
-  std::uint64_t memory_bytes = 0;            // all buffers together may take so much
-  bool shares_host_memory = false;           // nothing is copied to it
-  std::vector<std::string> missing_drivers;  // what other graphics cards need, a sentence each
+  std::uint64_t memory_bytes = 0;                 // all buffers together may take so much
+  bool shares_host_memory = false;                // nothing is copied to it
+  std::vector<std::string> missing_drivers = {};  // what other graphics cards need, a sentence each
 };
 
 // Counts what a device was given to do since it was opened.
