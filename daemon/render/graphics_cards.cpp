@@ -50,7 +50,7 @@ std::string of_nvidia(const std::string& kernel_driver) {
 
 std::string of_amd(const std::string& kernel_driver) {
   if (kernel_driver == "amdgpu")
-    return "graphics card AMD: Vulkan may not open it; adduser USER render and log in again, or "
+    return "graphics card AMD: Vulkan cannot open it; adduser USER render and log in again, or "
            "apt-get install mesa-vulkan-drivers";
   if (kernel_driver == "radeon")
     return "graphics card AMD: it is driven by radeon, without Vulkan; add radeon.si_support=0 "
@@ -63,7 +63,7 @@ std::string of_amd(const std::string& kernel_driver) {
 
 std::string of_intel(const std::string& kernel_driver) {
   if (!kernel_driver.empty())
-    return "graphics card Intel: Vulkan may not open it; adduser USER render and log in again, or "
+    return "graphics card Intel: Vulkan cannot open it; adduser USER render and log in again, or "
            "apt-get install mesa-vulkan-drivers";
   return "graphics card Intel: this kernel does not know it; apt-get -t bookworm-backports install "
          "linux-image-amd64 firmware-misc-nonfree (bookworm-backports and non-free-firmware in the "
@@ -112,10 +112,9 @@ std::string screen_advice(std::span<const GraphicsCard> cards) {
     return card.kernel_driver == "nvidia" && card.is_for_screens && !card.has_connectors;
   });
   if (!is_blind) return {};
-  return "graphics card NVIDIA: shows nothing without a window system; add nvidia-drm.modeset=1 to "
-         "the kernel's command line (GRUB_CMDLINE_LINUX in /etc/default/grub, then update-grub) "
-         "and "
-         "restart the computer";
+  return "graphics card NVIDIA: it shows nothing without a window system; add "
+         "nvidia-drm.modeset=1 to the kernel's command line (GRUB_CMDLINE_LINUX in "
+         "/etc/default/grub, then update-grub), then restart the computer";
 }
 
 }  // namespace previz::render
