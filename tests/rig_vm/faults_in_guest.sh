@@ -197,7 +197,7 @@ disk_hung() {
   dmsetup create takes --table "0 $(blockdev --getsz "$disk") linear $disk 0" || fail "no device mapper"
   mount /dev/mapper/takes /mnt/a
   start_rig
-  within 120 "pictures are rendered" above '.stages.render.frames' 0
+  within 300 "pictures are drawn" has_drawn 3
   begin_take
   frames_more 4
   local pid before captured

@@ -24,6 +24,8 @@ rig_bus() { busctl --json=short "$1" org.previz.Rig1 /org/previz/Rig1 org.previz
 status() { rig_bus get-property "$1" | jq -r '.data | if . == true then "yes" elif . == false then "no" else . end'; }
 status_is() { [[ $(status "$1") == "$2" ]]; }
 metric() { rig_bus call Metrics | jq ".data[0] | fromjson | $1 // 0"; }
+# The GPU has been handed so many pictures; a plate shown for want of light or tags is none.
+has_drawn() { [[ $(metric '.devices.graphics.submissions') -ge $((2 * $1)) ]]; }
 above() { [[ $(metric "$1") -gt $2 ]]; }
 advances() { within 120 "$2" above ".stages.\"$1\".frames" "$(metric ".stages.\"$1\".frames")"; }
 main_pid() { systemctl show --property=MainPID --value previzd; }
