@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs what building, testing and running previzd needs on Debian 12, and only what is missing;
+# Installs what building, testing and running previzd needs on Debian 12 and 13, and only what is missing;
 # and further packages that are named. As root, or through sudo; asks no questions.
 set -euo pipefail
 

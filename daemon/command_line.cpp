@@ -177,7 +177,7 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
   CLI::App& command =
       *app.add_subcommand("trade", "Measure error against render time: a table and a page");
   command
-      .add_option("set", options.source.set_or_session,
+      .add_option("session", options.source.set_or_session,
                   "Session folder, or set file (uses the take that it replays, or its newest)")
       ->required();
   command.add_option("--set", options.source.set_file, "Set file, instead of the session's own");

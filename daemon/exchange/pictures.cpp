@@ -1,3 +1,4 @@
+#include <exception>
 #include <exiv2/exiv2.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -34,8 +35,8 @@ Orientation orientation_of(const std::string& file) try {
   const Exiv2::ExifData& data = image->exifData();
   const auto found = data.findKey(Exiv2::ExifKey("Exif.Image.Orientation"));
   if (found == data.end() || found->count() == 0) return {};
-  return exif_orientation(static_cast<int>(found->toLong())).value_or(Orientation{});
-} catch (const Exiv2::AnyError&) {
+  return exif_orientation(static_cast<int>(found->toFloat())).value_or(Orientation{});
+} catch (const std::exception&) {
   return {};  // damaged EXIF data says nothing; the picture may be whole
 }
 

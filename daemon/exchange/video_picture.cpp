@@ -11,6 +11,7 @@ extern "C" {
 #include <array>
 #include <cmath>
 
+#include "drivers/av.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::exchange {
@@ -80,7 +81,7 @@ VideoPictures::VideoPictures(const AVFrame& first, AVStream& stream, AVFormatCon
         tags_.transfer == AVCOL_TRC_SMPTE2084 ? "1000 cd/m2" : "the most that HLG can say"));
   if (description_of(first).flags & AV_PIX_FMT_FLAG_ALPHA)
     notes_.push_back(file_.string() + ": its transparency is not used");
-  if (first.interlaced_frame)
+  if (av::is_interlaced(first))
     notes_.push_back(file_.string() + ": is interlaced; its fields are kept as they are");
 }
 

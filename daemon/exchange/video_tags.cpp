@@ -14,6 +14,7 @@ extern "C" {
 #include "daemon/exchange/luma_chroma.hpp"
 #include "daemon/exchange/video_color.hpp"
 #include "daemon/set/problems.hpp"
+#include "drivers/av.hpp"
 
 namespace previz::exchange {
 namespace {
@@ -128,9 +129,8 @@ Orientation orientation_of(const AVFrame& frame, AVStream& stream,
                            const std::filesystem::path& file) {
   if (const AVFrameSideData* data = av_frame_get_side_data(&frame, AV_FRAME_DATA_DISPLAYMATRIX))
     if (const auto found = orientation_in(data->data, data->size, file)) return *found;
-  std::size_t size = 0;
-  const std::uint8_t* data = av_stream_get_side_data(&stream, AV_PKT_DATA_DISPLAYMATRIX, &size);
-  return orientation_in(data, size, file).value_or(Orientation{});
+  const std::span<const std::uint8_t> data = av::side_data(stream, AV_PKT_DATA_DISPLAYMATRIX);
+  return orientation_in(data.data(), data.size(), file).value_or(Orientation{});
 }
 
 AVRational pixel_aspect_of(const AVRational& said, const std::filesystem::path& file) {

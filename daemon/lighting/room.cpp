@@ -1,11 +1,10 @@
 #include "daemon/lighting/room.hpp"
 
-#include <embree3/rtcore.h>
-
 #include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "drivers/embree.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::lighting {
@@ -86,19 +85,14 @@ std::optional<double> Room::distance(const glm::dvec3& origin, const glm::dvec3&
   RTCRayHit hit{};
   hit.ray = room_ray(origin - seen_from_, direction, std::numeric_limits<float>::infinity());
   hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(impl_->scene, &context, &hit);
+  embree::find_closest(impl_->scene, hit);
   if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   return hit.ray.tfar;
 }
 
 bool Room::sees(const glm::dvec3& from, const glm::dvec3& surface_point) const {
   RTCRay ray = room_ray(from - seen_from_, surface_point - from, 0.999);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded1(impl_->scene, &context, &ray);
-  return ray.tfar >= 0;
+  return !embree::is_blocked(impl_->scene, ray);
 }
 
 }  // namespace previz::lighting

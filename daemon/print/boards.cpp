@@ -43,12 +43,11 @@ Drawing chessboard(const calibrate::Board& board, const std::string& name) {
 void add_marker(const cv::Ptr<cv::aruco::Dictionary>& dictionary, int id, double x, double y,
                 double side, Drawing& drawing) {
   const int cells = dictionary->markerSize + 2;
-  cv::Mat picture;
-  dictionary->drawMarker(id, cells, picture);
+  const cv::Mat1b picture = calibrate::marker_picture(*dictionary, id, cells);
   const double cell = side / cells;
   for (int row = 0; row < cells; ++row)
     for (int column = 0; column < cells; ++column) {
-      const auto black = [&](int at) { return picture.at<std::uint8_t>(row, at) == 0; };
+      const auto black = [&](int at) { return picture(row, at) == 0; };
       if (!black(column)) continue;
       int end = column;
       while (end < cells && black(end)) ++end;

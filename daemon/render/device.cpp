@@ -290,12 +290,17 @@ void Device::create_instance() {
   if (options_.validation && options_.synchronization) create.pNext = &features;
   instance_ = vk::raii::Instance(context_, create);
   if (!options_.validation) return;
-  using Severity = vk::DebugUtilsMessageSeverityFlagBitsEXT;
-  using Type = vk::DebugUtilsMessageTypeFlagBitsEXT;
-  vk::DebugUtilsMessengerCreateInfoEXT info({}, Severity::eWarning | Severity::eError,
-                                            Type::eGeneral | Type::eValidation, &on_message,
-                                            &validation_messages_);
-  messenger_ = vk::raii::DebugUtilsMessengerEXT(instance_, info);
+  // In C's structure, since the C++ one has another type of function in each version.
+  VkDebugUtilsMessengerCreateInfoEXT info{};
+  info.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT;
+  info.messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT |
+                         VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+  info.messageType =
+      VK_DEBUG_UTILS_MESSAGE_TYPE_GENERAL_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
+  info.pfnUserCallback = &on_message;
+  info.pUserData = &validation_messages_;
+  messenger_ =
+      vk::raii::DebugUtilsMessengerEXT(instance_, vk::DebugUtilsMessengerCreateInfoEXT(info));
 }
 
 void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <iterator>
 #include <spirv-tools/optimizer.hpp>
 #include <unordered_map>
 #include <utility>
@@ -164,7 +165,7 @@ std::vector<std::uint32_t> with_uniform_subgroups(std::span<const std::uint32_t>
     asks |= op == op_capability && spirv[at + 1] == capability_group_non_uniform;
     if (op != op_capability && !std::exchange(named, true)) {
       result.push_back(static_cast<std::uint32_t>(name.size() + 1) << 16 | op_extension);
-      result.insert(result.end(), name.begin(), name.end());
+      std::ranges::copy(name, std::back_inserter(result));
     }
     result.insert(result.end(), spirv.begin() + static_cast<std::ptrdiff_t>(at),
                   spirv.begin() + static_cast<std::ptrdiff_t>(at + (spirv[at] >> 16)));

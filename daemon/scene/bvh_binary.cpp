@@ -1,7 +1,5 @@
 #include "daemon/scene/bvh_binary.hpp"
 
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <memory>
 #include <new>
@@ -9,6 +7,7 @@
 #include <string>
 #include <type_traits>
 
+#include "drivers/embree.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::scene {

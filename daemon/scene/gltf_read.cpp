@@ -60,6 +60,26 @@ bool write_nothing(std::string*, const std::string&, const std::vector<unsigned 
   return false;
 }
 
+// Later versions (2.9, Debian 13) also ask for the size of a file, and refuse all of these without
+// it.
+template <typename Reader, typename Files = tinygltf::FsCallbacks>
+void read_by_own_functions(Reader& reader) {
+  Files files{};
+  files.FileExists = file_exists;
+  files.ExpandFilePath = same_path;
+  files.ReadWholeFile = read_whole_file;
+  files.WriteWholeFile = write_nothing;
+  if constexpr (requires { reader.SetMaxExternalFileSize(max_file_bytes); }) {
+    files.GetFileSizeInBytes = [](std::size_t* size, std::string*, const std::string& path, void*) {
+      std::error_code error;
+      *size = fs::file_size(path, error);
+      return !error;
+    };
+    reader.SetMaxExternalFileSize(max_file_bytes);
+  }
+  reader.SetFsCallbacks(files);
+}
+
 // tinygltf does not check the pointer of images in a buffer view, which are therefore decoded
 // later.
 bool keep_encoded(tinygltf::Image* image, int, std::string*, std::string*, int, int,
@@ -136,7 +156,7 @@ tinygltf::Model read_gltf(const fs::path& path, Notes& notes) {
   }
 
   tinygltf::TinyGLTF reader;
-  reader.SetFsCallbacks({file_exists, same_path, read_whole_file, write_nothing, nullptr});
+  read_by_own_functions(reader);
   reader.SetImageLoader(keep_encoded, nullptr);
   tinygltf::Model model;
   std::string errors, warnings;

@@ -1,14 +1,11 @@
 #include "drivers/gpio/gpio_buttons.hpp"
 
-#include <gpiod.h>
 #include <sys/epoll.h>
 #include <sys/timerfd.h>
 
 #include <algorithm>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
-#include <ctime>
 #include <deque>
 #include <list>
 #include <optional>
@@ -17,26 +14,15 @@
 #include "drivers/debouncer.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
+#include "drivers/gpio/chip.hpp"
 #include "drivers/host_clock.hpp"
 
 namespace previz {
 namespace {
 
 constexpr std::int64_t second_ns = 1'000'000'000;
-constexpr const char* consumer = "previzd";
 // A contact that chatters faster than it is read must not hold up whoever reads it.
 constexpr int most_edges_at_once = 64;
-// The kernel keeps as many edges of a line, and drops those that follow.
-constexpr int edges_kept = 16;
-
-struct CloseChip {
-  void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }  // also releases its lines
-};
-using Chip = std::unique_ptr<gpiod_chip, CloseChip>;
-
-std::int64_t edge_ns(const timespec& time) {
-  return std::int64_t{time.tv_sec} * second_ns + time.tv_nsec;
-}
 
 struct Contact {
   std::string chip, line;
@@ -50,32 +36,6 @@ Contact contact_of(const std::string& name) {
   return {name.substr(begin, end - begin), name.substr(end + 1)};
 }
 
-// Finds a chip by its label only, because the number of a gpiochip changes from boot to boot.
-Chip find_chip(const std::string& label) {
-  Chip chip(gpiod_chip_open_by_label(label.c_str()));
-  if (!chip) throw Error("no GPIO chip has the label \"" + label + "\": " + std::strerror(errno));
-  return chip;
-}
-
-gpiod_line* find_line(gpiod_chip& chip, const std::string& line) {
-  unsigned offset = 0;
-  const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), offset);
-  gpiod_line* found = error == std::errc{} && end == line.data() + line.size()
-                          ? gpiod_chip_get_line(&chip, offset)
-                          : gpiod_chip_find_line(&chip, line.c_str());
-  if (!found) throw Error("the chip has no line \"" + line + "\"");
-  return found;
-}
-
-int request_flags(const ContactWiring& wiring) {
-  using Bias = ContactWiring::Bias;
-  int flags = wiring.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
-  if (wiring.bias == Bias::none) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_DISABLE;
-  if (wiring.bias == Bias::pull_up) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP;
-  if (wiring.bias == Bias::pull_down) flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN;
-  return flags;
-}
-
 class GpioButtons final : public Buttons {
  public:
   GpioButtons(std::string device, const std::vector<std::string>& names,
@@ -86,7 +46,7 @@ class GpioButtons final : public Buttons {
     if (!epoll_ || !timer_) throw Error(device_ + ": cannot be polled: " + std::strerror(errno));
     for (const std::string& name : names) {
       const ContactWiring wiring = settings.wiring_of(name);
-      lines_.push_back({name, contact_of(name).line, request_flags(wiring), nullptr,
+      lines_.push_back({name, contact_of(name).line, wiring, std::nullopt,
                         Debouncer(static_cast<std::int64_t>(1e9 * wiring.debounce_s)), 0, 0});
     }
     watch(timer_.get());
@@ -120,8 +80,8 @@ class GpioButtons final : public Buttons {
   struct Line {
     std::string name;   // name of the button
     std::string label;  // name or offset of the line
-    int request_flags;
-    gpiod_line* line;  // owned by chip_; null while it is not there
+    ContactWiring wiring;
+    std::optional<gpio::Input> input;  // while chip_ is there
     Debouncer debouncer;
     std::uint64_t times_babbled = 0, presses_left_out = 0;  // as counted so far
   };
@@ -134,15 +94,16 @@ class GpioButtons final : public Buttons {
 
   void open() {
     try {
-      Chip chip = find_chip(device_.substr(device_.find(':') + 1));
-      for (Line& line : lines_) request(*chip, line);
-      chip_ = std::move(chip);
+      chip_.emplace(device_.substr(device_.find(':') + 1));
+      for (Line& line : lines_) {
+        line.input = chip_->take(line.label, line.wiring);
+        watch(line.input->fd());
+      }
       refusal_.clear();
       for (Line& line : lines_) see_held(line);
       ++counters_["opened"];
     } catch (const std::exception& error) {
-      for (Line& line : lines_) line.line = nullptr;
-      chip_.reset();
+      release();
       retry_ns_ = monotonic_ns() + second_ns;
       ++counters_["not opened"];
       if (refusal_ == error.what()) return;
@@ -151,37 +112,34 @@ class GpioButtons final : public Buttons {
     }
   }
 
-  void request(gpiod_chip& chip, Line& line) {
-    line.line = find_line(chip, line.label);
-    if (gpiod_line_request_both_edges_events_flags(line.line, consumer, line.request_flags) != 0)
-      throw Error("line \"" + line.label + "\" is not available: " + std::strerror(errno));
-    watch(gpiod_line_event_get_fd(line.line));
+  void release() {
+    for (Line& line : lines_) line.input.reset();
+    chip_.reset();
   }
 
   // A button that is held while the rig starts counts as pressed from now on.
   void see_held(Line& line) {
-    if (gpiod_line_get_value(line.line) == 1 && line.debouncer.edge(true, monotonic_ns()))
+    if (line.input->is_active().value_or(false) && line.debouncer.edge(true, monotonic_ns()))
       push_edge(line);
   }
 
-  void read(Line& line) {
-    constexpr timespec at_once{0, 0};
+  void read(Line& line) try {
     int edges = 0;
-    while (line.line && edges < most_edges_at_once &&
-           gpiod_line_event_wait(line.line, &at_once) == 1) {
-      gpiod_line_event edge{};
-      if (gpiod_line_event_read(line.line, &edge) != 0) return lose(std::strerror(errno));
-      if (line.debouncer.edge(edge.event_type == GPIOD_LINE_EVENT_RISING_EDGE, edge_ns(edge.ts)))
-        push_edge(line);
+    while (line.input && edges < most_edges_at_once) {
+      const std::optional<gpio::Edge> edge = line.input->next_edge();
+      if (!edge) break;
+      if (line.debouncer.edge(edge->is_active, edge->timestamp_ns)) push_edge(line);
       ++edges;
     }
-    if (edges >= edges_kept) see_level(line);
+    if (edges >= gpio::edges_kept) see_level(line);
+  } catch (const Error& error) {
+    lose(error.what());
   }
 
   // The last edge may be among those that the kernel dropped.
   void see_level(Line& line) {
-    const int level = gpiod_line_get_value(line.line);
-    if (level >= 0 && line.debouncer.edge(level == 1, monotonic_ns())) push_edge(line);
+    const std::optional<bool> is_active = line.input->is_active();
+    if (is_active && line.debouncer.edge(*is_active, monotonic_ns())) push_edge(line);
   }
 
   void look_for_babble(Line& line) {
@@ -194,12 +152,11 @@ class GpioButtons final : public Buttons {
 
   void lose(const std::string& why) {
     for (Line& line : lines_) {
-      line.line = nullptr;
       if (line.debouncer.pressed())
         events_.emplace_back(ButtonEvent{line.name, false, monotonic_ns()});
       line.debouncer.reset();
     }
-    chip_.reset();
+    release();
     retry_ns_ = monotonic_ns() + second_ns;
     ++counters_["lost"];
     events_.emplace_back(DeviceTrouble{device_, "is lost: " + why + "; retrying"});
@@ -229,17 +186,13 @@ class GpioButtons final : public Buttons {
 
   const std::string device_;
   OwnedDescriptor epoll_, timer_;
-  Chip chip_;
+  std::optional<gpio::Chip> chip_;
   std::int64_t retry_ns_ = 0;
   std::string refusal_;  // trouble last reported
   std::list<Line> lines_;
   std::deque<ButtonsEvent> events_;
   DeviceCounters counters_{{"opened", 0}, {"not opened", 0}, {"lost", 0}, {presses_babbled, 0}};
 };
-
-std::string or_empty(const char* text) {
-  return text ? text : "";
-}
 
 }  // namespace
 
@@ -254,21 +207,9 @@ std::unique_ptr<Buttons> open_gpio(const std::string& device, const std::vector<
 
 std::vector<FoundButton> find_gpio() {
   std::vector<FoundButton> found;
-  gpiod_chip_iter* chips = gpiod_chip_iter_new();
-  if (!chips) return found;
-  while (gpiod_chip* chip = gpiod_chip_iter_next(chips)) {
-    const std::string label = or_empty(gpiod_chip_label(chip));
-    for (unsigned i = 0; i < gpiod_chip_num_lines(chip); ++i) {
-      gpiod_line* line = gpiod_chip_get_line(chip, i);
-      if (!line || gpiod_line_is_used(line)) continue;
-      if (gpiod_line_direction(line) != GPIOD_LINE_DIRECTION_INPUT) continue;
-      const std::string name = or_empty(gpiod_line_name(line));
-      if (!name.empty())
-        found.push_back({"gpio:" + label + ":" + name,
-                         or_empty(gpiod_chip_name(chip)) + " line " + std::to_string(i)});
-    }
-  }
-  gpiod_chip_iter_free(chips);
+  for (const gpio::FreeInput& input : gpio::free_inputs())
+    found.push_back({"gpio:" + input.chip_label + ":" + input.line,
+                     input.chip_name + " line " + std::to_string(input.number)});
   return found;
 }
 

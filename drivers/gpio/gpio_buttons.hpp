@@ -1,5 +1,4 @@
-// Drives buttons, pedals and switches on GPIO lines through libgpiod (1.6; version 2 has another
-// API).
+// Drives buttons, pedals and switches on GPIO lines through libgpiod.
 #pragma once
 
 #include <memory>

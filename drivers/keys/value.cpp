@@ -159,15 +159,17 @@ std::filesystem::path Codec<std::filesystem::path>::read(const Value& value, con
 
 std::array<glm::dvec3, 4> Codec<std::array<glm::dvec3, 4>>::read(const Value& value,
                                                                  const Rule& rule) {
-  const auto& points = codec::list(value, describe(rule));
-  if (points.size() != 4) codec::misread(value, describe(rule));
+  const std::string allowed = describe(rule);
+  const auto& points = codec::list(value, allowed);
+  if (points.size() != 4) codec::misread(value, allowed);
   std::array<glm::dvec3, 4> out;
   for (std::size_t i = 0; i < 4; ++i) out[i] = Codec<glm::dvec3>::read(points[i], rule);
   return out;
 }
 
 glm::dmat4 Codec<glm::dmat4>::read(const Value& value, const Rule& rule) {
-  const auto& entries = codec::list(value, describe(rule));
+  const std::string allowed = describe(rule);
+  const auto& entries = codec::list(value, allowed);
   std::vector<double> numbers;
   if (entries.size() == 4) {
     for (const auto& row : entries)
@@ -175,10 +177,10 @@ glm::dmat4 Codec<glm::dmat4>::read(const Value& value, const Rule& rule) {
   } else if (entries.size() == 16) {
     numbers = codec::numbers(value, 16, rule);
   } else {
-    codec::misread(value, describe(rule));
+    codec::misread(value, allowed);
   }
   if (numbers[12] != 0 || numbers[13] != 0 || numbers[14] != 0 || numbers[15] != 1)
-    throw Misread{value.at, "the last row is not 0 0 0 1; allowed: " + describe(rule)};
+    throw Misread{value.at, "the last row is not 0 0 0 1; allowed: " + allowed};
   glm::dmat4 out;
   for (int row = 0; row < 4; ++row)
     for (int column = 0; column < 4; ++column)
@@ -195,16 +197,17 @@ std::string Codec<glm::dmat4>::print(const glm::dmat4& matrix, const Rule& rule)
 }
 
 std::vector<double> Codec<std::vector<double>>::read(const Value& value, const Rule& rule) {
+  const std::string allowed = describe(rule);
   std::vector<double> out;
-  for (const auto& entry : codec::list(value, describe(rule)))
-    out.push_back(codec::number(entry, rule));
+  for (const auto& entry : codec::list(value, allowed)) out.push_back(codec::number(entry, rule));
   return out;
 }
 
 std::vector<std::string> Codec<std::vector<std::string>>::read(const Value& value,
                                                                const Rule& rule) {
+  const std::string allowed = describe(rule);
   std::vector<std::string> out;
-  for (const auto& entry : codec::list(value, describe(rule))) out.push_back(codec::text(entry));
+  for (const auto& entry : codec::list(value, allowed)) out.push_back(codec::text(entry));
   return out;
 }
 

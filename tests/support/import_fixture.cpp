@@ -62,6 +62,15 @@ av::Codec open_encoder(const VideoForm& form) {
   return encoder;
 }
 
+std::uint8_t* new_side_data(AVStream& stream, AVPacketSideDataType type, std::size_t bytes) {
+#if LIBAVCODEC_VERSION_INT >= AV_VERSION_INT(60, 31, 100)
+  AVCodecParameters& of = *stream.codecpar;
+  return av_packet_side_data_new(&of.coded_side_data, &of.nb_coded_side_data, type, bytes, 0)->data;
+#else
+  return av_stream_new_side_data(&stream, type, bytes);
+#endif
+}
+
 AVStream& add_stream(AVFormatContext& context, const AVCodecContext& encoder,
                      const VideoForm& form) {
   AVStream* stream = avformat_new_stream(&context, nullptr);
@@ -73,7 +82,7 @@ AVStream& add_stream(AVFormatContext& context, const AVCodecContext& encoder,
     av_dict_set(&stream->metadata, name.c_str(), value.c_str(), 0);
   const std::size_t bytes = form.display_matrix.size() * sizeof(std::int32_t);
   if (bytes > 0)
-    std::memcpy(av_stream_new_side_data(stream, AV_PKT_DATA_DISPLAYMATRIX, bytes),
+    std::memcpy(new_side_data(*stream, AV_PKT_DATA_DISPLAYMATRIX, bytes),
                 form.display_matrix.data(), bytes);
   return *stream;
 }

@@ -1,7 +1,5 @@
 #include "tests/truth/cpu_geometry.hpp"
 
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -11,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/embree.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::truth {
@@ -116,9 +115,7 @@ std::optional<Hit> Geometry::closest(const Ray& ray, std::uint32_t world) const 
   query.ray = to_embree(ray, std::numeric_limits<float>::infinity());
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(impl_->worlds[world - 1].get(), &context, &query);
+  embree::find_closest(impl_->worlds[world - 1].get(), query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
 
   Hit hit;
@@ -154,10 +151,7 @@ std::optional<Hit> Geometry::closest(const Ray& ray, std::uint32_t world) const 
 
 bool Geometry::blocked(const Ray& ray, double distance, std::uint32_t world) const {
   RTCRay query = to_embree(ray, distance);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded1(impl_->worlds[world - 1].get(), &context, &query);
-  return query.tfar < 0;
+  return embree::is_blocked(impl_->worlds[world - 1].get(), query);
 }
 
 Triangle Geometry::triangle(std::uint32_t instance, std::uint32_t index) const {

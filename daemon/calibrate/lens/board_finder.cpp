@@ -75,8 +75,8 @@ class CharucoFinder final : public BoardFinder {
  public:
   CharucoFinder(const Board& board, const ResponseCurve& response)
       : columns_(board.columns - 1), dictionary_(markers_of(board)), photometry_(response) {
-    board_ = cv::aruco::CharucoBoard::create(board.columns, board.rows, float(board.square_m),
-                                             float(board.marker_m), dictionary_);
+    board_ = charuco_board(board.columns, board.rows, float(board.square_m), float(board.marker_m),
+                           dictionary_);
   }
 
   BoardCorners find(const Frame& frame) override {

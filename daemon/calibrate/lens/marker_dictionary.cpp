@@ -5,10 +5,18 @@
 namespace previz::calibrate {
 namespace {
 
+cv::Ptr<cv::aruco::Dictionary> predefined(int id) {
+#if CV_VERSION_MINOR >= 7
+  return cv::makePtr<cv::aruco::Dictionary>(cv::aruco::getPredefinedDictionary(id));
+#else
+  return cv::aruco::getPredefinedDictionary(id);
+#endif
+}
+
 cv::Ptr<cv::aruco::Dictionary> dictionary_by_name(const std::string& name) {
   constexpr struct {
     const char* name;
-    cv::aruco::PREDEFINED_DICTIONARY_NAME id;
+    int id;
   } known[] = {
       {"4x4_50", cv::aruco::DICT_4X4_50},   {"4x4_100", cv::aruco::DICT_4X4_100},
       {"4x4_250", cv::aruco::DICT_4X4_250}, {"4x4_1000", cv::aruco::DICT_4X4_1000},
@@ -21,7 +29,7 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_by_name(const std::string& name) {
   };
   std::string names;
   for (const auto& entry : known) {
-    if (name == entry.name) return cv::aruco::getPredefinedDictionary(entry.id);
+    if (name == entry.name) return predefined(entry.id);
     add_to_list(names, entry.name);
   }
   throw Error("board: \"" + name + "\" is not a marker dictionary; known: " + names);
@@ -36,6 +44,25 @@ cv::Ptr<cv::aruco::Dictionary> markers_of(const Board& board) {
     throw Error("board: " + std::to_string(markers) + " markers are more than dictionary " +
                 board.dictionary + " has");
   return dictionary;
+}
+
+cv::Mat1b marker_picture(const cv::aruco::Dictionary& dictionary, int id, int cells) {
+  cv::Mat1b picture;
+#if CV_VERSION_MINOR >= 7
+  dictionary.generateImageMarker(id, cells, picture);
+#else
+  dictionary.drawMarker(id, cells, picture);
+#endif
+  return picture;
+}
+
+cv::Ptr<cv::aruco::CharucoBoard> charuco_board(int columns, int rows, float square, float marker,
+                                               const cv::Ptr<cv::aruco::Dictionary>& dictionary) {
+#if CV_VERSION_MINOR >= 7
+  return cv::makePtr<cv::aruco::CharucoBoard>(cv::Size(columns, rows), square, marker, *dictionary);
+#else
+  return cv::aruco::CharucoBoard::create(columns, rows, square, marker, dictionary);
+#endif
 }
 
 }  // namespace previz::calibrate

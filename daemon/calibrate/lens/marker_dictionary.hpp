@@ -1,7 +1,8 @@
-// Knows the markers of ChArUco boards by name.
+// Knows the markers of ChArUco boards by name; and OpenCV's two ways to hold them, by pointers
+// (4.6, Debian 12) and by value (4.10, Debian 13).
 #pragma once
 
-#include <opencv2/aruco/dictionary.hpp>
+#include <opencv2/aruco/charuco.hpp>
 
 #include "daemon/calibrate/lens/board.hpp"
 
@@ -10,5 +11,12 @@ namespace previz::calibrate {
 // Returns the markers of a ChArUco board; throws previz::Error if its dictionary is not known, or
 // has too few.
 cv::Ptr<cv::aruco::Dictionary> markers_of(const Board& board);
+
+// Returns a marker's picture, black on white, of `cells` x `cells` pixels, its border among them.
+cv::Mat1b marker_picture(const cv::aruco::Dictionary& dictionary, int id, int cells);
+
+// Returns a board of squares of `square`, and of markers of `marker`, in any unit.
+cv::Ptr<cv::aruco::CharucoBoard> charuco_board(int columns, int rows, float square, float marker,
+                                               const cv::Ptr<cv::aruco::Dictionary>& dictionary);
 
 }  // namespace previz::calibrate

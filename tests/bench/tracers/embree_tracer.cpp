@@ -85,9 +85,7 @@ TracedHit EmbreeTracer::closest(const Ray& ray, std::uint32_t worlds) const {
   query.ray = to_embree(ray, worlds);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(single_ ? meshes_[0].get() : scene_.get(), &context, &query);
+  embree::find_closest(single_ ? meshes_[0].get() : scene_.get(), query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {-1, {}, 0, 0, 0};
   const std::uint32_t instance = single_ ? 0 : query.hit.instID[0];
   return {
@@ -96,10 +94,7 @@ TracedHit EmbreeTracer::closest(const Ray& ray, std::uint32_t worlds) const {
 
 bool EmbreeTracer::occluded(const Ray& ray, std::uint32_t worlds) const {
   RTCRay query = to_embree(ray, worlds);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded1(single_ ? meshes_[0].get() : scene_.get(), &context, &query);
-  return query.tfar < 0;
+  return embree::is_blocked(single_ ? meshes_[0].get() : scene_.get(), query);
 }
 
 }  // namespace previz::bench

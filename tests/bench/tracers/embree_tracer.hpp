@@ -1,8 +1,6 @@
 // The same scene traced by Embree, one ray a call: what our traversal is compared with.
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "daemon/scene/scene.hpp"
+#include "drivers/embree.hpp"
 #include "tests/bench/tracers/gpu_tracer.hpp"
 
 namespace previz::bench {

@@ -87,7 +87,12 @@ TEST_F(GltfCompression, OfFilteredPositions) {
   const Grid given = grid();
   const std::size_t count = given.positions.size();
   std::vector<std::uint32_t> filtered(3 * count);
+#if MESHOPTIMIZER_VERSION >= 190
+  meshopt_encodeFilterExp(filtered.data(), count, 12, 15, &given.positions[0].x,
+                          meshopt_EncodeExpSharedVector);
+#else
   meshopt_encodeFilterExp(filtered.data(), count, 12, 15, &given.positions[0].x);
+#endif
   const int view = meshopt_view(gltf, meshopt_vertices(filtered.data(), count, 12), "ATTRIBUTES",
                                 count, 12, "EXPONENTIAL");
   first_primitive()["attributes"]["POSITION"] = gltf.accessor(view, 5126, "VEC3", count);

@@ -68,7 +68,7 @@ TEST_P(GroundTruthScene, HasTheObjectsOfSetJson) {
       const Mesh& mesh = scene.meshes[instance.mesh];
       EXPECT_EQ(mesh.triangles.size(), object.at("triangles").get<std::size_t>());
       EXPECT_EQ(instance.presence, *world == 'r' ? world_both : world_mixed);
-      EXPECT_EQ(scene.materials[instance.material].name, object.at("material"));
+      EXPECT_EQ(scene.materials[instance.material].name, object.at("material").get<std::string>());
       expect_material(scene.materials[instance.material],
                       json.at("gltf").at("materials").at(object.at("material").get<std::string>()));
       glm::dvec3 low(1e9), high(-1e9);

@@ -1,10 +1,10 @@
 // Boards as they are written, and found in pictures whose corners are known exactly.
-#include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "daemon/calibrate/lens/board.hpp"
 #include "daemon/calibrate/lens/board_finder.hpp"
 #include "daemon/calibrate/lens/board_guess.hpp"
+#include "daemon/calibrate/lens/marker_dictionary.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
@@ -118,10 +118,14 @@ TEST(BoardFinder, SeesNoBoardInNoise) {
 // OpenCV's own drawing of the board, enlarged by whole pixels: its corner (i, j) lies between
 // pixels, at (i + 1, j + 1) squares - 0.5. There is no noise; the bound is that of the bias above.
 Frame charuco_drawing() {
-  const auto drawing = cv::aruco::CharucoBoard::create(
-      7, 5, 0.04f, 0.03f, cv::aruco::getPredefinedDictionary(cv::aruco::DICT_4X4_50));
+  const auto drawing =
+      charuco_board(7, 5, 0.04f, 0.03f, markers_of(parse_board("charuco:7x5:40mm:30mm:4x4_50")));
   cv::Mat1b picture;
+#if CV_VERSION_MINOR >= 7
+  drawing->generateImage({560, 400}, picture, 0, 1);
+#else
   drawing->draw({560, 400}, picture, 0, 1);
+#endif
   cv::GaussianBlur(picture, picture, {}, 0.7);
   cv::copyMakeBorder(picture, picture, 40, 40, 40, 40, cv::BORDER_CONSTANT, 255);
   return test::gray_frame(picture.cols, picture.rows, {picture.datastart, picture.dataend});
