@@ -1,4 +1,3 @@
-#include <exception>
 #include <exiv2/exiv2.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -35,8 +34,10 @@ Orientation orientation_of(const std::string& file) try {
   const Exiv2::ExifData& data = image->exifData();
   const auto found = data.findKey(Exiv2::ExifKey("Exif.Image.Orientation"));
   if (found == data.end() || found->count() == 0) return {};
-  return exif_orientation(static_cast<int>(found->toFloat())).value_or(Orientation{});
-} catch (const std::exception&) {
+  const float value = found->toFloat();
+  if (!(value >= 1 && value <= 8)) return {};  // is none
+  return exif_orientation(static_cast<int>(value)).value_or(Orientation{});
+} catch (const Exiv2::Error&) {
   return {};  // damaged EXIF data says nothing; the picture may be whole
 }
 

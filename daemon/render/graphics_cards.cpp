@@ -65,9 +65,11 @@ std::string of_intel(const std::string& kernel_driver) {
   if (!kernel_driver.empty())
     return "graphics card Intel: Vulkan cannot open it; adduser USER render and log in again, or "
            "apt-get install mesa-vulkan-drivers";
-  return "graphics card Intel: this kernel does not know it; apt-get -t bookworm-backports install "
-         "linux-image-amd64 firmware-misc-nonfree (bookworm-backports and non-free-firmware in the "
-         "package sources) mesa-vulkan-drivers, then restart the computer";
+  return "graphics card Intel: this kernel does not drive it; apt-get install mesa-vulkan-drivers "
+         "and, on Debian 13, firmware-intel-graphics (non-free-firmware in the package sources) "
+         "or, "
+         "on Debian 12, -t bookworm-backports linux-image-amd64 firmware-misc-nonfree "
+         "(bookworm-backports too), then restart the computer";
 }
 
 std::string advice_for(const GraphicsCard& card) {

@@ -1,5 +1,5 @@
-// Knows the graphics cards of the computer from the kernel, and what those need on Debian 12 for
-// which there is no Vulkan driver.
+// Knows the graphics cards of the computer from the kernel, and what those need on Debian 12 and
+// 13 for which there is no Vulkan driver.
 #pragma once
 
 #include <cstdint>

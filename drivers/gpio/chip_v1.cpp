@@ -63,7 +63,7 @@ std::optional<Edge> Input::next_edge() {
 
 struct Chip::Impl {
   struct Close {
-    void operator()(gpiod_chip* chip) const { gpiod_chip_close(chip); }
+    void operator()(gpiod_chip* opened) const { gpiod_chip_close(opened); }
   };
   std::unique_ptr<gpiod_chip, Close> chip;
 };

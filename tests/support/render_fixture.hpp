@@ -1,6 +1,8 @@
 // Shared by the renderer's tests: one device with the validation layer on, and pictures of a view.
 #pragma once
 
+#include <mutex>
+
 #include "daemon/render/renderer.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/scenes.hpp"
@@ -8,12 +10,24 @@
 
 namespace previz::test {
 
+// The device of shared_device(), which ends with the tests: at the program's exit, the validation
+// layer's own data may be gone before it (1.4.309, Debian 13).
+struct KeptDevice : testing::Environment {
+  void TearDown() override { device.reset(); }
+  static inline std::mutex mutex;
+  static inline std::shared_ptr<render::Device> device;
+};
+inline testing::Environment* const ends_the_device =
+    testing::AddGlobalTestEnvironment(new KeptDevice);
+
 // One device a test program; every test ends by asking it for validation messages. With
 // PREVIZ_AS_GPU in the environment a CPU device is treated as a graphics card.
 inline const std::shared_ptr<render::Device>& shared_device() {
-  static const auto device = render::open_device(
-      {.validation = true, .name = "", .as_gpu = std::getenv("PREVIZ_AS_GPU") != nullptr});
-  return device;
+  const std::scoped_lock lock(KeptDevice::mutex);
+  if (!KeptDevice::device)
+    KeptDevice::device = render::open_device(
+        {.validation = true, .name = "", .as_gpu = std::getenv("PREVIZ_AS_GPU") != nullptr});
+  return KeptDevice::device;
 }
 
 inline void expect_clean(const render::Counters& counters) {

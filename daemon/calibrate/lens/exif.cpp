@@ -36,7 +36,7 @@ PhotoData read_exif(const std::filesystem::path& file) try {
   const auto lens = data.findKey(Exiv2::ExifKey("Exif.Photo.LensModel"));
   if (lens != data.end()) photo.lens = lens->toString();
   return photo;
-} catch (const std::exception& error) {
+} catch (const Exiv2::Error& error) {
   throw Error(file.string() + ": cannot be read: " + error.what());
 }
 

@@ -43,7 +43,7 @@ TEST(GraphicsCards, WithoutAVulkanDriverAreSaidWithTheirPackage) {
                {"0x038000", "0x1002", "", "install firmware-amd-graphics"},
                {"0x030000", "0x1002", "radeon", "amdgpu.cik_support=1"},
                {"0x030000", "0x8086", "i915", "adduser USER render.*mesa-vulkan-drivers"},
-               {"0x030000", "0x8086", "", "bookworm-backports"}};
+               {"0x030000", "0x8086", "", "firmware-intel-graphics"}};
   for (const auto& each : cases) {
     const Sysfs sysfs;
     sysfs.add("0000:01:00.0", each.kind, each.vendor, each.driver);
