@@ -67,8 +67,7 @@ std::string of_intel(const std::string& kernel_driver) {
            "apt-get install mesa-vulkan-drivers";
   return "graphics card Intel: this kernel does not drive it; apt-get install mesa-vulkan-drivers "
          "and, on Debian 13, firmware-intel-graphics (non-free-firmware in the package sources) "
-         "or, "
-         "on Debian 12, -t bookworm-backports linux-image-amd64 firmware-misc-nonfree "
+         "or, on Debian 12, -t bookworm-backports linux-image-amd64 firmware-misc-nonfree "
          "(bookworm-backports too), then restart the computer";
 }
 
