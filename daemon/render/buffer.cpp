@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cassert>
 #include <chrono>
+#include <cstdio>
 #include <cstring>
 #include <utility>
 
@@ -11,12 +13,31 @@
 namespace previz::render {
 namespace {
 
+std::string size_words(vk::DeviceSize bytes) {
+  if (bytes < 1'000'000) return std::to_string(bytes) + " bytes";
+  char text[32];
+  const auto size = static_cast<double>(bytes);
+  std::snprintf(text, sizeof(text), bytes < 1'000'000'000 ? "%.1f MB" : "%.1f GB",
+                size / (bytes < 1'000'000'000 ? 1e6 : 1e9));
+  return text;
+}
+
+// "a buffer of 34.1 MB for the photons"
+std::string buffer_words(Device& device, vk::DeviceSize size) {
+  assert(device.purpose());
+  return "a buffer of " + size_words(size) +
+         (device.purpose() ? " for " + device.purpose()->what() : "");
+}
+
+std::string advice_words(Device& device) {
+  return device.purpose() ? std::string("; ") + device.purpose()->advice() : "";
+}
+
 // Throws previz::Error where the device does not allow so large a buffer.
-void check_buffer(const Device& device, const BufferNeed& need) {
+void check_buffer(Device& device, const BufferNeed& need) {
   if (const auto past = past_limits(device.allows(), need))
-    throw Error("Vulkan: the scene or the picture needs a buffer of " + past->asked + ", but " +
-                device.name() + " allows " + std::to_string(past->allowed) +
-                ". Fewer triangles, smaller textures or a smaller picture need less");
+    throw Error("Vulkan: " + buffer_words(device, need.bytes) + " needs " + past->asked + ", but " +
+                device.name() + " allows " + std::to_string(past->allowed) + advice_words(device));
 }
 
 std::uint64_t next_id() {
@@ -27,6 +48,7 @@ std::uint64_t next_id() {
 Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage,
                      vk::MemoryPropertyFlags wanted, vk::MemoryPropertyFlags preferred) {
   using Usage = vk::BufferUsageFlagBits;
+  assert(device.purpose());
   device.submissions().finish();  // what is no longer needed is freed first
   Buffer result;
   result.size = std::max<vk::DeviceSize>((size + 15) / 16 * 16, 16);
@@ -46,8 +68,8 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
   } catch (const vk::SystemError& error) {
     const bool is_full = error.code() == vk::Result::eErrorOutOfDeviceMemory;
     throw Error("Vulkan: " + device.name() + (is_full ? " is out of memory" : " has no room") +
-                " for a buffer of " + std::to_string(result.size) + " bytes" +
-                (is_full ? "" : std::string(": ") + error.what()));
+                " for " + buffer_words(device, result.size) +
+                (is_full ? "" : std::string(": ") + error.what()) + advice_words(device));
   }
   ++device.submissions().work.allocations;
   result.buffer = *result.parts->buffer;
@@ -68,6 +90,8 @@ Buffer create_device_buffer(Device& device, vk::DeviceSize size, vk::BufferUsage
 
 Buffer create_staging_buffer(Device& device, vk::DeviceSize size,
                              vk::MemoryPropertyFlags preferred) {
+  const Purpose purpose(device, "copies to and from the graphics card",
+                        "close other programs, or make the picture smaller");
   return create_buffer(device, size, {}, Memory::eHostVisible | Memory::eHostCoherent, preferred);
 }
 
@@ -112,6 +136,24 @@ void record_copy_down(Device& device, const Buffer& from, const Buffer& to, vk::
 }
 
 }  // namespace
+
+Purpose::Purpose(Device& device, const char* what, const char* advice, int width, int height)
+    : device_(device),
+      what_(what),
+      advice_(advice),
+      width_(width),
+      height_(height),
+      around_(std::exchange(device.purpose(), this)) {}
+
+Purpose::~Purpose() {
+  device_.purpose() = around_;
+}
+
+std::string Purpose::what() const {
+  return width_ == 0 ? what_
+                     : std::string(what_) + " of a picture of " + std::to_string(width_) + "x" +
+                           std::to_string(height_);
+}
 
 Buffer create_storage_buffer(Device& device, vk::DeviceSize size) {
   check_buffer(device, {size, 0, true});
@@ -263,6 +305,7 @@ void record_clear(Device& device, const vk::raii::CommandBuffer& commands, const
 std::optional<CopySpeed> copy_speed(Device& device) {
   if (device.shares_host_memory()) return std::nullopt;
   std::vector<std::byte> bytes(std::size_t{64} << 20);
+  const Purpose purpose(device, "the measurement of copies", "close other programs");
   Buffer buffer = create_storage_buffer(device, bytes.size());
   const auto bytes_a_second = [&](const auto& copy) {
     copy();  // makes the staging memory

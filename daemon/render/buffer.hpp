@@ -9,6 +9,7 @@
 #include <initializer_list>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "daemon/render/device.hpp"
@@ -34,6 +35,31 @@ struct Buffer {
   std::unique_ptr<Parts, Retire<Parts>> parts;
 };
 
+// Says what the buffers are for that are made while it lives, so that the error of one that does
+// not fit can say it too, and what to do. There must be one wherever a buffer is made; the
+// innermost counts.
+class Purpose {
+ public:
+  // `what` completes "a buffer for" in the crew's words, and `advice` is an order. The texts must
+  // stay where they are. `width` and `height` are added to `what` where they are given: those of a
+  // picture.
+  Purpose(Device& device, const char* what, const char* advice, int width = 0, int height = 0);
+  ~Purpose();
+  Purpose(const Purpose&) = delete;
+  Purpose& operator=(const Purpose&) = delete;
+
+  std::string what() const;  // "the paths of a picture of 1920x1080"
+  const char* advice() const { return advice_; }
+
+ private:
+  Device& device_;
+  const char *what_, *advice_;
+  int width_, height_;
+  const Purpose* around_;
+};
+
+// These throw previz::Error, with the device's name, the size and the purpose, where the device
+// does not allow so large a buffer or has no memory for it.
 Buffer create_storage_buffer(Device& device, vk::DeviceSize size);
 Buffer create_indirect_buffer(Device& device, vk::DeviceSize size);
 // Creates a buffer that shaders read as texels. It is written by uploads, or with `is_storage` by

@@ -29,6 +29,7 @@ class CameraMap {
               const Buffers& buffers);
 
  private:
+  Purpose for_radiance() const;
   void resize(std::uint32_t pixels);
 
   Device& device_;

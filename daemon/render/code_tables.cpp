@@ -5,6 +5,7 @@
 namespace previz::render {
 
 CodeTables::CodeTables(Device& device, const lighting::Response& response) : bits(response.bits()) {
+  const Purpose purpose(device, "the camera's response", "close other programs");
   const std::vector<double>& inverse = response.inverse();
   upload_storage(device, signal_of, std::vector<float>(inverse.begin(), inverse.end()));
   std::vector<float> least;

@@ -78,6 +78,10 @@ scene::MeshBvh Deformer::add(const scene::Scene& scene, const scene::Deformation
   return std::move(built.bvh);
 }
 
+Purpose Deformer::for_deformation() const {
+  return {device_, "the meshes that deform", "simplify the meshes that deform"};
+}
+
 void Deformer::upload(std::vector<Place> places) {
   if (meshes_.empty()) return;
   if (!has_kernels_) {
@@ -92,6 +96,7 @@ void Deformer::upload(std::vector<Place> places) {
     meshes_[i].first_box = boxes;
     boxes += meshes_[i].room;
   }
+  const Purpose purpose = for_deformation();
   boxes_ = create_storage_buffer(device_, boxes * sizeof(gpu::GpuRefitBox));
   roots_ = create_storage_buffer(device_, meshes_.size() * sizeof(gpu::GpuRefitBox));
   upload_undeformed();
@@ -162,6 +167,7 @@ void Deformer::upload_shapes() {
       ++mesh.push.weights;
     }
   }
+  const Purpose purpose = for_deformation();
   upload_storage(device_, joints_, rows);
   upload_storage(device_, weights_, weights);
 }

@@ -61,6 +61,8 @@ std::span<const Pass> Denoiser::passes() {
 
 void Denoiser::reserve(std::size_t pixels, bool companions, bool caustics) {
   has_caustics_ = caustics;
+  const Purpose purpose(device_, "the noise filter",
+                        "make the picture smaller, or set quality.denoise to false");
   for (Buffer& side : caustic_)
     if (const std::size_t count = caustics ? pixels : 1; side.size < count * sizeof(gpu::vec4))
       side = texels_for(device_, count);

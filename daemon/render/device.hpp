@@ -23,7 +23,8 @@
 namespace previz::render {
 
 struct Program;  // a compute pass compiled for a device: daemon/render/kernel.hpp
-class Staging;   // daemon/render/buffer.hpp
+class Purpose;   // daemon/render/buffer.hpp
+class Staging;   // likewise
 
 // The images of pictures that are shared with a display (drivers/card_picture.hpp).
 inline constexpr vk::Format card_picture_format = vk::Format::eR8G8B8A8Unorm;
@@ -103,6 +104,8 @@ class Device {
   };
   Made made() const { return {made_buffers_, made_programs_}; }
   void count_buffer() { ++made_buffers_; }
+  // What buffers are made for at the moment; null: nothing is to be made.
+  const Purpose*& purpose() { return purpose_; }
   // The memory through which copies go up and come down; empty until it is needed.
   std::shared_ptr<Staging>& staging() { return staging_; }
 
@@ -178,6 +181,7 @@ class Device {
   std::vector<Compiled> programs_;  // in the order in which they were last wanted
   std::optional<Submissions> submissions_;
   std::shared_ptr<Staging> staging_;
+  const Purpose* purpose_ = nullptr;
 };
 
 // Deletes what the device may be working with: once that is done.

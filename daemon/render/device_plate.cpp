@@ -101,12 +101,17 @@ std::span<const Pass> DevicePlate::passes() {
   return all;
 }
 
+Purpose DevicePlate::for_plate() const {
+  return {device_, "the plate", "choose a smaller picture of the camera"};
+}
+
 DevicePlate::DevicePlate(Device& device) : device_(device) {
   make_kernels({&codes_of_bytes_, &scale_}, device, passes());
   reserve(codes_, 0);
 }
 
 void DevicePlate::reserve(Buffer& codes, std::size_t pixels) {
+  const Purpose purpose = for_plate();
   // Two pixels are written at once.
   const vk::DeviceSize size =
       std::max<std::size_t>((pixels + 1) / 2, 1) * 6 * sizeof(std::uint16_t);
@@ -154,6 +159,7 @@ void DevicePlate::make_codes(const Frame& frame, Buffer& codes) {
   check_size(frame);
   const std::span<const std::byte> bytes = std::as_bytes(std::span(frame.bytes));
   const std::size_t pixels = static_cast<std::size_t>(frame.width) * frame.height;
+  const Purpose purpose = for_plate();
   reserve(codes, pixels);
   if (frame.format == PixelFormat::rgb16) return upload_bytes(device_, codes, bytes);
   if (!yuv_terms_.buffer) upload_storage(device_, yuv_terms_, yuv_of_plates().terms());

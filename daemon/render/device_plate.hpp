@@ -30,6 +30,7 @@ class DevicePlate {
   const Buffer& codes() const { return codes_; }
 
  private:
+  Purpose for_plate() const;
   void reserve(Buffer& codes, std::size_t pixels);
   void make_codes(const Frame& frame, Buffer& codes);
   template <typename Constants>

@@ -251,6 +251,11 @@ void GpuScene::find_bounds(const Spheres& spheres) {
   specular_bounds_ = specular_bounds(scene_, spheres, specular_alpha_);
 }
 
+void GpuScene::upload_tree(const std::vector<glm::uvec4>& bvh) {
+  const Purpose purpose(device_, "the triangles' tree", "simplify the meshes of the set");
+  upload_texels(device_, bvh_, bvh, vk::Format::eR32G32B32A32Uint);
+}
+
 void GpuScene::upload_meshes() {
   // The memory of another scene is free for this one.
   for (Buffer* buffer : {&bvh_, &vertices_, &triangles_, &extras_}) *buffer = {};
@@ -284,7 +289,8 @@ void GpuScene::upload_meshes() {
       vertices.emplace_back(mesh.normals[i], uv.y);
     }
   }
-  upload_texels(device_, bvh_, bvh, vk::Format::eR32G32B32A32Uint);
+  upload_tree(bvh);
+  const Purpose purpose(device_, "the triangles", "simplify the meshes of the set");
   upload_texels(device_, vertices_, vertices, vk::Format::eR32G32B32A32Sfloat);
   upload_texels(device_, triangles_, triangles, vk::Format::eR32G32B32A32Uint);
   upload_texels(device_, extras_, extras, vk::Format::eR32G32Uint);
@@ -338,6 +344,7 @@ void GpuScene::upload_materials(double specular_alpha) {
     set_factors(m, to);
     set_layers(m, to);
   }
+  const Purpose purpose(device_, "the materials", "use fewer materials");
   upload_storage(device_, materials_, materials);
   upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);
 }
@@ -387,6 +394,10 @@ void GpuScene::upload_textures() {
     textures.push_back(texture);
   }
   append(textures, levels);
+  const Purpose purpose(device_, "the scene's textures",
+                        filters_textures_
+                            ? "use smaller textures, or set estimator.filter_textures to false"
+                            : "use smaller textures");
   upload_storage(device_, textures_, textures);
   upload_texels(device_, texels_, texels, vk::Format::eR32G32Uint);
 }
@@ -397,6 +408,7 @@ void GpuScene::set_environment(const EncodedEnvironment& encoded, set::LightSamp
   environment_mean_ = encoded.mean;
   environment_spread_ = encoded.spread;
   sampling_ = sampling;
+  const Purpose purpose(device_, "the environment light", "use a smaller environment map");
   upload_texels(device_, environment_, encoded.radiance, vk::Format::eR32G32B32A32Sfloat);
   upload_texels(device_, importance_, encoded.importance, vk::Format::eR32G32B32A32Sfloat);
 }
@@ -421,6 +433,7 @@ void GpuScene::upload_bounds(const glm::dvec3& camera_position) {
   for (const Bounds& part : {difference_bounds_, specular_bounds_})
     for (const glm::dvec4& bound : part)
       bounds.emplace_back(glm::dvec3(bound) - camera_position, bound.w);
+  const Purpose purpose(device_, "the bounds of virtual objects", "use fewer objects");
   upload_storage(device_, bounds_buffer_, bounds);
 }
 
@@ -467,6 +480,7 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
   }
   const scene::TopBvh top_bvh = scene::build_top_bvh(top);
   upload_bytes(device_, bvh_, std::as_bytes(std::span(top_bvh.texels)));
+  const Purpose purpose(device_, "the scene's objects", "use fewer objects");
   upload_storage(device_, instances_, instances);
 }
 

@@ -104,6 +104,7 @@ class GpuScene {
   };
 
   void upload_meshes();
+  void upload_tree(const std::vector<glm::uvec4>& bvh);
   void check_deforming() const;
   void upload_materials(double specular_alpha);
   scene::Material as_read(const scene::Material& material) const;

@@ -86,10 +86,17 @@ void History::light_with(std::vector<set::Light> lamps) {
   light_.see(std::move(lamps));
 }
 
+Purpose History::for_average(const PinholeIntrinsics& lens) const {
+  return {device_, "the average over frames",
+          "make the picture smaller, or turn off averaging (quality.accumulate or --neighbours 0)",
+          lens.width, lens.height};
+}
+
 void History::reserve(Frame& frame) {
   const std::size_t points = deforming_points(frame.stances);
   const std::size_t pixels = static_cast<std::size_t>(frame.view.lens.width) *
                              static_cast<std::size_t>(frame.view.lens.height);
+  const Purpose purpose = for_average(frame.view.lens);
   const auto grow = [&](Buffer& buffer, std::size_t bytes) {
     if (buffer.size < bytes) buffer = create_storage_buffer(device_, bytes);
   };
@@ -216,6 +223,7 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
   if (!moved_now.moved.empty()) from = arrivals(light_.environment(), light_.lamps());
   gpu::GpuHistory values = constants(samples, moved_now);
   values.arrival_count = static_cast<std::uint32_t>(from.size());
+  const Purpose purpose = for_average(now.view.lens);
   upload_storage(device_, history_, std::vector{values});
   upload_storage(device_, moves_, moved_now.moved);
   upload_storage(device_, arrivals_, from);

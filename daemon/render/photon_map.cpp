@@ -18,6 +18,7 @@ void PhotonMap::resize(std::uint32_t photons) {
   bucket_count_ = std::bit_ceil(2 * photons);
   if (photons <= room_) return;  // fewer photons use a part of the buffers
   room_ = 0;                     // stays 0 if an allocation below throws
+  const Purpose purpose(device_, "the photons", "lower estimator.photons");
   const vk::DeviceSize slots = 2 * static_cast<vk::DeviceSize>(photons);
   photon_buffer_ = create_storage_buffer(device_, slots * sizeof(gpu::GpuPhoton));
   order_ = create_storage_buffer(device_, slots * sizeof(std::uint32_t));

@@ -61,6 +61,7 @@ Presenter::Presenter(Device& device, const lighting::Response& response)
       tables_(device, response) {
   make_kernels({&composite_, &present_, &scan_out_}, device, passes());
   static const std::vector<float> pattern = blue_noise(gpu::DITHER_SIDE);
+  const Purpose purpose(device, "the dither pattern", "close other programs");
   upload_storage(device, thresholds_, pattern);
 }
 
@@ -74,6 +75,7 @@ std::span<const Pass> Presenter::passes() {
 void Presenter::reserve(std::size_t pixels) {
   if (pixels <= pixels_) return;
   pixels_ = 0;  // stays 0 if an allocation below throws
+  const Purpose purpose(device_, "the shown picture", "make the picture smaller");
   composites_ = create_storage_buffer(device_, pixels * sizeof(gpu::vec4));
   highlights_ = create_storage_buffer(device_, pixels * sizeof(std::uint32_t));
   picture_ = create_storage_buffer(device_, words_of(pixels) * sizeof(std::uint32_t));

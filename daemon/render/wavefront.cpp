@@ -73,14 +73,16 @@ Wavefront::Wavefront(Device& device, int width, int height, std::uint32_t paths_
       max_slots_(most_slots(device, paths_a_slot)),
       paths_a_slot_(paths_a_slot),
       photons_(device),
-      camera_(device),
-      control_(create_indirect_buffer(device, sizeof(gpu::GpuControl))) {
+      camera_(device) {
+  const Purpose purpose(device, "the counters of paths", "close other programs");
+  control_ = create_indirect_buffer(device, sizeof(gpu::GpuControl));
   resize(width, height);
 }
 
 void Wavefront::resize(int width, int height) {
   width_ = width;
   height_ = height;
+  const Purpose purpose(device_, "the paths", "make the picture smaller", width, height);
   create_tiles();
   create_paths();
 }
@@ -176,6 +178,9 @@ Buffers Wavefront::buffers_of(std::size_t tile) const {
 
 // Makes room for the light of photons, or for nothing where there is none.
 void Wavefront::create_caustics(bool has_photons) {
+  const Purpose purpose(device_, "the light of photons",
+                        "make the picture smaller, or set estimator.caustics to \"none\"", width_,
+                        height_);
   const vk::DeviceSize slots = has_photons ? 2 * vk::DeviceSize{slots_} : 1;
   if (sample_caustic_.size < slots * sizeof(gpu::vec4))
     sample_caustic_ = create_storage_buffer(device_, slots * sizeof(gpu::vec4));

@@ -14,6 +14,7 @@ class Accumulator {
  public:
   explicit Accumulator(Device& device)
       : device_(device), kernel_(device, "accumulate", accumulate_spv, {0}) {
+    const render::Purpose purpose(device, "a test", "");
     const vk::DeviceSize samples = slots * sizeof(gpu::vec4);
     for (Buffer* buffer : {&mixed_, &real_, &landed_, &aov_, &albedo_})
       *buffer = render::create_storage_buffer(device, samples);

@@ -27,6 +27,7 @@ inline render::Layers layers_of(std::span<const gpu::GpuPixel> pixels, std::int6
 inline Plate present(std::span<const gpu::GpuPixel> pixels, const Plate& plate,
                      const lighting::Response& response, double exposure,
                      render::Denoiser& denoiser, bool denoise, int tile_rows) {
+  const render::Purpose purpose(*shared_device(), "a test", "");
   std::vector<render::Buffer> buffers;
   std::vector<std::pair<int, int>> rows;
   for (int row = 0; row < plate.height; row += tile_rows) {

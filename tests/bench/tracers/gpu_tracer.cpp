@@ -50,11 +50,13 @@ GpuTracer::GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texe
       hits_pass_(device, "closest_hits", closest_hits_spv, {0, on_card}),
       distances_pass_(device, "closest_distances", closest_distances_spv, {0, on_card}),
       blocked_pass_(device, "blocked_worlds", blocked_worlds_spv, {0, on_card}) {
+  const render::Purpose purpose(device, "the triangles' tree", "use fewer triangles");
   render::upload_texels(device, bvh_, texels, vk::Format::eR32G32B32A32Uint);
 }
 
 void GpuTracer::set_rays(std::span<const Ray> rays) {
   count_ = static_cast<std::uint32_t>(rays.size());
+  const render::Purpose purpose(device_, "the rays", "use fewer rays");
   render::upload_texels(device_, rays_, std::vector<Ray>(rays.begin(), rays.end()),
                         vk::Format::eR32G32B32A32Sfloat);
   const vk::DeviceSize size = rays.size() * sizeof(TracedHit);

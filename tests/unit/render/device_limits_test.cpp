@@ -1,7 +1,7 @@
 // What a device does not allow is said with both numbers, before a driver is asked for it.
 #include "daemon/render/device_limits.hpp"
 
-#include "daemon/render/device.hpp"
+#include "daemon/render/buffer.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::device_limits_test {
@@ -79,10 +79,12 @@ TEST(DeviceLimits, OfThisDeviceRefuseABufferByName) {
   EXPECT_GE(allows.allocation_bytes, 1u << 30);
   EXPECT_GE(allows.push_bytes, push_bytes);
   const auto create_past_it = [&] {
+    const render::Purpose purpose(device, "the texels of a test", "use fewer");
     render::create_texel_buffer(device, 16 * (allows.texels + 1), vk::Format::eR32G32B32A32Sfloat);
   };
   EXPECT_THAT(error_of(create_past_it),
-              AllOf(HasSubstr(device.name()), HasSubstr(std::to_string(allows.texels))));
+              AllOf(HasSubstr(device.name()), HasSubstr(std::to_string(allows.texels)),
+                    HasSubstr("for the texels of a test needs "), HasSubstr("; use fewer")));
   EXPECT_EQ(render::validation_messages(device), 0u);
 }
 

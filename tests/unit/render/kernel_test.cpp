@@ -22,6 +22,7 @@ Buffer control_with(std::uint32_t shadow_rays, Device& device = *shared_device()
   gpu::GpuControl control{};
   control.shadow_count = shadow_rays;
   Buffer buffer;
+  const render::Purpose purpose(device, "a test", "");
   render::upload_storage(device, buffer, std::vector{control});
   return buffer;
 }

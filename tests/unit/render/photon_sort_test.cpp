@@ -24,6 +24,7 @@ Sorted sort_photons(render::Device& device, std::uint32_t count) {
   gpu::GpuFrame frame{};
   frame.photon_count = count;
   Buffer frames;
+  const render::Purpose purpose(device, "a test", "");
   render::upload_storage(device, frames, std::vector{frame});
   Buffers buffers{{"frame", &frames}};
   map.add_to(buffers);
