@@ -58,7 +58,13 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
     Buffer::Parts& parts = *result.parts;
     parts.buffer = vk::raii::Buffer(device.vk(), {{}, result.size, usage});
     const auto requirements = parts.buffer.getMemoryRequirements();
-    const auto type = device.memory_type(requirements.memoryTypeBits, wanted, preferred);
+    std::uint32_t types = requirements.memoryTypeBits;
+    const bool is_own = static_cast<bool>(wanted & vk::MemoryPropertyFlagBits::eDeviceLocal);
+    if (is_own && (types & device.mapped_types()) != 0) {
+      types &= device.mapped_types();
+      wanted |= vk::MemoryPropertyFlagBits::eHostVisible;
+    }
+    const auto type = device.memory_type(types, wanted, preferred);
     parts.memory = vk::raii::DeviceMemory(device.vk(), {requirements.size, type});
     parts.buffer.bindMemory(*parts.memory, 0);
     if (wanted & vk::MemoryPropertyFlagBits::eHostVisible)
@@ -79,7 +85,7 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
 
 using Memory = vk::MemoryPropertyFlagBits;
 
-// Where the host works in the device's memory, it is mapped and no staging is needed.
+// Where the host works in the device's memory, or can write it, it is mapped.
 Buffer create_device_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage) {
   device.count_buffer();
   const vk::MemoryPropertyFlags host = Memory::eHostVisible | Memory::eHostCoherent;
@@ -114,6 +120,12 @@ vk::DeviceSize texel_bytes_of(vk::Format format) {
 Staging& staging_of(Device& device) {
   if (!device.staging()) device.staging() = std::make_shared<Staging>(device);
   return *device.staging();
+}
+
+// Returns whether the host can write the buffer in place. A card may still be working with it,
+// unless it has nothing at all to do, as after every creation of a buffer.
+bool can_write_now(Device& device, const Buffer& buffer) {
+  return buffer.mapped && (device.shares_host_memory() || device.submissions().is_idle());
 }
 
 // Copies down, and makes what was copied visible to the host. What the device writes next waits
@@ -224,7 +236,7 @@ void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> byt
   if (bytes.empty()) return;
   if (offset + bytes.size() > buffer.size) throw Error("Vulkan: upload past a buffer's end");
   device.submissions().work.bytes_up += bytes.size();
-  if (buffer.mapped) {
+  if (can_write_now(device, buffer)) {
     std::memcpy(static_cast<std::byte*>(buffer.mapped) + offset, bytes.data(), bytes.size());
     return;
   }
@@ -246,7 +258,7 @@ void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> byt
 void read_bytes(Device& device, const Buffer& buffer, vk::DeviceSize size,
                 const std::function<void(const std::byte*)>& visit) {
   if (size == 0) return;
-  if (buffer.mapped) {
+  if (device.shares_host_memory()) {
     device.submissions().work.bytes_down += size;
     visit(static_cast<const std::byte*>(buffer.mapped));
     return;
@@ -264,7 +276,7 @@ void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> b
 }
 
 void Downloads::add(Device& device, const Buffer& buffer, std::span<std::byte> to) {
-  if (buffer.mapped) return download_bytes(device, buffer, to);
+  if (device.shares_host_memory()) return download_bytes(device, buffer, to);
   const auto same =
       std::ranges::find(copies_, to.data(), [](const Copy& copy) { return copy.to.data(); });
   Copy& copy = same != copies_.end()

@@ -30,7 +30,7 @@ struct Buffer {
   vk::Buffer buffer;
   vk::BufferView view;  // texel buffers only
   vk::DeviceSize size = 0;
-  void* mapped = nullptr;  // non-null where the memory is host-visible
+  void* mapped = nullptr;  // non-null where the host can write the memory
   std::uint64_t id = 0;    // no other buffer of the process has it
   std::unique_ptr<Parts, Retire<Parts>> parts;
 };
@@ -100,7 +100,8 @@ class Staging {
   std::vector<Buffer> lent_;  // and given back
 };
 
-// Uploads to `offset` (bytes). Throws previz::Error where the data would not fit.
+// Uploads to `offset` (bytes), behind what is recorded so far. Throws previz::Error where the data
+// would not fit.
 void upload_bytes(Device& device, Buffer& buffer, std::span<const std::byte> bytes,
                   vk::DeviceSize offset = 0);
 void download_bytes(Device& device, const Buffer& buffer, std::span<std::byte> bytes);

@@ -104,6 +104,24 @@ bool has_extension(const vk::raii::PhysicalDevice& physical, std::string_view na
                              });
 }
 
+// Returns a bit for each type of the device's own memory that the host can write without flushing.
+// Its heap is no smaller than any other of the device: neither a window into one nor a small part.
+std::uint32_t types_to_map(const vk::raii::PhysicalDevice& physical) {
+  using Property = vk::MemoryPropertyFlagBits;
+  constexpr auto wanted = Property::eDeviceLocal | Property::eHostVisible | Property::eHostCoherent;
+  const vk::PhysicalDeviceMemoryProperties memory = physical.getMemoryProperties();
+  vk::DeviceSize most = 0;
+  for (const vk::MemoryHeap& heap : std::span(memory.memoryHeaps).first(memory.memoryHeapCount))
+    if (heap.flags & vk::MemoryHeapFlagBits::eDeviceLocal) most = std::max(most, heap.size);
+  std::uint32_t types = 0;
+  for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i) {
+    const vk::MemoryType& type = memory.memoryTypes[i];
+    const bool fits = memory.memoryHeaps[type.heapIndex].size == most;
+    if (fits && (type.propertyFlags & wanted) == wanted) types |= 1u << i;
+  }
+  return types;
+}
+
 bool has_uniform_subgroups(const vk::raii::PhysicalDevice& physical) {
   if (!has_extension(physical, VK_KHR_SHADER_SUBGROUP_UNIFORM_CONTROL_FLOW_EXTENSION_NAME))
     return false;
@@ -306,6 +324,7 @@ void Device::create_instance() {
 void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) {
   std::string found;
   std::vector<std::uint32_t> vendors;
+  bool is_integrated = false;
   int best = 1000;
   for (auto& physical : vk::raii::PhysicalDevices(instance_)) {
     const auto properties = physical.getProperties();
@@ -322,8 +341,12 @@ void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) 
     name_ = name;
     limits_ = properties.limits;
     is_cpu_ = is_cpu;
+    is_integrated = properties.deviceType == vk::PhysicalDeviceType::eIntegratedGpu;
   }
   note_missing_drivers(vendors);
+  mapped_types_ = 0;
+  if (best < 1000 && !shares_host_memory() && (is_integrated || options_.as_integrated))
+    mapped_types_ = types_to_map(physical_);
   if (best == 1000)
     throw Error("Vulkan: no usable device" +
                 (wanted_name.empty() ? "" : " named \"" + wanted_name + "\"") +
@@ -379,7 +402,8 @@ void Device::create_device() {
                        Submissions::Options{.name = name_,
                                             .times_passes = options_.times_passes || can_time,
                                             .most_work = is_cpu_ ? cpu_work : first_work,
-                                            .adapts = !is_cpu_});
+                                            .adapts = !is_cpu_,
+                                            .host_writes = mapped_types_ != 0});
 }
 
 std::uint32_t Device::memory_type(std::uint32_t allowed_bits, vk::MemoryPropertyFlags wanted,

@@ -64,6 +64,9 @@ class Device {
   // Returns whether the host works in the device's own memory; otherwise it uploads and downloads
   // by copies, and the device is wide enough to have many samples in flight.
   bool shares_host_memory() const { return is_cpu_ && !options_.as_gpu; }
+  // Returns a bit for each type of the device's own memory that the host can write: of a graphics
+  // card that is part of the processor. Reading it may be slow.
+  std::uint32_t mapped_types() const { return mapped_types_; }
   // What is open now; may be called on any thread.
   struct Drawing {
     std::string name;  // empty: nothing is open
@@ -169,6 +172,7 @@ class Device {
   DeviceLimits allows_{};
   bool is_cpu_ = false;
   bool lanes_meet_ = false;
+  std::uint32_t mapped_types_ = 0;
   bool had_gpu_ = false;  // since it was first opened
   std::vector<std::string> missing_drivers_;
   bool missing_is_said_ = false;

@@ -22,6 +22,8 @@ struct DeviceOptions {
   // samples are in flight, so that a computer without a card runs the code that a card would. The
   // device is still called a CPU. No pixel depends on it.
   bool as_gpu = false;
+  // With `as_gpu`: as one that is part of the processor, whose memory the host can write.
+  bool as_integrated = false;
   // With `validation`: the layer also looks for accesses to memory that no barrier orders.
   bool synchronization = false;
   // Every pass is timed by the device's clock (take_times()), as a graphics card's always are if it

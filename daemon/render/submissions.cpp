@@ -25,6 +25,17 @@ void named(const std::string& device, const F& call) {
   }
 }
 
+// Lets the host write where the device has written. What it reads is copied behind a barrier of its
+// own.
+void barrier_to_host(const vk::raii::CommandBuffer& commands) {
+  using Stage = vk::PipelineStageFlagBits2;
+  const vk::MemoryBarrier2 to_host(
+      Stage::eComputeShader | Stage::eCopy | Stage::eClear,
+      vk::AccessFlagBits2::eShaderWrite | vk::AccessFlagBits2::eTransferWrite, Stage::eHost,
+      vk::AccessFlagBits2::eHostWrite);
+  commands.pipelineBarrier2(vk::DependencyInfo({}, to_host));
+}
+
 }  // namespace
 
 Submissions::Submissions(const vk::raii::PhysicalDevice& physical, const vk::raii::Device& device,
@@ -72,6 +83,7 @@ void Submissions::flush() {
   is_recording_ = false;
   has_failed_ = true;  // unless all of this goes well: what was recorded is lost otherwise
   named(options_.name, [&] {
+    if (options_.host_writes) barrier_to_host(slot.commands);
     slot.commands.end();
     const vk::CommandBuffer commands = *slot.commands;
     const vk::TimelineSemaphoreSubmitInfo values({}, next_);

@@ -23,7 +23,8 @@ class Submissions {
     std::string name;         // the device's, for errors
     bool times_passes;        // throws previz::Error where the queue family has no timestamps
     std::uint64_t most_work;  // add_work() hands over what is more
-    bool adapts;  // `most_work` is only the beginning: a driver ends what takes too long
+    bool adapts;       // `most_work` is only the beginning: a driver ends what takes too long
+    bool host_writes;  // to what the device has written, when that is done
   };
   Submissions(const vk::raii::PhysicalDevice& physical, const vk::raii::Device& device,
               std::uint32_t queue_family, Options options);

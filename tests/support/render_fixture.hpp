@@ -21,12 +21,18 @@ inline testing::Environment* const ends_the_device =
     testing::AddGlobalTestEnvironment(new KeptDevice);
 
 // One device a test program; every test ends by asking it for validation messages. With
-// PREVIZ_AS_GPU in the environment a CPU device is treated as a graphics card.
+// PREVIZ_AS_GPU in the environment a CPU device is treated as a graphics card, and if that is
+// "integrated", as one that is part of the processor.
 inline const std::shared_ptr<render::Device>& shared_device() {
   const std::scoped_lock lock(KeptDevice::mutex);
-  if (!KeptDevice::device)
-    KeptDevice::device = render::open_device(
-        {.validation = true, .name = "", .as_gpu = std::getenv("PREVIZ_AS_GPU") != nullptr});
+  if (!KeptDevice::device) {
+    const char* as = std::getenv("PREVIZ_AS_GPU");
+    KeptDevice::device =
+        render::open_device({.validation = true,
+                             .name = "",
+                             .as_gpu = as != nullptr,
+                             .as_integrated = as && std::string_view(as) == "integrated"});
+  }
   return KeptDevice::device;
 }
 

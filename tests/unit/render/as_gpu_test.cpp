@@ -81,8 +81,7 @@ Pictures pictures_on(const std::shared_ptr<render::Device>& device) {
   return result;
 }
 
-TEST(AsGpu, HasThePicturesOfACpuBitForBit) {
-  const auto as_gpu = render::open_device({.validation = true, .name = "", .as_gpu = true});
+void expect_the_pictures_of_a_cpu(const std::shared_ptr<render::Device>& as_gpu) {
   // On a card there is no other path to compare with; every other test then runs the card's.
   if (!as_gpu->is_cpu()) GTEST_SKIP() << "the device is a graphics card";
   if (!shared_device()->shares_host_memory()) GTEST_SKIP() << "PREVIZ_AS_GPU is set";
@@ -101,13 +100,25 @@ TEST(AsGpu, HasThePicturesOfACpuBitForBit) {
   EXPECT_GT(render::work_of(*as_gpu).submissions, 0u);
 }
 
-std::shared_ptr<render::Device> hazards_heard() {
-  return render::open_device(
-      {.validation = true, .name = "", .as_gpu = true, .synchronization = true});
+TEST(AsGpu, HasThePicturesOfACpuBitForBit) {
+  expect_the_pictures_of_a_cpu(
+      render::open_device({.validation = true, .name = "", .as_gpu = true}));
 }
 
-TEST(AsGpu, HasTheSamePicturesWhereFramesOverlap) {
-  const auto as_gpu = hazards_heard();
+TEST(AsGpu, HasThePicturesOfACpuBitForBitWhereItsMemoryIsMapped) {
+  expect_the_pictures_of_a_cpu(
+      render::open_device({.validation = true, .name = "", .as_gpu = true, .as_integrated = true}));
+}
+
+std::shared_ptr<render::Device> hazards_heard(bool as_integrated = false) {
+  return render::open_device({.validation = true,
+                              .name = "",
+                              .as_gpu = true,
+                              .as_integrated = as_integrated,
+                              .synchronization = true});
+}
+
+void expect_the_same_where_frames_overlap(const std::shared_ptr<render::Device>& as_gpu) {
   const View view = ball_on_texture();
   SetRenderer one(view, many_photons(), set::LightSampling::importance, as_gpu);
   SetRenderer other(view, many_photons(), set::LightSampling::importance, as_gpu);
@@ -118,15 +129,25 @@ TEST(AsGpu, HasTheSamePicturesWhereFramesOverlap) {
   EXPECT_EQ(render::validation_messages(*as_gpu), 0u);
 }
 
+TEST(AsGpu, HasTheSamePicturesWhereFramesOverlap) {
+  expect_the_same_where_frames_overlap(hazards_heard());
+}
+
+TEST(AsGpu, HasTheSamePicturesWhereFramesOverlapInMappedMemory) {
+  expect_the_same_where_frames_overlap(hazards_heard(/*as_integrated=*/true));
+}
+
 void two_live_frames(const std::shared_ptr<render::Device>& device) {
   SetRenderer renderer(ball_on_texture(), many_photons(), set::LightSampling::importance, device);
   live_frames(renderer, 2);
 }
 
 TEST(AsGpu, NoAccessLacksItsBarrier) {
-  const auto device = hazards_heard();
-  two_live_frames(device);
-  EXPECT_EQ(render::validation_messages(*device), 0u);
+  for (const bool as_integrated : {false, true}) {
+    const auto device = hazards_heard(as_integrated);
+    two_live_frames(device);
+    EXPECT_EQ(render::validation_messages(*device), 0u) << as_integrated;
+  }
 }
 
 VKAPI_ATTR void VKAPI_CALL no_barrier(VkCommandBuffer, const VkDependencyInfo*) {}

@@ -133,4 +133,47 @@ TEST(Buffers, ThatDoNotFitSayTheirSize) {
   EXPECT_EQ(error_of_size(34'100'000), begin + "34.1 MB" + end);
 }
 
+std::shared_ptr<Device> integrated() {
+  return render::open_device(
+      {.validation = true, .name = "", .as_gpu = true, .as_integrated = true});
+}
+
+TEST(MappedMemory, IsWrittenWithoutACopyWhileTheDeviceHasNothingToDo) {
+  for (const auto& device : {integrated(), as_gpu()}) {
+    const Purpose purpose(*device, "a test", "");
+    const bool is_mapped = device->mapped_types() != 0;
+    const std::vector<std::uint32_t> first{1, 2, 3}, second{4, 5, 6};
+    Buffer buffer;
+    render::upload_storage(*device, buffer, first);
+    EXPECT_EQ(device->submissions().is_idle(), is_mapped);
+    EXPECT_EQ(render::download<std::uint32_t>(*device, buffer, 3), first);
+    render::upload_storage(*device, buffer, second);
+    EXPECT_EQ(device->submissions().is_idle(), is_mapped);
+    EXPECT_EQ(render::download<std::uint32_t>(*device, buffer, 3), second);
+    EXPECT_EQ(render::validation_messages(*device), 0u);
+  }
+}
+
+TEST(MappedMemory, IsCopiedToBehindWhatTheDeviceHasToDo) {
+  const auto device = integrated();
+  if (device->mapped_types() == 0) GTEST_SKIP() << "the host cannot write the device's memory";
+  const Purpose purpose(*device, "a test", "");
+  const std::vector<std::uint32_t> first{1, 2, 3}, second{4, 5, 6};
+  Buffer buffer, untouched;
+  render::upload_storage(*device, buffer, first);
+  render::upload_storage(*device, untouched, first);
+  std::vector<std::uint32_t> before(3);
+  render::Downloads downloads;
+  downloads.add(*device, buffer, std::as_writable_bytes(std::span(before)));
+  render::upload_storage(*device, buffer, second);  // only recorded is what reads it
+  device->submissions().flush();
+  render::upload_storage(*device, untouched, second);  // it may be under way
+  EXPECT_FALSE(device->submissions().is_idle());
+  downloads.finish();
+  EXPECT_EQ(before, first);
+  EXPECT_EQ(render::download<std::uint32_t>(*device, buffer, 3), second);
+  EXPECT_EQ(render::download<std::uint32_t>(*device, untouched, 3), second);
+  EXPECT_EQ(render::validation_messages(*device), 0u);
+}
+
 }  // namespace previz::test::buffer_test
