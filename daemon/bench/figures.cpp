@@ -28,6 +28,7 @@ std::string head_of(const BenchReport& report) {
       "previzd {}, {}\n{}{}, driver {}, {} of memory\n{}, {} cores\n", report.version, report.date,
       device.name, device.is_gpu ? "" : " (a CPU: no graphics card)", device.driver,
       gigabytes(static_cast<double>(device.memory_bytes)), report.processor, report.cores);
+  text += "rays are traced by " + report.tracing_units() + "\n";
   text += fmt::format("first picture after {:.1f} s\n", report.start_s);
   if (report.up_bytes_s && report.down_bytes_s)
     text += fmt::format("copies: {}/s up, {}/s down\n", gigabytes(*report.up_bytes_s),
@@ -137,6 +138,10 @@ const FrameFigures* BenchReport::typical() const {
   return best;
 }
 
+std::string BenchReport::tracing_units() const {
+  return device.traces_in_hardware ? "its own units for them" : "its compute units";
+}
+
 std::string bench_table(const BenchReport& report) {
   std::string text = head_of(report);
   text += rows_of("Live frames over the size of the picture", report.by_size);
@@ -170,7 +175,8 @@ std::string bench_json(const BenchReport& report) {
                  {"driver", report.device.driver},
                  {"is_gpu", report.device.is_gpu},
                  {"memory_bytes", report.device.memory_bytes},
-                 {"shares_host_memory", report.device.shares_host_memory}}},
+                 {"shares_host_memory", report.device.shares_host_memory},
+                 {"traces_in_hardware", report.device.traces_in_hardware}}},
                {"processor", report.processor},
                {"cores", report.cores},
                {"start_s", report.start_s},

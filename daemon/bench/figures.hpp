@@ -71,6 +71,7 @@ struct BenchReport {
 
   // The frame that stands for the device: the largest of those of one sample up to 1920x1080.
   const FrameFigures* typical() const;
+  std::string tracing_units() const;  // the device's that trace rays, in words
 };
 
 std::string bench_table(const BenchReport& report);

@@ -97,6 +97,7 @@ std::string machine(const BenchReport& report) {
   std::string html = "<h2>The machine</h2>\n<table>\n";
   html += row("graphics card", report.device.name + (report.device.is_gpu ? "" : " (a CPU)"));
   html += row("driver", report.device.driver);
+  html += row("rays", "traced by " + report.tracing_units());
   html += row("its memory",
               fmt::format("{:.1f} GB", static_cast<double>(report.device.memory_bytes) / 1e9));
   html += row("processor", fmt::format("{}, {} cores", report.processor, report.cores));

@@ -309,7 +309,8 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
                 pipeline::Metrics& metrics, std::ostream& out) {
   const scene::Scene scene = scene::load_scene(take.set);
   for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
-  const std::shared_ptr<render::Device> device = render::open_device(options.device);
+  const std::shared_ptr<render::Device> device =
+      render::open_device(render::options_for(options.device, take.set.quality.hardware_rays));
   check_neighbours(options, take, *device);
   out << take.session.info.name << ": " << to_do.size() << " frames of "
       << size_words(pipeline::scaled(take.observer, options.scale).intrinsics) << ", "

@@ -65,7 +65,10 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
       wanted |= vk::MemoryPropertyFlagBits::eHostVisible;
     }
     const auto type = device.memory_type(types, wanted, preferred);
-    parts.memory = vk::raii::DeviceMemory(device.vk(), {requirements.size, type});
+    const vk::MemoryAllocateFlagsInfo with_address(vk::MemoryAllocateFlagBits::eDeviceAddress);
+    vk::MemoryAllocateInfo allocate(requirements.size, type);
+    if (usage & vk::BufferUsageFlagBits::eShaderDeviceAddress) allocate.pNext = &with_address;
+    parts.memory = vk::raii::DeviceMemory(device.vk(), allocate);
     parts.buffer.bindMemory(*parts.memory, 0);
     if (wanted & vk::MemoryPropertyFlagBits::eHostVisible)
       result.mapped = parts.memory.mapMemory(0, VK_WHOLE_SIZE);
@@ -87,7 +90,10 @@ using Memory = vk::MemoryPropertyFlagBits;
 
 // Where the host works in the device's memory, or can write it, it is mapped.
 Buffer create_device_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage) {
+  using Usage = vk::BufferUsageFlagBits;
   device.count_buffer();
+  if (device.traces_in_hardware())
+    usage |= Usage::eShaderDeviceAddress | Usage::eAccelerationStructureBuildInputReadOnlyKHR;
   const vk::MemoryPropertyFlags host = Memory::eHostVisible | Memory::eHostCoherent;
   return device.shares_host_memory()
              ? create_buffer(device, size, usage, host, Memory::eDeviceLocal)
@@ -187,6 +193,17 @@ Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format forma
   result.parts->view =
       vk::raii::BufferView(device.vk(), {{}, result.buffer, format, 0, VK_WHOLE_SIZE});
   result.view = *result.parts->view;
+  return result;
+}
+
+Buffer create_structure_buffer(Device& device, vk::DeviceSize size,
+                               vk::AccelerationStructureTypeKHR type) {
+  check_buffer(device, {size, 0, false});
+  Buffer result =
+      create_device_buffer(device, size, vk::BufferUsageFlagBits::eAccelerationStructureStorageKHR);
+  result.parts->structure = vk::raii::AccelerationStructureKHR(
+      device.vk(), vk::AccelerationStructureCreateInfoKHR({}, result.buffer, 0, size, type));
+  result.structure = *result.parts->structure;
   return result;
 }
 

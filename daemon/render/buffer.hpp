@@ -25,10 +25,12 @@ struct Buffer {
     vk::raii::Buffer buffer{nullptr};
     vk::raii::DeviceMemory memory{nullptr};
     vk::raii::BufferView view{nullptr};
+    vk::raii::AccelerationStructureKHR structure{nullptr};
   };
 
   vk::Buffer buffer;
-  vk::BufferView view;  // texel buffers only
+  vk::BufferView view;                     // texel buffers only
+  vk::AccelerationStructureKHR structure;  // of create_structure_buffer() only
   vk::DeviceSize size = 0;
   void* mapped = nullptr;  // non-null where the host can write the memory
   std::uint64_t id = 0;    // no other buffer of the process has it
@@ -66,6 +68,12 @@ Buffer create_indirect_buffer(Device& device, vk::DeviceSize size);
 // shaders, for which a device may allow less.
 Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format,
                            bool is_storage = false);
+
+// Creates a buffer with an acceleration structure in it, which is still to be built
+// (daemon/render/ray_structures.hpp). Where rays are traced in hardware, these can be built from
+// all buffers of the device.
+Buffer create_structure_buffer(Device& device, vk::DeviceSize size,
+                               vk::AccelerationStructureTypeKHR type);
 
 // The host's memory that copies go through, where the device's own is out of its reach. What goes
 // up lies in a ring, whose memory is used again when the copies are done.

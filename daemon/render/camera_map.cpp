@@ -1,6 +1,7 @@
 #include "daemon/render/camera_map.hpp"
 
 #include "shaders/camera_depth.spv.h"
+#include "shaders/camera_depth_query.spv.h"
 #include "shaders/camera_measured.spv.h"
 #include "shaders/camera_usable.spv.h"
 
@@ -22,7 +23,7 @@ void CameraMap::resize(std::uint32_t pixels) {
 
 std::span<const Pass> CameraMap::passes() {
   static constexpr Pass all[] = {{"camera_measured", camera_measured_spv, false},
-                                 {"camera_depth", camera_depth_spv},
+                                 {"camera_depth", camera_depth_spv, true, camera_depth_query_spv},
                                  {"camera_usable", camera_usable_spv}};
   return all;
 }

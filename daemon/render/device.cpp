@@ -131,6 +131,23 @@ bool has_uniform_subgroups(const vk::raii::PhysicalDevice& physical) {
       .shaderSubgroupUniformControlFlow;
 }
 
+constexpr const char* ray_extensions[] = {VK_KHR_RAY_QUERY_EXTENSION_NAME,
+                                          VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME,
+                                          VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME};
+
+bool has_ray_queries(const vk::raii::PhysicalDevice& physical) {
+  if (!std::ranges::all_of(ray_extensions,
+                           [&](const char* name) { return has_extension(physical, name); }))
+    return false;
+  using Structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR;
+  using Queries = vk::PhysicalDeviceRayQueryFeaturesKHR;
+  const auto features =
+      physical.getFeatures2<vk::PhysicalDeviceFeatures2, vk::PhysicalDeviceVulkan12Features,
+                            Structures, Queries>();
+  return features.get<vk::PhysicalDeviceVulkan12Features>().bufferDeviceAddress &&
+         features.get<Structures>().accelerationStructure && features.get<Queries>().rayQuery;
+}
+
 // Returns what names the device for OpenGL ES, if images that it makes can be shared with that.
 std::optional<CardIdentity> card_of(const vk::raii::PhysicalDevice& physical) {
   if (!has_extension(physical, VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME) ||
@@ -366,12 +383,28 @@ std::string Device::missing_lines() const {
   return lines;
 }
 
+void Device::choose_rays() {
+  scratch_alignment_ = 0;
+  if (!options_.hardware_rays.value_or(!is_cpu_)) return;
+  if (has_ray_queries(physical_)) {
+    using Properties = vk::PhysicalDeviceAccelerationStructurePropertiesKHR;
+    scratch_alignment_ = physical_.getProperties2<vk::PhysicalDeviceProperties2, Properties>()
+                             .get<Properties>()
+                             .minAccelerationStructureScratchOffsetAlignment;
+  } else if (options_.hardware_rays) {
+    report::log({report::Severity::warning, "render",
+                 name_ + " has no units that trace rays, or its driver does not offer them "
+                         "(VK_KHR_ray_query); they are traced by its compute units, more slowly"});
+  }
+}
+
 void Device::create_device() {
   const auto families = physical_.getQueueFamilyProperties();
   const auto family = compute_family(families);
   if (family == families.end()) throw Error("Vulkan: " + name_ + " has no compute queue");
   queue_family_ = static_cast<std::uint32_t>(family - families.begin());
   allows_ = limits_of(physical_);
+  choose_rays();
 
   const float priority = 1.0f;
   const vk::DeviceQueueCreateInfo queue({}, queue_family_, 1, &priority);
@@ -393,6 +426,14 @@ void Device::create_device() {
     extensions.push_back(VK_KHR_SHADER_SUBGROUP_UNIFORM_CONTROL_FLOW_EXTENSION_NAME);
     features13.pNext = &uniform;
   }
+  vk::PhysicalDeviceRayQueryFeaturesKHR queries(VK_TRUE);
+  vk::PhysicalDeviceAccelerationStructureFeaturesKHR structures(VK_TRUE);
+  if (traces_in_hardware()) {
+    extensions.insert(extensions.end(), std::begin(ray_extensions), std::end(ray_extensions));
+    features12.bufferDeviceAddress = VK_TRUE;
+    queries.pNext = std::exchange(features13.pNext, &structures);
+    structures.pNext = &queries;
+  }
   info.setPEnabledExtensionNames(extensions);
   device_ = vk::raii::Device(physical_, info);
   pipelines_ = PipelineCache(physical_, device_, options_.cache);
@@ -403,7 +444,8 @@ void Device::create_device() {
                                             .times_passes = options_.times_passes || can_time,
                                             .most_work = is_cpu_ ? cpu_work : first_work,
                                             .adapts = !is_cpu_,
-                                            .host_writes = mapped_types_ != 0});
+                                            .host_writes = mapped_types_ != 0,
+                                            .builds_structures = traces_in_hardware()});
 }
 
 std::uint32_t Device::memory_type(std::uint32_t allowed_bits, vk::MemoryPropertyFlags wanted,
@@ -444,6 +486,10 @@ void Device::record(const std::function<void(const vk::raii::CommandBuffer&)>& r
   if (shares_host_memory()) submissions_->finish();
 }
 
+DeviceOptions options_for(DeviceOptions options, std::optional<bool> hardware_rays) {
+  if (!options.hardware_rays) options.hardware_rays = hardware_rays;
+  return options;
+}
 std::shared_ptr<Device> open_device(const DeviceOptions& options) {
   return std::make_shared<Device>(options);
 }
@@ -482,6 +528,7 @@ DeviceFacts facts_of(const Device& device) {
           .is_gpu = !device.is_cpu(),
           .memory_bytes = device.memory_bytes(),
           .shares_host_memory = device.shares_host_memory(),
+          .traces_in_hardware = device.traces_in_hardware(),
           .missing_drivers = device.missing_drivers()};
 }
 void keep_programs(Device& device) {

@@ -67,6 +67,10 @@ class Device {
   // Returns a bit for each type of the device's own memory that the host can write: of a graphics
   // card that is part of the processor. Reading it may be slow.
   std::uint32_t mapped_types() const { return mapped_types_; }
+  // Returns whether rays are traced by the device's own units, through RayStructures.
+  bool traces_in_hardware() const { return scratch_alignment_ > 0; }
+  // Returns the alignment, in bytes, of the memory in which a structure is built.
+  vk::DeviceSize scratch_alignment() const { return scratch_alignment_; }
   // What is open now; may be called on any thread.
   struct Drawing {
     std::string name;  // empty: nothing is open
@@ -155,6 +159,7 @@ class Device {
   std::string missing_lines() const;
   void pick_physical_device(const std::string& wanted_name, bool cpu_too);
   void create_device();
+  void choose_rays();
 
   const DeviceOptions options_;
   vk::raii::Context context_;
@@ -173,7 +178,8 @@ class Device {
   bool is_cpu_ = false;
   bool lanes_meet_ = false;
   std::uint32_t mapped_types_ = 0;
-  bool had_gpu_ = false;  // since it was first opened
+  vk::DeviceSize scratch_alignment_ = 0;  // 0: rays are not traced in hardware
+  bool had_gpu_ = false;                  // since it was first opened
   std::vector<std::string> missing_drivers_;
   bool missing_is_said_ = false;
   mutable std::mutex drawing_mutex_;

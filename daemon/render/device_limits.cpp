@@ -46,11 +46,14 @@ DeviceLimits limits_of(const vk::raii::PhysicalDevice& physical) {
 
 std::optional<PastLimit> past_limits(const DeviceLimits& limits, const SpirvInfo& pass,
                                      std::uint32_t push_bytes) {
-  const auto storage = static_cast<std::uint64_t>(
-      std::ranges::count(pass.bindings, true, &SpirvInfo::Binding::is_storage));
+  const auto count = [&](BufferKind kind) {
+    return static_cast<std::uint64_t>(
+        std::ranges::count(pass.bindings, kind, &SpirvInfo::Binding::kind));
+  };
+  const std::uint64_t storage = count(BufferKind::storage), texels = count(BufferKind::texels);
   const std::uint64_t all = pass.bindings.size();
   return first_past({{"storage buffers", storage, limits.storage_buffers},
-                     {"texel buffers", all - storage, limits.texel_buffers},
+                     {"texel buffers", texels, limits.texel_buffers},
                      {"buffers", all, limits.buffers},
                      {"invocations in a work group", pass.group_size, limits.group_invocations},
                      {"invocations across a work group", pass.group_size, limits.group_width},

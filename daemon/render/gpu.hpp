@@ -24,6 +24,10 @@ struct DeviceOptions {
   bool as_gpu = false;
   // With `as_gpu`: as one that is part of the processor, whose memory the host can write.
   bool as_integrated = false;
+  // Whether the device's own units trace rays where it has such (VK_KHR_ray_query); absent: those
+  // of a graphics card do, and a CPU device, which only pretends to have them, does not. Pictures
+  // are the same but for rounding.
+  std::optional<bool> hardware_rays = {};
   // With `validation`: the layer also looks for accesses to memory that no barrier orders.
   bool synchronization = false;
   // Every pass is timed by the device's clock (take_times()), as a graphics card's always are if it
@@ -35,6 +39,9 @@ struct DeviceOptions {
   // need is logged once, unless a device is asked for by its name, and is part of errors.
   std::filesystem::path sys = "/sys";
 };
+
+// Returns the options with what a set wishes of hardware_rays, unless they say it themselves.
+DeviceOptions options_for(DeviceOptions options, std::optional<bool> hardware_rays);
 
 // Returns the folder for files that a program makes again when they are gone, as the XDG Base
 // Directory Specification has it: $XDG_CACHE_HOME/previzd, or ~/.cache/previzd; empty: neither is
@@ -60,6 +67,7 @@ struct DeviceFacts {
   bool is_gpu = false;
   std::uint64_t memory_bytes = 0;                 // all buffers together may take so much
   bool shares_host_memory = false;                // nothing is copied to it
+  bool traces_in_hardware = false;                // its own units trace rays
   std::vector<std::string> missing_drivers = {};  // what other graphics cards need, a sentence each
 };
 

@@ -9,14 +9,11 @@
 #include <glm/gtc/packing.hpp>
 #include <map>
 #include <numbers>
-#include <tuple>
 #include <utility>
-#include <variant>
 
-#include "daemon/render/albedo_table.hpp"
 #include "daemon/render/gpu_lights.hpp"
+#include "daemon/render/gpu_materials.hpp"
 #include "daemon/render/mip_levels.hpp"
-#include "daemon/scene/material_extensions.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
@@ -41,97 +38,6 @@ double environment_share(double environment_power, double light_power) {
   return std::clamp(environment_power / (environment_power + light_power), 0.1, 0.9);
 }
 
-// Returns in how many steps of its strength an anisotropy needs albedo tables; 0: it has one
-// strength.
-std::uint32_t anisotropy_steps(const scene::Material& m) {
-  return m.anisotropy_texture != scene::no_texture ? gpu::ANISOTROPIC_STEPS : 0;
-}
-
-// Concatenates the albedo tables: reflection's first, if anything is rough or has sheen, then that
-// of sheen, then those of each glass and of each anisotropic metal.
-struct AlbedoTables {
-  std::vector<float> values{1};  // a placeholder that no shader reads
-  std::map<float, std::uint32_t> of_ior;
-  // Keys: strength, roughness, whether a texture makes it smoother, and whether one changes the
-  // strength.
-  std::map<std::tuple<float, float, bool, bool>, std::uint32_t> of_anisotropy;
-
-  explicit AlbedoTables(bool has_sheen) {
-    if (!has_sheen) return;
-    values = reflection_albedo();
-    add(sheen_albedo());
-  }
-
-  std::uint32_t first_of(const scene::Material& m, double specular_alpha) {
-    const bool glass = scene::transmits(m);
-    // The shader's sum is in floats.
-    const bool is_mirror = scene::widest_alpha(m, m.roughness) <= specular_alpha * (1 - 1e-5);
-    if (is_mirror || !(glass || m.metallic > 0)) return 0;
-    if (values.size() == 1) values = reflection_albedo();
-    if (scene::is_anisotropic(m)) return first_of_anisotropy(m);
-    if (!glass || m.thin_walled || m.ior < gpu::LEAST_ROUGH_IOR) return 0;
-    const auto [at, is_new] = of_ior.try_emplace(m.ior, next());
-    if (is_new)
-      for (const double eta : {1.0 * m.ior, 1.0 / m.ior}) add(refraction_albedo(eta));
-    return at->second;
-  }
-
- private:
-  std::uint32_t first_of_anisotropy(const scene::Material& m) {
-    const bool varies = m.metallic_roughness_texture != scene::no_texture;
-    const bool has_steps = anisotropy_steps(m) > 0;
-    const auto [at, is_new] =
-        of_anisotropy.try_emplace({m.anisotropy, m.roughness, varies, has_steps}, next());
-    const std::uint32_t steps = has_steps ? gpu::ANISOTROPIC_STEPS : 1;
-    for (std::uint32_t step = 1; is_new && step <= steps; ++step)
-      add(anisotropic_albedo(m.anisotropy * step / steps, varies ? 0.0 : m.roughness, m.roughness));
-    return at->second;
-  }
-
-  std::uint32_t next() const {
-    constexpr std::size_t table_size = std::size_t{gpu::ALBEDO_SIDE} * gpu::ALBEDO_SIDE;
-    return static_cast<std::uint32_t>(values.size() / table_size);
-  }
-  void add(const AlbedoTable& tables) { values.insert(values.end(), tables.begin(), tables.end()); }
-};
-
-// Returns the direction of an anisotropy times its strength, as the shaders want it.
-glm::vec2 anisotropy_of(const scene::Material& m) {
-  if (!scene::is_anisotropic(m)) return glm::vec2(0);
-  return m.anisotropy *
-         glm::vec2(std::cos(m.anisotropy_rotation_rad), std::sin(m.anisotropy_rotation_rad));
-}
-
-// Returns the mappings of all textures, packed for mapping_of() of the shaders.
-std::array<std::uint32_t, 2> packed_mappings(const scene::Material& m) {
-  static_assert(scene::max_mappings <= 16);
-  std::array<std::uint32_t, 2> packed{};
-  for (std::size_t i = 0; i < m.mappings.size(); ++i)
-    packed[i / 8] |= static_cast<std::uint32_t>(m.mappings[i]) << 4 * (i % 8);
-  return packed;
-}
-
-// Sets the factors that the table of extensions packs.
-void set_factors(const scene::Material& m, gpu::GpuMaterial& to) {
-  for (const scene::MaterialExtension& extension : scene::material_extensions())
-    for (const scene::Factor& factor : extension.factors)
-      std::visit(
-          [&](const auto& value) {
-            if (value.packed) to.*value.packed = glm::max(m.*value.member, factor.supported);
-          },
-          factor.value);
-}
-
-// Adds the textures of extensions.
-void set_layers(const scene::Material& m, gpu::GpuMaterial& to) {
-  for (std::uint32_t i = 0; i < gpu::LAYERS; ++i) {
-    to.layer_textures[i] = m.*scene::material_textures[scene::first_layer_texture + i];
-    if (to.layer_textures[i] != scene::no_texture) to.layers |= 1u << i;
-  }
-  const auto mappings = packed_mappings(m);
-  std::ranges::copy(mappings, to.mappings);
-}
-
 // Returns how many values a vertex of the mesh has in EXTRAS (GpuInstance): its colour, and its
 // texture coordinates after the first.
 std::uint32_t extras_per_vertex(const scene::Mesh& mesh) {
@@ -150,12 +56,9 @@ void append_extras(const scene::Mesh& mesh, std::vector<glm::uvec2>& extras) {
   }
 }
 
-// A path has so many bits to say which medium it is in.
-void check_medium(const scene::Material& material, std::size_t index) {
-  if (index >= gpu::MAX_MEDIUM && scene::attenuates(material))
-    throw Error("scene: material \"" + material.name +
-                "\" has an attenuation colour but is number " + std::to_string(index + 1) +
-                "; only the first " + std::to_string(gpu::MAX_MEDIUM) + " can have one");
+// Says what lets_light_through() of shaders/lib/pane.glsl does.
+bool lets_light_through(const scene::Material& m) {
+  return m.alpha_mode != scene::AlphaMode::opaque || (m.thin_walled && scene::transmits(m));
 }
 
 template <typename T>
@@ -196,7 +99,12 @@ void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha, bool 
 void GpuScene::deform(const std::vector<scene::Shape>& shapes) {
   assert(shapes.size() == scene_.deformations.size());
   if (shapes.empty()) return;
+  std::vector<std::optional<scene::Shape>> before;
+  for (std::size_t i = 0; i < shapes.size(); ++i) before.push_back(deformer_.shape(i));
   deformer_.deform(shapes, bvh_, vertices_);
+  for (std::size_t i = 0; device_.traces_in_hardware() && i < shapes.size(); ++i)
+    if (deformer_.shape(i) != before[i])
+      structures_.reshape(scene_.deformations[i].mesh, vertices_);
   shapes_ = shapes;
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     const scene::Deformation& deformation = scene_.deformations[i];
@@ -301,6 +209,17 @@ void GpuScene::upload_meshes() {
     deformed.push_back({&place.bvh, place.first_record, place.first_vertex});
   }
   deformer_.upload(std::move(deformed));
+  if (device_.traces_in_hardware()) build_structures();
+}
+
+void GpuScene::build_structures() {
+  std::vector<RayStructures::Mesh> meshes;
+  for (std::size_t i = 0; i < scene_.meshes.size(); ++i) {
+    const bool deforms = std::ranges::find(scene_.deformations, i, &scene::Deformation::mesh) !=
+                         scene_.deformations.end();
+    meshes.push_back(RayStructures::mesh_of(scene_.meshes[i], places_[i].first_vertex, deforms));
+  }
+  structures_.build(meshes, vertices_);
 }
 
 // Throws if the buffers of a scene with deforming meshes are too large: the shapes are written
@@ -317,36 +236,13 @@ void GpuScene::check_deforming() const {
 
 void GpuScene::upload_materials(double specular_alpha) {
   ++work_.materials;
-  std::vector<gpu::GpuMaterial> materials;
-  AlbedoTables albedo(std::ranges::any_of(scene_.materials, scene::has_sheen));
-  for (const scene::Material& material : scene_.materials) {
-    const scene::Material m = as_read(material);
-    check_medium(m, materials.size());
-    gpu::GpuMaterial& to = materials.emplace_back();
-    to.base_color = m.base_color;
-    to.metallic = m.metallic;
-    to.emission = m.emission;
-    to.roughness = m.roughness;
-    to.thin_walled = m.thin_walled ? 1u : 0u;
-    to.base_color_texture = m.base_color_texture;
-    to.metallic_roughness_texture = m.metallic_roughness_texture;
-    to.emission_texture = m.emission_texture;
-    to.normal_texture = m.normal_texture;
-    to.normal_scale = m.normal_scale;
-    to.alpha_mode = static_cast<std::uint32_t>(m.alpha_mode);
-    to.alpha = m.alpha;
-    to.alpha_cutoff = m.alpha_cutoff;
-    to.albedo_table = albedo.first_of(m, specular_alpha);
-    to.attenuation = scene::attenuation_per_m(m);
-    to.anisotropy = anisotropy_of(m);
-    to.clearcoat_normal_scale = m.clearcoat_normal_scale;
-    to.anisotropy_steps = anisotropy_steps(m);
-    set_factors(m, to);
-    set_layers(m, to);
-  }
+  std::vector<scene::Material> as_read;
+  for (const scene::Material& material : scene_.materials)
+    as_read.push_back(this->as_read(material));
+  const EncodedMaterials encoded = encode_materials(as_read, specular_alpha);
   const Purpose purpose(device_, "the materials", "use fewer materials");
-  upload_storage(device_, materials_, materials);
-  upload_texels(device_, albedo_, albedo.values, vk::Format::eR32Sfloat);
+  upload_storage(device_, materials_, encoded.materials);
+  upload_texels(device_, albedo_, encoded.albedo, vk::Format::eR32Sfloat);
 }
 
 // Returns the material with the textures as it reads them: where they are filtered they are there
@@ -482,6 +378,19 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
   upload_bytes(device_, bvh_, std::as_bytes(std::span(top_bvh.texels)));
   const Purpose purpose(device_, "the scene's objects", "use fewer objects");
   upload_storage(device_, instances_, instances);
+  if (device_.traces_in_hardware()) place_structures(top);
+}
+
+void GpuScene::place_structures(const std::vector<scene::TopInstance>& top) {
+  std::vector<RayStructures::Instance> instances;
+  for (std::size_t i = 0; i < top.size(); ++i) {
+    const scene::Instance& instance = scene_.instances[i];
+    instances.push_back({.mesh = instance.mesh,
+                         .presence = scene::can_be_placed(top[i]) ? instance.presence : 0,
+                         .placed = top[i].world_from_object,
+                         .is_open = lets_light_through(scene_.materials[instance.material])});
+  }
+  structures_.place(instances);
 }
 
 std::vector<GpuScene::Stance> GpuScene::stances() const {
@@ -553,11 +462,19 @@ void GpuScene::describe(gpu::GpuFrame& frame, std::uint32_t features) const {
 }
 
 Buffers GpuScene::buffers() const {
-  Buffers buffers{
-      {"bvh", &bvh_},           {"vertices", &vertices_},       {"triangles", &triangles_},
-      {"texels", &texels_},     {"environment", &environment_}, {"importance", &importance_},
-      {"albedo", &albedo_},     {"instances", &instances_},     {"materials", &materials_},
-      {"textures", &textures_}, {"bounds", &bounds_buffer_},    {"extras", &extras_}};
+  Buffers buffers{{"bvh", &bvh_},
+                  {"vertices", &vertices_},
+                  {"triangles", &triangles_},
+                  {"texels", &texels_},
+                  {"environment", &environment_},
+                  {"importance", &importance_},
+                  {"albedo", &albedo_},
+                  {"instances", &instances_},
+                  {"materials", &materials_},
+                  {"textures", &textures_},
+                  {"bounds", &bounds_buffer_},
+                  {"extras", &extras_},
+                  {"ray_structure", &structures_.top()}};
   lights_.add_to(buffers);
   return buffers;
 }

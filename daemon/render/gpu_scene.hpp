@@ -14,6 +14,7 @@
 #include "daemon/render/feature.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/kernel.hpp"
+#include "daemon/render/ray_structures.hpp"
 #include "daemon/render/scene_lights.hpp"
 #include "daemon/scene/bvh.hpp"
 #include "daemon/scene/scene.hpp"
@@ -23,7 +24,8 @@ namespace previz::render {
 
 class GpuScene {
  public:
-  explicit GpuScene(Device& device) : device_(device), deformer_(device), lights_(device) {}
+  explicit GpuScene(Device& device)
+      : device_(device), deformer_(device), structures_(device), lights_(device) {}
 
   // Counts what was built or uploaded since this object was made.
   struct Work {
@@ -105,6 +107,7 @@ class GpuScene {
 
   void upload_meshes();
   void upload_tree(const std::vector<glm::uvec4>& bvh);
+  void build_structures();
   void check_deforming() const;
   void upload_materials(double specular_alpha);
   scene::Material as_read(const scene::Material& material) const;
@@ -113,6 +116,7 @@ class GpuScene {
   bool shape_emitter(std::size_t deformation);
   void find_extent();
   void upload_instances(const glm::dvec3& camera_position);
+  void place_structures(const std::vector<scene::TopInstance>& top);
   void upload_bounds(const glm::dvec3& camera_position);
 
   Device& device_;
@@ -131,6 +135,7 @@ class GpuScene {
   std::optional<std::vector<set::Light>> sources_;  // absent: there are never any
   std::vector<MeshPlace> places_;
   Deformer deformer_;
+  RayStructures structures_;  // where rays are traced in hardware
   SceneLights lights_;
   Bounds difference_bounds_, specular_bounds_;
   glm::dvec3 scene_center_{0.0};  // of the instances' bounds; world, metres

@@ -10,8 +10,10 @@
 
 #include "shaders/history.spv.h"
 #include "shaders/history_cover.spv.h"
+#include "shaders/history_cover_query.spv.h"
 #include "shaders/history_show.spv.h"
 #include "shaders/history_surface.spv.h"
+#include "shaders/history_surface_query.spv.h"
 
 namespace previz::render {
 namespace {
@@ -36,9 +38,10 @@ bool are_comparable(const GpuScene::Stance& a, const GpuScene::Stance& b) {
 constexpr std::uint32_t most_pixels_at_once = 1u << 21;
 
 constexpr Pass show_pass{"history_show", history_show_spv, false};
-constexpr Pass frame_passes[] = {{"history_surface", history_surface_spv},
-                                 {"history_cover", history_cover_spv},
-                                 {"history", history_spv}};
+constexpr Pass frame_passes[] = {
+    {"history_surface", history_surface_spv, true, history_surface_query_spv},
+    {"history_cover", history_cover_spv, true, history_cover_query_spv},
+    {"history", history_spv}};
 
 double frames_after(double change) {
   return change > 0 ? most_drift / change : std::numeric_limits<double>::infinity();

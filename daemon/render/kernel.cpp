@@ -21,6 +21,18 @@ constexpr auto compute_stage = vk::ShaderStageFlagBits::eCompute;
 // both sides of what is averaged.
 constexpr std::size_t most_sets = 64;
 
+vk::DescriptorType descriptor_of(BufferKind kind) {
+  switch (kind) {
+    case BufferKind::storage:
+      return vk::DescriptorType::eStorageBuffer;
+    case BufferKind::texels:
+      return vk::DescriptorType::eUniformTexelBuffer;
+    case BufferKind::acceleration_structure:
+      return vk::DescriptorType::eAccelerationStructureKHR;
+  }
+  return {};
+}
+
 std::shared_ptr<const Program> compile(const Device& device, const std::string& name,
                                        const SpirvInfo& info,
                                        const std::vector<std::uint32_t>& spirv) {
@@ -31,8 +43,7 @@ std::shared_ptr<const Program> compile(const Device& device, const std::string& 
   program->group_size = info.group_size;
   std::vector<vk::DescriptorSetLayoutBinding> bindings;
   for (const SpirvInfo::Binding& binding : info.bindings) {
-    const vk::DescriptorType type = binding.is_storage ? vk::DescriptorType::eStorageBuffer
-                                                       : vk::DescriptorType::eUniformTexelBuffer;
+    const vk::DescriptorType type = descriptor_of(binding.kind);
     program->bindings.push_back({binding.name, binding.number, type});
     bindings.emplace_back(binding.number, type, 1, compute_stage);
   }
@@ -84,16 +95,17 @@ std::vector<std::uint32_t> as_for(std::uint32_t device, const std::vector<std::u
 // A pass with the constants that it reads something of, and the way to compile it.
 struct ToCompile {
   ToCompile(const Device& device, const Pass& pass, std::vector<std::uint32_t> constants)
-      : info(describe_spirv(pass.spirv)), values(std::move(constants)) {
+      : spirv(pass.spirv_for(device)), info(describe_spirv(spirv)), values(std::move(constants)) {
     if (!values.empty()) values.front() &= info.asked_bits;
     compile_now = [this, &device, &pass] {
       return compile(device, pass.name, info,
-                     as_for(device_bits(device), specialised(pass.spirv, values)));
+                     as_for(device_bits(device), specialised(spirv, values)));
     };
   }
   ToCompile(const ToCompile&) = delete;
   ToCompile& operator=(const ToCompile&) = delete;
 
+  const std::span<const std::uint32_t> spirv;
   const SpirvInfo info;
   std::vector<std::uint32_t> values;
   std::function<std::shared_ptr<const Program>()> compile_now;
@@ -114,7 +126,7 @@ Kernel::Kernel(Device& device, const Pass& pass, std::uint32_t features)
 
 void Kernel::use(const Pass& pass, std::vector<std::uint32_t> constants) {
   const ToCompile wanted(*device_, pass, std::move(constants));
-  state_ = {new State{device_->program(pass.spirv.data(), wanted.values, wanted.compile_now), {}},
+  state_ = {new State{device_->program(wanted.spirv.data(), wanted.values, wanted.compile_now), {}},
             Retire<State>{device_}};
 }
 
@@ -134,7 +146,7 @@ std::vector<std::uint32_t> module_of(const Pass& pass, std::uint32_t features,
 
 void compile_ahead(Device& device, const Pass& pass, std::uint32_t features) {
   const ToCompile wanted(device, pass, values_of(pass, features, device_bits(device)));
-  device.program_ahead(pass.spirv.data(), wanted.values, wanted.compile_now);
+  device.program_ahead(wanted.spirv.data(), wanted.values, wanted.compile_now);
 }
 
 Kernel::BoundSet Kernel::create_set() const {
@@ -181,12 +193,16 @@ vk::DescriptorSet Kernel::bound(const Buffers& buffers) {
   bound.buffers = std::move(ids);
   std::vector<vk::DescriptorBufferInfo> infos(bindings.size());
   std::vector<vk::BufferView> views(bindings.size());
+  std::vector<vk::WriteDescriptorSetAccelerationStructureKHR> structures(bindings.size());
   std::vector<vk::WriteDescriptorSet> writes;
   for (std::size_t i = 0; i < bindings.size(); ++i) {
     infos[i] = vk::DescriptorBufferInfo(wanted[i]->buffer, 0, wanted[i]->size);
     views[i] = wanted[i]->view;
     writes.emplace_back(*bound.set, bindings[i].number, 0, 1, bindings[i].type, nullptr, &infos[i],
                         &views[i]);
+    if (bindings[i].type != vk::DescriptorType::eAccelerationStructureKHR) continue;
+    structures[i].setAccelerationStructures(wanted[i]->structure);
+    writes.back().pNext = &structures[i];
   }
   device_->vk().updateDescriptorSets(writes, {});
   return *bound.set;

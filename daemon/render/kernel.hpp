@@ -58,6 +58,12 @@ struct Pass {
   std::span<const std::uint32_t> spirv;  // static
   bool has_features = true;  // specialisation constant 0 has the FEATURE_* bits, and 1 the
                              // device's DEVICE_* bits; otherwise no constant is set
+  // The same pass for a device that traces rays in hardware; empty: it traces none.
+  std::span<const std::uint32_t> query = {};
+
+  std::span<const std::uint32_t> spirv_for(const Device& device) const {
+    return device.traces_in_hardware() && !query.empty() ? query : spirv;
+  }
 };
 
 class Kernel {

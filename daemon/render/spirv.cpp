@@ -32,7 +32,8 @@ enum Op : std::uint32_t {
   op_array_length = 68,
   op_decorate = 71,
   op_bitwise_and = 199,
-  op_execution_mode_id = 331
+  op_execution_mode_id = 331,
+  op_type_acceleration_structure = 5341
 };
 constexpr std::uint32_t spirv_header_words = 5;
 constexpr std::uint32_t mode_local_size = 17, mode_local_size_id = 38;
@@ -49,6 +50,7 @@ struct SpirvId {
   std::uint32_t type = 0, storage = 0, binding = 0;  // of a variable
   std::uint32_t value = 0;                           // of a constant
   bool is_used = false;
+  bool is_acceleration_structure = false;  // of a type
 };
 
 // Collects what specialisation constant 0 is masked with.
@@ -125,6 +127,9 @@ SpirvInfo describe_spirv(std::span<const std::uint32_t> spirv) {
       case op_constant:
         ids[operands[1]].value = operands[2];
         break;
+      case op_type_acceleration_structure:
+        ids[operands[0]].is_acceleration_structure = true;
+        break;
       case op_variable:
         ids[operands[1]].type = operands[0];
         ids[operands[1]].storage = operands[2];
@@ -146,8 +151,11 @@ SpirvInfo describe_spirv(std::span<const std::uint32_t> spirv) {
     if (!variable.is_used || !(is_storage || variable.storage == storage_uniform_constant))
       continue;
     const char* own = variable.name;
-    info.bindings.push_back({*own != 0 ? own : ids[ids[variable.type].pointee].first_member,
-                             variable.binding, is_storage});
+    const SpirvId& type = ids[ids[variable.type].pointee];
+    const BufferKind kind = is_storage                       ? BufferKind::storage
+                            : type.is_acceleration_structure ? BufferKind::acceleration_structure
+                                                             : BufferKind::texels;
+    info.bindings.push_back({*own != 0 ? own : type.first_member, variable.binding, kind});
   }
   info.asked_bits = asked_bits(spirv, ids, feature_id);
   return info;

@@ -9,11 +9,13 @@
 
 namespace previz::render {
 
+enum class BufferKind { storage, texels, acceleration_structure };
+
 struct SpirvInfo {
   struct Binding {
     std::string name;  // as the shader calls the buffer
     std::uint32_t number;
-    bool is_storage;  // a storage buffer; otherwise a uniform texel buffer
+    BufferKind kind;
   };
   std::vector<Binding> bindings;  // of the buffers that the module uses
   std::uint32_t group_size = 1;

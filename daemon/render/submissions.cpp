@@ -153,12 +153,20 @@ void Submissions::keep(std::shared_ptr<const void> what) {
 void Submissions::barrier(const vk::raii::CommandBuffer& commands) {
   using Stage = vk::PipelineStageFlagBits2;
   using Access = vk::AccessFlagBits2;
-  const vk::MemoryBarrier2 everything(
+  vk::MemoryBarrier2 everything(
       Stage::eComputeShader | Stage::eCopy | Stage::eClear,
       Access::eShaderWrite | Access::eTransferWrite,
       Stage::eComputeShader | Stage::eDrawIndirect | Stage::eCopy | Stage::eClear,
       Access::eShaderRead | Access::eShaderWrite | Access::eIndirectCommandRead |
           Access::eTransferRead | Access::eTransferWrite);
+  if (options_.builds_structures) {
+    const auto built =
+        Access::eAccelerationStructureReadKHR | Access::eAccelerationStructureWriteKHR;
+    everything.srcStageMask |= Stage::eAccelerationStructureBuildKHR;
+    everything.srcAccessMask |= built;
+    everything.dstStageMask |= Stage::eAccelerationStructureBuildKHR;
+    everything.dstAccessMask |= built;
+  }
   commands.pipelineBarrier2(vk::DependencyInfo({}, everything));
   ++work.barriers;
 }

@@ -25,6 +25,7 @@ class Submissions {
     std::uint64_t most_work;  // add_work() hands over what is more
     bool adapts;       // `most_work` is only the beginning: a driver ends what takes too long
     bool host_writes;  // to what the device has written, when that is done
+    bool builds_structures = false;  // of rays (daemon/render/ray_structures.hpp)
   };
   Submissions(const vk::raii::PhysicalDevice& physical, const vk::raii::Device& device,
               std::uint32_t queue_family, Options options);

@@ -147,7 +147,9 @@ class LiveRun {
         sets_(
             options.set_file, [this](set::Set& set) { override_set(set, options_); }, reports,
             options.with),
-        device_(open_graphics(options.device, sets_.running().set.quality.cpu_instead, reports)),
+        device_(open_graphics(
+            render::options_for(options.device, sets_.running().set.quality.hardware_rays),
+            sets_.running().set.quality.cpu_instead, reports)),
         screen_(kept_, options.on_screen) {}
 
   pipeline::MetricsSnapshot run() {

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <optional>
 
 #include "daemon/scene/bvh_pairs.hpp"
 #include "daemon/scene/bvh_wide.hpp"
@@ -34,17 +35,19 @@ bool usable(const std::array<glm::vec3, 3>& corners) {
   return glm::cross(glm::dvec3(corners[1]) - a, glm::dvec3(corners[2]) - a) != glm::dvec3(0);
 }
 
+bool has_vertices(const Mesh& mesh, const glm::uvec3& t) {
+  return std::max({t.x, t.y, t.z}) < mesh.positions.size();
+}
+
+std::array<glm::vec3, 3> corners_of(const Mesh& mesh, const glm::uvec3& t) {
+  return {mesh.positions[t.x], mesh.positions[t.y], mesh.positions[t.z]};
+}
+
 Triangles usable_triangles(const Mesh& mesh) {
   Triangles result;
-  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-    const glm::uvec3& t = mesh.triangles[i];
-    if (std::max({t.x, t.y, t.z}) >= mesh.positions.size()) continue;
-    const std::array<glm::vec3, 3> corners{mesh.positions[t.x], mesh.positions[t.y],
-                                           mesh.positions[t.z]};
-    if (!usable(corners)) continue;
-    result.corners.push_back(corners);
-    result.primitives.push_back(i);
-  }
+  result.primitives = traced_triangles(mesh, false);
+  for (const std::uint32_t i : result.primitives)
+    result.corners.push_back(corners_of(mesh, mesh.triangles[i]));
   return result;
 }
 
@@ -60,6 +63,20 @@ double extent_of(const Aabb& bounds) {
   return std::max({extent.x, extent.y, extent.z});
 }
 
+glm::dmat4 uniform_scale(double scale) {
+  glm::dmat4 result(scale);
+  result[3][3] = 1;
+  return result;
+}
+
+// Returns none where no ray could be taken there.
+std::optional<glm::dmat4> grid_from_world(const TopInstance& instance) {
+  const glm::dmat4 result = uniform_scale(std::ldexp(1.0, instance.mesh->grid_exponent)) *
+                            glm::inverse(instance.world_from_object);
+  if (!is_finite(instance.world_from_object) || !is_finite(result)) return std::nullopt;
+  return result;
+}
+
 Record space_record(const glm::dmat4& grid_from_world, std::uint32_t first_record,
                     std::uint32_t presence, std::uint32_t index) {
   Record record{with_fill(first_record / records_per_block), with_fill(presence), gpu::RECORD_SPACE,
@@ -69,12 +86,6 @@ Record space_record(const glm::dmat4& grid_from_world, std::uint32_t first_recor
       record[4 + static_cast<std::size_t>(4 * row + column)] =
           std::bit_cast<std::uint32_t>(static_cast<float>(grid_from_world[column][row]));
   return record;
-}
-
-glm::dmat4 uniform_scale(double scale) {
-  glm::dmat4 result(scale);
-  result[3][3] = 1;
-  return result;
 }
 
 // Pads a box by the rounding error of a ray that is transformed into an instance, a share of the
@@ -88,6 +99,19 @@ Aabb padded(const Aabb& box) {
 
 int grid_exponent_of(const Aabb& bounds) {
   return grid_exponent(extent_of(bounds));
+}
+
+std::vector<std::uint32_t> traced_triangles(const Mesh& mesh, bool deforms) {
+  std::vector<std::uint32_t> result;
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+    const glm::uvec3& t = mesh.triangles[i];
+    if (has_vertices(mesh, t) && (deforms || usable(corners_of(mesh, t)))) result.push_back(i);
+  }
+  return result;
+}
+
+bool can_be_placed(const TopInstance& instance) {
+  return grid_from_world(instance).has_value();
 }
 
 void check_triangles(const Mesh& mesh) {
@@ -143,14 +167,12 @@ TopBvh build_top_bvh(std::span<const TopInstance> instances) {
   for (std::uint32_t i = 0; i < instances.size(); ++i) {
     const TopInstance& instance = instances[i];
     if (instance.mesh == nullptr || instance.mesh->leaves == 0) continue;
-    const glm::dmat4 grid_from_world =
-        uniform_scale(std::ldexp(1.0, instance.mesh->grid_exponent)) *
-        glm::inverse(instance.world_from_object);
-    if (!is_finite(instance.world_from_object) || !is_finite(grid_from_world)) {
+    const std::optional<glm::dmat4> space = grid_from_world(instance);
+    if (!space) {
       ++top.dropped_instances;
       continue;
     }
-    spaces.push_back(space_record(grid_from_world, instance.first_record, instance.presence, i));
+    spaces.push_back(space_record(*space, instance.first_record, instance.presence, i));
     boxes.push_back(padded(transform_bounds(instance.mesh->bounds, instance.world_from_object)));
     extent = std::max(extent, extent_of(boxes.back()));
   }

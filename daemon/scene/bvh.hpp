@@ -52,6 +52,10 @@ struct TopInstance {
   glm::dmat4 world_from_object{1.0};    // any invertible affine transform
 };
 
+// Returns whether the instance can be traced: its transform is invertible and finite. Meshes
+// without a triangle count too.
+bool can_be_placed(const TopInstance& instance);
+
 struct TopBvh {
   std::vector<glm::uvec4> texels;       // always top_bvh_texels(number of instances)
   std::uint32_t dropped_instances = 0;  // not invertible or not finite; empty meshes do not count
@@ -61,6 +65,10 @@ struct TopBvh {
 std::size_t top_bvh_texels(std::size_t instance_count);
 // Throws previz::Error above 16,777,215 instances.
 TopBvh build_top_bvh(std::span<const TopInstance> instances);
+
+// Returns the triangles of the mesh that build_mesh_bvh() does not drop, by their numbers. Those of
+// a mesh that deforms may become any.
+std::vector<std::uint32_t> traced_triangles(const Mesh& mesh, bool deforms);
 
 // Throws previz::Error if the mesh has more than 2^24 triangles.
 void check_triangles(const Mesh& mesh);

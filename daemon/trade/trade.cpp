@@ -107,7 +107,8 @@ TradeReport run_trade(const TradeOptions& given, std::ostream& out) {
       made_directory(options.directory.value_or(frame.set().output.directory / "trade"));
   const scene::Scene scene = scene::load_scene(frame.set());
   for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
-  const std::shared_ptr<render::Device> device = render::open_device(options.device);
+  const std::shared_ptr<render::Device> device =
+      render::open_device(render::options_for(options.device, frame.set().quality.hardware_rays));
   const std::string key = memory_key(frame, scene, options.scale, render::device_name(*device));
   TradeMemory memory = remembered(options, directory, key, out);
   const auto save = [&](const TradeReport& report) {

@@ -9,10 +9,6 @@
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/trace.glsl"
 
-// A ray passes at most so many transparent surfaces. The next one stops it, which is counted in
-// control.stopped_in_layers.
-const uint MAX_LAYERS = 256u;
-
 // Returns the alpha of the surface at the hit, 1 where the surface is opaque.
 float hit_coverage(Hit hit) {
   return coverage(hit.instance, hit.primitive, hit.barycentrics);
@@ -36,11 +32,63 @@ bool is_met(Hit hit, vec3 origin, vec3 direction) {
          (passes <= 0.0 || unit_float(hash_bits(key ^ KEY_PASSES)) >= passes);
 }
 
-// Finds the closest surface that the ray meets, as trace_closest() does.
-bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, uvec2 source,
-                 out Hit hit) {
-  if (!has_feature(FEATURE_ALPHA | FEATURE_PANES))
-    return trace_closest(origin, direction, t_min, t_max, worlds, source, hit);
+// Takes from the share of light in each world what the surface at the hit keeps. Returns the worlds in
+// which none is left by it.
+uint take_from(inout Gain share, Hit hit, vec3 direction) {
+  const float coverage = has_feature(FEATURE_ALPHA) ? hit_coverage(hit) : 1.0;
+  vec3 through = vec3(1.0 - coverage);
+  if (has_feature(FEATURE_PANES)) through += coverage * hit_transmittance(hit, direction);
+  if ((hit.presence & WORLD_MIXED) != 0u) share.mixed *= through;
+  if ((hit.presence & WORLD_REAL) != 0u) share.real *= through;
+  return all(lessThanEqual(through, vec3(0.0))) ? hit.presence : 0u;
+}
+
+#ifdef PREVIZ_RAY_QUERY
+
+// Surfaces with transparent parts are left to the shader, in any order. What meets them does not depend on it.
+bool closest_candidate_met(QueriedRay ray, uint flags, inout Hit hit) {
+  Hit candidate;
+  query_begin(ray, flags);
+  while (query_next(ray, candidate))
+    if (is_met(candidate, ray.origin, ray.direction)) rayQueryConfirmIntersectionEXT(query);
+  return query_found(hit);
+}
+
+bool closest_through(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, uvec2 source,
+                     out Hit hit) {
+  const QueriedRay ray = QueriedRay(origin, t_min, direction, t_max, worlds, source);
+  hit = Hit(t_max, vec2(0.0), 0xffffffffu, 0xffffffffu, 0u);
+  if (!closest_candidate_met(ray, gl_RayFlagsNoneEXT, hit)) return false;
+  if (query_is_source(ray, hit) && !closest_candidate_met(ray, gl_RayFlagsNoOpaqueEXT, hit)) return false;
+  Hit candidate;
+  query_begin(query_around(ray, hit), gl_RayFlagsNoOpaqueEXT);
+  while (query_next(ray, candidate))
+    if (query_prefers(ray, candidate, hit) && is_met(candidate, ray.origin, ray.direction)) hit = candidate;
+  return true;
+}
+
+Gain share_through(vec3 origin, vec3 direction, float t_max, uint worlds, uvec2 source, Gain share) {
+  const QueriedRay ray = QueriedRay(origin, 0.0, direction, t_max, worlds, source);
+  Hit hit;
+  Hit last = Hit(t_max, vec2(0.0), NO_INDEX, NO_INDEX, 0u);
+  query_begin(ray, gl_RayFlagsNoOpaqueEXT);
+  while (worlds != 0u && query_next(ray, hit)) {
+    // On an edge that two triangles share both may be met, one after the other.
+    const bool is_passed = hit.instance == last.instance && abs(hit.t - last.t) <= query_tie(ray, hit.t);
+    if (!is_passed) worlds &= ~take_from(share, hit, direction);
+    last = hit;
+  }
+  return share;
+}
+
+#else
+
+// A ray passes at most so many transparent surfaces. The next one stops it, which is counted in
+// control.stopped_in_layers.
+const uint MAX_LAYERS = 256u;
+
+bool closest_through(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, uvec2 source,
+                     out Hit hit) {
   for (uint layer = 0u; layer < MAX_LAYERS; ++layer) {
     if (!trace_closest(origin, direction, t_min, t_max, worlds, source, hit)) return false;
     if (is_met(hit, origin, direction)) return true;
@@ -50,15 +98,7 @@ bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint wor
   return trace_closest(origin, direction, t_min, t_max, worlds, source, hit);
 }
 
-// Returns the share of light that passes along the ray in each world; it is 0 in a world that is not
-// in `worlds`.
-Gain light_through(vec3 origin, vec3 direction, float t_max, uint worlds, uvec2 source) {
-  Gain share = Gain(vec3((worlds & WORLD_MIXED) != 0u), vec3((worlds & WORLD_REAL) != 0u));
-  if (!has_feature(FEATURE_ALPHA | FEATURE_PANES)) {
-    const uint blocked = trace_blocked(origin, direction, 0.0, t_max, worlds, source);
-    return Gain(share.mixed * float((blocked & WORLD_MIXED) == 0u),
-                share.real * float((blocked & WORLD_REAL) == 0u));
-  }
+Gain share_through(vec3 origin, vec3 direction, float t_max, uint worlds, uvec2 source, Gain share) {
   float t_min = 0.0;
   for (uint layer = 0u; worlds != 0u; ++layer) {
     if (layer == MAX_LAYERS) {
@@ -67,15 +107,32 @@ Gain light_through(vec3 origin, vec3 direction, float t_max, uint worlds, uvec2 
     }
     Hit hit;
     if (!trace_closest(origin, direction, t_min, t_max, worlds, source, hit)) return share;
-    const float coverage = has_feature(FEATURE_ALPHA) ? hit_coverage(hit) : 1.0;
-    vec3 through = vec3(1.0 - coverage);
-    if (has_feature(FEATURE_PANES)) through += coverage * hit_transmittance(hit, direction);
-    if ((hit.presence & WORLD_MIXED) != 0u) share.mixed *= through;
-    if ((hit.presence & WORLD_REAL) != 0u) share.real *= through;
-    if (all(lessThanEqual(through, vec3(0.0)))) worlds &= ~hit.presence;
+    worlds &= ~take_from(share, hit, direction);
     t_min = hit.t;
   }
   return share;
+}
+
+#endif
+
+// Finds the closest surface that the ray meets, as trace_closest() does.
+bool closest_met(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, uvec2 source,
+                 out Hit hit) {
+  if (!has_feature(FEATURE_ALPHA | FEATURE_PANES))
+    return trace_closest(origin, direction, t_min, t_max, worlds, source, hit);
+  return closest_through(origin, direction, t_min, t_max, worlds, source, hit);
+}
+
+// Returns the share of light that passes along the ray in each world; it is 0 in a world that is not
+// in `worlds`.
+Gain light_through(vec3 origin, vec3 direction, float t_max, uint worlds, uvec2 source) {
+  const Gain share = Gain(vec3((worlds & WORLD_MIXED) != 0u), vec3((worlds & WORLD_REAL) != 0u));
+  if (!has_feature(FEATURE_ALPHA | FEATURE_PANES)) {
+    const uint blocked = trace_blocked(origin, direction, 0.0, t_max, worlds, source);
+    return Gain(share.mixed * float((blocked & WORLD_MIXED) == 0u),
+                share.real * float((blocked & WORLD_REAL) == 0u));
+  }
+  return share_through(origin, direction, t_max, worlds, source, share);
 }
 
 #endif

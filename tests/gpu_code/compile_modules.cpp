@@ -8,7 +8,6 @@
 // how many threads a SIMD of AMD holds (of 1024), how many an instruction of Intel has, how many
 // warps the registers of an SM of NVIDIA hold (of 48, as of Ada). seconds: to compile it.
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -18,6 +17,7 @@
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 #include <vulkan/vulkan_raii.hpp>
 
@@ -39,10 +39,22 @@ std::vector<vk::DescriptorSetLayoutBinding> read_bindings(const fs::path& file) 
   std::uint32_t number = 0;
   for (std::string type; in >> number >> type;)
     bindings.emplace_back(number,
-                          type == "storage" ? vk::DescriptorType::eStorageBuffer
-                                            : vk::DescriptorType::eUniformTexelBuffer,
+                          type == "storage"  ? vk::DescriptorType::eStorageBuffer
+                          : type == "texels" ? vk::DescriptorType::eUniformTexelBuffer
+                                             : vk::DescriptorType::eAccelerationStructureKHR,
                           1, vk::ShaderStageFlagBits::eCompute);
   return bindings;
+}
+
+constexpr const char* ray_extensions[] = {VK_KHR_RAY_QUERY_EXTENSION_NAME,
+                                          VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME,
+                                          VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME};
+
+bool traces_rays(const vk::raii::PhysicalDevice& physical) {
+  return std::ranges::any_of(
+      physical.enumerateDeviceExtensionProperties(), [](const vk::ExtensionProperties& extension) {
+        return std::string_view(extension.extensionName) == VK_KHR_RAY_QUERY_EXTENSION_NAME;
+      });
 }
 
 // What a driver says of one program, by names of its own.
@@ -97,8 +109,16 @@ vk::raii::Device open(const vk::raii::PhysicalDevice& physical) {
   vk::PhysicalDeviceVulkan12Features features12;
   features12.scalarBlockLayout = features12.timelineSemaphore = VK_TRUE;
   features12.pNext = &features13;
-  const std::array extensions = {VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME,
-                                 VK_KHR_SHADER_SUBGROUP_UNIFORM_CONTROL_FLOW_EXTENSION_NAME};
+  std::vector extensions = {VK_KHR_PIPELINE_EXECUTABLE_PROPERTIES_EXTENSION_NAME,
+                            VK_KHR_SHADER_SUBGROUP_UNIFORM_CONTROL_FLOW_EXTENSION_NAME};
+  vk::PhysicalDeviceRayQueryFeaturesKHR queries(VK_TRUE);
+  vk::PhysicalDeviceAccelerationStructureFeaturesKHR structures(VK_TRUE);
+  if (traces_rays(physical)) {
+    extensions.insert(extensions.end(), std::begin(ray_extensions), std::end(ray_extensions));
+    features12.bufferDeviceAddress = VK_TRUE;
+    uniform.pNext = &structures;
+    structures.pNext = &queries;
+  }
   vk::DeviceCreateInfo info({}, queue, {}, extensions);
   info.pNext = &features12;
   return {physical, info};
@@ -146,7 +166,9 @@ void compile_all(const std::string& gpu, const fs::path& folder) {
   for (const fs::directory_entry& entry : fs::directory_iterator(folder))
     if (entry.path().extension() == ".spv") modules.push_back(entry.path());
   std::ranges::sort(modules);
-  for (const fs::path& module : modules) compile(device, gpu, module);
+  const bool has_queries = traces_rays(physical);
+  for (const fs::path& module : modules)
+    if (has_queries || !module.stem().string().ends_with("_query")) compile(device, gpu, module);
 }
 
 }  // namespace

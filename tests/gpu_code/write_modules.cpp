@@ -1,7 +1,9 @@
 // Writes every pass of the renderer as the driver of a graphics card gets it:
 //   gpu_code_modules SET_FILE FOLDER
 // makes FOLDER/<features>.<pass>.spv, and beside each a file .bindings with a line for each buffer,
-// "number storage" or "number texels". The features are those of the set, and all that there are.
+// "number storage", "number texels" or "number structure". The features are those of the set, and
+// all that there are. Passes that trace rays are there a second time, as <pass>_query, for a card
+// that has units for them.
 #include <cstdio>
 #include <exception>
 #include <filesystem>
@@ -26,6 +28,13 @@ using previz::render::Pass;
 // All five GPUs keep their lanes together.
 constexpr std::uint32_t card = previz::gpu::DEVICE_IS_CARD | previz::gpu::DEVICE_LANES_MEET;
 
+const char* words_for(previz::render::BufferKind kind) {
+  using previz::render::BufferKind;
+  return kind == BufferKind::storage  ? "storage"
+         : kind == BufferKind::texels ? "texels"
+                                      : "structure";
+}
+
 void write(const std::filesystem::path& stem, const Pass& pass, std::uint32_t features) {
   const std::vector<std::uint32_t> module = previz::render::module_of(pass, features, card);
   std::ofstream code(stem.string() + ".spv", std::ios::binary);
@@ -33,7 +42,7 @@ void write(const std::filesystem::path& stem, const Pass& pass, std::uint32_t fe
              static_cast<std::streamsize>(module.size() * sizeof(std::uint32_t)));
   std::ofstream bindings(stem.string() + ".bindings");
   for (const auto& binding : previz::render::describe_spirv(pass.spirv).bindings)
-    bindings << binding.number << (binding.is_storage ? " storage\n" : " texels\n");
+    bindings << binding.number << ' ' << words_for(binding.kind) << '\n';
   code.close();
   bindings.close();
   if (!code || !bindings) throw std::runtime_error(stem.string() + ": cannot be written");
@@ -45,7 +54,12 @@ void write_all(const std::filesystem::path& folder, const std::string& name,
   passes.push_back({"deform", deform_spv, false});
   passes.push_back({"refit_leaves", refit_leaves_spv, false});
   passes.push_back({"refit_nodes", refit_nodes_spv, false});
-  for (const Pass& pass : passes) write(folder / (name + "." + pass.name), pass, features);
+  for (const Pass& pass : passes) {
+    const std::filesystem::path stem = folder / (name + "." + pass.name);
+    write(stem, pass, features);
+    const Pass by_query{pass.name, pass.query, pass.has_features};
+    if (!pass.query.empty()) write(stem.string() + "_query", by_query, features);
+  }
 }
 
 }  // namespace

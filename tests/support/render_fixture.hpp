@@ -22,16 +22,17 @@ inline testing::Environment* const ends_the_device =
 
 // One device a test program; every test ends by asking it for validation messages. With
 // PREVIZ_AS_GPU in the environment a CPU device is treated as a graphics card, and if that is
-// "integrated", as one that is part of the processor.
+// "integrated", as one that is part of the processor. With PREVIZ_HARDWARE_RAYS it traces rays as
+// the units of one do.
 inline const std::shared_ptr<render::Device>& shared_device() {
   const std::scoped_lock lock(KeptDevice::mutex);
   if (!KeptDevice::device) {
     const char* as = std::getenv("PREVIZ_AS_GPU");
-    KeptDevice::device =
-        render::open_device({.validation = true,
-                             .name = "",
-                             .as_gpu = as != nullptr,
-                             .as_integrated = as && std::string_view(as) == "integrated"});
+    render::DeviceOptions options{.validation = true, .name = ""};
+    options.as_gpu = as != nullptr;
+    options.as_integrated = as && std::string_view(as) == "integrated";
+    if (std::getenv("PREVIZ_HARDWARE_RAYS")) options.hardware_rays = true;
+    KeptDevice::device = render::open_device(options);
   }
   return KeptDevice::device;
 }

@@ -3,8 +3,11 @@
 #include <algorithm>
 
 #include "shaders/blocked_worlds.spv.h"
+#include "shaders/blocked_worlds_query.spv.h"
 #include "shaders/closest_distances.spv.h"
+#include "shaders/closest_distances_query.spv.h"
 #include "shaders/closest_hits.spv.h"
+#include "shaders/closest_hits_query.spv.h"
 
 namespace previz::bench {
 namespace {
@@ -49,9 +52,41 @@ GpuTracer::GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texe
     : device_(device),
       hits_pass_(device, "closest_hits", closest_hits_spv, {0, on_card}),
       distances_pass_(device, "closest_distances", closest_distances_spv, {0, on_card}),
-      blocked_pass_(device, "blocked_worlds", blocked_worlds_spv, {0, on_card}) {
+      blocked_pass_(device, "blocked_worlds", blocked_worlds_spv, {0, on_card}),
+      structures_(device) {
   const render::Purpose purpose(device, "the triangles' tree", "use fewer triangles");
   render::upload_texels(device, bvh_, texels, vk::Format::eR32G32B32A32Uint);
+}
+
+GpuTracer::GpuTracer(render::Device& device, const scene::Scene& scene, scene::BvhQuality quality)
+    : GpuTracer(device, scene_texels(scene, quality)) {
+  if (!device.traces_in_hardware()) return;
+  hits_pass_ = render::Kernel(device, "closest_hits", closest_hits_query_spv);
+  distances_pass_ = render::Kernel(device, "closest_distances", closest_distances_query_spv);
+  blocked_pass_ = render::Kernel(device, "blocked_worlds", blocked_worlds_query_spv);
+  build_structures(scene);
+}
+
+// The vertices lie as the renderer has them.
+void GpuTracer::build_structures(const scene::Scene& scene) {
+  std::vector<glm::vec4> vertices;
+  std::vector<render::RayStructures::Mesh> meshes;
+  for (const scene::Mesh& from : scene.meshes) {
+    meshes.push_back(render::RayStructures::mesh_of(
+        from, static_cast<std::uint32_t>(vertices.size() / 2), false));
+    for (const glm::vec3& position : from.positions)
+      vertices.insert(vertices.end(), {glm::vec4(position, 0), glm::vec4(0)});
+  }
+  const render::Purpose purpose(device_, "the vertices", "use fewer triangles");
+  render::Buffer buffer;
+  render::upload_texels(device_, buffer, vertices, vk::Format::eR32G32B32A32Sfloat);
+  structures_.build(meshes, buffer);
+  std::vector<render::RayStructures::Instance> instances;
+  for (const scene::Instance& instance : scene.instances)
+    instances.push_back({.mesh = instance.mesh,
+                         .presence = instance.presence,
+                         .placed = instance.world_from_object});
+  structures_.place(instances);
 }
 
 void GpuTracer::set_rays(std::span<const Ray> rays) {
@@ -65,11 +100,9 @@ void GpuTracer::set_rays(std::span<const Ray> rays) {
 }
 
 void GpuTracer::dispatch(render::Kernel& pass, std::uint32_t worlds) {
-  const render::Buffers buffers{{"bvh", &bvh_},
-                                {"rays", &rays_},
-                                {"hits", &results_},
-                                {"distances", &results_},
-                                {"blocked", &results_}};
+  const render::Buffers buffers{{"bvh", &bvh_},           {"ray_structure", &structures_.top()},
+                                {"rays", &rays_},         {"hits", &results_},
+                                {"distances", &results_}, {"blocked", &results_}};
   const Batch batch{count_, worlds};
   device_.record([&](const vk::raii::CommandBuffer& commands) {
     pass.dispatch({commands, batch, buffers}, count_);

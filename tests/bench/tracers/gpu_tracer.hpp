@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/render/kernel.hpp"
+#include "daemon/render/ray_structures.hpp"
 #include "daemon/scene/bvh.hpp"
 #include "daemon/scene/scene.hpp"
 
@@ -36,6 +37,8 @@ class GpuTracer {
   // Traces as the renderer does on this device, or as it does on a card or a CPU device.
   GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels);
   GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels, bool on_card);
+  // Traces the scene in hardware if the device does so, otherwise as above.
+  GpuTracer(render::Device& device, const scene::Scene& scene, scene::BvhQuality quality);
 
   std::vector<TracedHit> closest(std::span<const Ray> rays, std::uint32_t worlds);
   std::vector<std::uint32_t> blocked(std::span<const Ray> rays, std::uint32_t worlds);
@@ -49,10 +52,12 @@ class GpuTracer {
 
  private:
   void dispatch(render::Kernel& pass, std::uint32_t worlds);
+  void build_structures(const scene::Scene& scene);
 
   render::Device& device_;
   render::Kernel hits_pass_, distances_pass_, blocked_pass_;
   render::Buffer bvh_, rays_, results_;
+  render::RayStructures structures_;
   std::uint32_t count_ = 0;
 };
 

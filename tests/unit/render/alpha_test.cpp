@@ -1,4 +1,5 @@
 // Surfaces that are not there everywhere, against closed forms.
+#include "daemon/render/device.hpp"
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 
@@ -78,13 +79,18 @@ TEST(Alpha, IsLeftOutWhereEveryTexelIsOpaque) {
   }
 }
 
-// More layers than a ray follows stop it, and are counted.
+// More layers than a ray follows stop it, and are counted. In hardware it follows all of them.
 TEST(Alpha, RaysThroughTooManyVeilsAreCounted) {
   View view = lit_point(albedo);
   add_veils(view, 300, 0.7, scene::world_both);
   view.scene.materials.back().alpha = 0;
   view.scene.lights.push_back(lamp(set::LightType::directional));
   const Rendered result = render_view(view, 1, up_to_depth(1));
+  if (shared_device()->traces_in_hardware()) {
+    EXPECT_GT(mean(result.layers.mixed).g, 0);
+    EXPECT_EQ(result.counters.stopped_in_layers, 0u);
+    return;
+  }
   EXPECT_EQ(mean(result.layers.mixed), glm::dvec3(0));
   EXPECT_GE(result.counters.stopped_in_layers, 32u * 32u);  // and of the scattered rays, a few
 }

@@ -15,7 +15,9 @@ constexpr DeviceLimits just_enough{5, 3, 8, 64, 64, 128, 4096, 4096, 4096, 512};
 
 SpirvInfo pass() {
   SpirvInfo info;
-  for (std::uint32_t i = 0; i < 8; ++i) info.bindings.push_back({"buffer", i, i < 5});
+  for (std::uint32_t i = 0; i < 8; ++i)
+    info.bindings.push_back(
+        {"buffer", i, i < 5 ? render::BufferKind::storage : render::BufferKind::texels});
   info.group_size = 64;
   return info;
 }

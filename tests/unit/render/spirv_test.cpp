@@ -24,16 +24,17 @@ constexpr std::uint32_t every_feature = (gpu::FEATURE_LAYER_TEXTURES << 1) - 1;
 TEST(Spirv, NamesTheBuffersThatAreUsed) {
   const SpirvInfo info = describe_spirv(generate_spv);
   EXPECT_EQ(info.group_size, gpu::WORKGROUP_SIZE);
-  const auto has = [&](const std::string& name, bool is_storage) {
+  const auto has = [&](const std::string& name, render::BufferKind kind) {
     return std::ranges::any_of(info.bindings, [&](const SpirvInfo::Binding& binding) {
-      return binding.name == name && binding.is_storage == is_storage;
+      return binding.name == name && binding.kind == kind;
     });
   };
-  EXPECT_TRUE(has("control", true));
-  EXPECT_FALSE(has("vertices", false));  // declared in a header, and not used by this pass
+  EXPECT_TRUE(has("control", render::BufferKind::storage));
+  EXPECT_FALSE(has("vertices",
+                   render::BufferKind::texels));  // declared in a header, and not used by this pass
   const SpirvInfo shade = describe_spirv(shade_spv);
   EXPECT_TRUE(std::ranges::any_of(shade.bindings, [](const SpirvInfo::Binding& binding) {
-    return binding.name == "vertices" && !binding.is_storage;
+    return binding.name == "vertices" && binding.kind == render::BufferKind::texels;
   }));
 }
 
