@@ -58,7 +58,7 @@ struct DeviceTimes {
   std::vector<Pass> passes;
   std::uint64_t submissions = 0;
   double waited_ms = 0;       // of the computer, from handing a submission over to its end
-  std::uint64_t untimed = 0;  // passes, of submissions with too many of them
+  std::uint64_t untimed = 0;  // passes, of submissions with too many or without times
 };
 
 // Names a device and says what it has.

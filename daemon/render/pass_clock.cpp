@@ -69,14 +69,23 @@ double PassClock::collect(std::uint64_t submission) {
   const auto& [pool, passes] = under_way_[submission % under_way_.size()];
   if (passes.empty()) return 0;
   const auto count = static_cast<std::uint32_t>(2 * passes.size());
-  const auto [result, ticks] =
-      pool.getResults<std::uint64_t>(0, count, count * sizeof(std::uint64_t), sizeof(std::uint64_t),
-                                     vk::QueryResultFlagBits::e64 | vk::QueryResultFlagBits::eWait);
+  // The submission is done, so that all times are there, or else the driver has none: to wait for
+  // them could be for ever.
+  struct Timestamp {
+    std::uint64_t ticks = 0, is_there = 0;
+  };
+  using Flag = vk::QueryResultFlagBits;
+  const auto [result, times] = pool.getResults<Timestamp>(
+      0, count, count * sizeof(Timestamp), sizeof(Timestamp), Flag::e64 | Flag::eWithAvailability);
   double all = 0;
   for (std::size_t i = 0; i < passes.size(); ++i) {
+    const Timestamp &begin = times[2 * i], &end = times[2 * i + 1];
+    if (begin.is_there == 0 || end.is_there == 0) {
+      ++sums_.untimed;
+      continue;
+    }
     DeviceTimes::Pass& pass = sums_.passes[passes[i]];
-    const double ms =
-        ms_per_tick_ * static_cast<double>((ticks[2 * i + 1] - ticks[2 * i]) & valid_);
+    const double ms = ms_per_tick_ * static_cast<double>((end.ticks - begin.ticks) & valid_);
     ++pass.count;
     pass.ms += ms;
     all += ms;

@@ -31,7 +31,7 @@ class PassClock {
   double collect(std::uint64_t submission);
   void add_wait(double ms);  // of the computer, for the device
 
-  // Passes since the last take() that found no room.
+  // Passes since the last take() that found no room, or whose times the driver did not have.
   std::uint64_t untimed() const { return sums_.untimed; }
   // Returns the sums since the last call, passes in the order in which they first ran.
   DeviceTimes take();

@@ -75,6 +75,7 @@ class Submissions {
   Slot& slot_of(std::uint64_t submission) { return slots_[submission % slots_.size()]; }
   void refuse_after_failure() const;
   void await(std::uint64_t submission);
+  bool is_done(std::uint64_t submission) const;
   void collect(std::uint64_t done, double waited_ms);
   void adapt(const Slot& slot, double ms);
 

@@ -140,9 +140,9 @@ std::vector<OsdText> lines_of(const PassTimes& times) {
     lines.push_back({counted(static_cast<int>(passes.size() - most_passes), "other") + ": " +
                      milliseconds(others_ms)});
   if (times.untimed > 0)
-    lines.push_back({fmt::format("{:.0f} passes per {} are too many to be timed",
-                                 std::ceil(times.untimed), each),
-                     OsdTone::warning});
+    lines.push_back(
+        {fmt::format("{:.0f} passes per {} could not be timed", std::ceil(times.untimed), each),
+         OsdTone::warning});
   return lines;
 }
 

@@ -20,7 +20,7 @@ struct PassTimes {
   bool is_of_rounds = false;  // the times are of a refinement's rounds instead of frames
   std::vector<Pass> passes;   // the longest first
   double waited_ms = 0;       // of the computer, for the card
-  double untimed = 0;         // passes that were too many to be timed
+  double untimed = 0;         // passes that could not be timed
 };
 
 class PassMeter {

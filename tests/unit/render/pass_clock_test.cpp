@@ -53,6 +53,26 @@ TEST(PassClock, TimesEveryPassOfAFrame) {
   EXPECT_LE(passes_ms, 1.001 * times.waited_ms);
 }
 
+VKAPI_ATTR void VKAPI_CALL no_timestamp(VkCommandBuffer, VkPipelineStageFlags2, VkQueryPool,
+                                        std::uint32_t) {}
+
+// A driver that never has the times must not be waited for. Here the device's table of functions,
+// which is the test's own, gets a timestamp that writes nothing.
+TEST(PassClock, CountsWhatTheDriverDoesNotTime) {
+  render::DeviceOptions options;
+  options.times_passes = true;
+  const auto device = render::open_device(options);
+  using Table = std::remove_cvref_t<decltype(*device->vk().getDispatcher())>;
+  const_cast<Table*>(device->vk().getDispatcher())->vkCmdWriteTimestamp2 = no_timestamp;
+  SetRenderer renderer(floor_under_sky(), up_to_depth(bounces), set::LightSampling::importance,
+                       device);
+  EXPECT_GT(mean(renderer.rendered(1).mixed).g, 0);
+  const render::DeviceTimes times = render::take_times(*device);
+  EXPECT_GT(times.untimed, 0u);
+  EXPECT_TRUE(times.passes.empty());
+  EXPECT_GT(times.submissions, 0u);
+}
+
 TEST(PassClock, TimesNothingUnlessItIsAsked) {
   if (render::is_gpu(*shared_device())) GTEST_SKIP() << "a graphics card's passes are always timed";
   const render::DeviceTimes times = times_of_a_frame(false);

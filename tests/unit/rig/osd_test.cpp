@@ -214,7 +214,7 @@ TEST(OsdWords, PassesWithoutTimes) {
   rig.pass_times = times_of({{"extend", 4}});
   rig.pass_times->untimed = 119.5;
   EXPECT_EQ(column().back(),
-            (OsdText{"120 passes per frame are too many to be timed", OsdTone::warning}));
+            (OsdText{"120 passes per frame could not be timed", OsdTone::warning}));
 }
 
 // The deviation of a place is the root of its three variances' sum.
