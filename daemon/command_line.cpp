@@ -21,8 +21,8 @@ void add_device_options(CLI::App& command, render::DeviceOptions& device) {
   device.cache = render::cache_folder();
   command.add_option("--device", device.name, "Vulkan device, by part of its name");
   add_choice(command, "--hardware-rays,!--no-hardware-rays", device.hardware_rays,
-             "Trace rays by the device's own units, or not; otherwise as the set file says "
-             "(quality.hardware_rays)");
+             "Trace rays in hardware, or not; otherwise a graphics card does so where it can and "
+             "quality.hardware_rays allows it");
   command.add_flag("--validation", device.validation,
                    "Log the messages of Vulkan's validation layer");
 }

@@ -87,12 +87,14 @@ class Bench {
     report_.version = PREVIZ_VERSION;
     report_.processor = processor();
     report_.cores = std::thread::hardware_concurrency();
-    render::DeviceOptions wanted = options_.device;
+    const render::DeviceOptions given =
+        render::options_for(options_.device, !frame_ || frame_->set().quality.hardware_rays);
+    render::DeviceOptions wanted = given;
     wanted.times_passes = true;
     try {
       device_ = render::open_device(wanted);
     } catch (const Error&) {
-      device_ = render::open_device(options_.device);  // its passes cannot be timed
+      device_ = render::open_device(given);  // its passes cannot be timed
       report_.left_out.push_back({"the passes of a frame", "the device has no clock for them"});
     }
     report_.device = render::facts_of(*device_);

@@ -139,7 +139,7 @@ const FrameFigures* BenchReport::typical() const {
 }
 
 std::string BenchReport::tracing_units() const {
-  return device.traces_in_hardware ? "its own units for them" : "its compute units";
+  return device.traces_in_hardware ? "its hardware for rays" : "compute shaders";
 }
 
 std::string bench_table(const BenchReport& report) {

@@ -91,8 +91,10 @@ void calibrate_balance(const BalanceOptions& options, std::ostream& out) {
   ProbeOptions probe;
   probe.frames = options.frames;
   probe.samples = options.samples;
-  const SurfacePixels seen =
-      probe_surfaces(take, scene, render::open_device(options.device), probe);
+  const SurfacePixels seen = probe_surfaces(
+      take, scene,
+      render::open_device(render::options_for(options.device, take.set.quality.hardware_rays)),
+      probe);
   const Balance balance = fit_balance(seen, options.references);
   print_balance(seen, balance, out);
   print_exposure(balance, !take.set.lighting.environment, out);

@@ -60,7 +60,7 @@ previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the 
 previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Run again, it continues where it stopped.
 previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
 previzd bench --page bench.html: Measures what this machine can do, in two minutes at most, and writes a page about it. The first thing to run on a new machine.
-previzd bench --no-hardware-rays: Measures it without the units that a graphics card has for rays, to compare with what they bring.
+previzd bench --no-hardware-rays: Measures it without the hardware that a graphics card may have for rays, to see what that brings.
 previzd bench desk.toml --json bench.json: Also measures the frames of a set, whose newest take is used, and writes all figures as JSON.
 previzd trade desk.toml --axes estimator,depth: Measures the cost and benefit of the estimator and the number of bounces on this set.
 previzd trade takes/12A_take003 --set desk.toml --fps 25 --error 2% --out trade: Finds the settings that hold 25 frames per second with the least error, and those that reach an error of 2 % in the least time.

@@ -196,13 +196,18 @@ Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format forma
   return result;
 }
 
+Buffer create_structure_memory(Device& device, vk::DeviceSize size) {
+  check_buffer(device, {size, 0, false});
+  return create_device_buffer(device, size,
+                              vk::BufferUsageFlagBits::eStorageBuffer |
+                                  vk::BufferUsageFlagBits::eAccelerationStructureStorageKHR);
+}
+
 Buffer create_structure_buffer(Device& device, vk::DeviceSize size,
                                vk::AccelerationStructureTypeKHR type) {
-  check_buffer(device, {size, 0, false});
-  Buffer result =
-      create_device_buffer(device, size, vk::BufferUsageFlagBits::eAccelerationStructureStorageKHR);
+  Buffer result = create_structure_memory(device, size);
   result.parts->structure = vk::raii::AccelerationStructureKHR(
-      device.vk(), vk::AccelerationStructureCreateInfoKHR({}, result.buffer, 0, size, type));
+      device.vk(), vk::AccelerationStructureCreateInfoKHR({}, result.buffer, 0, result.size, type));
   result.structure = *result.parts->structure;
   return result;
 }

@@ -69,9 +69,10 @@ Buffer create_indirect_buffer(Device& device, vk::DeviceSize size);
 Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format,
                            bool is_storage = false);
 
-// Creates a buffer with an acceleration structure in it, which is still to be built
-// (daemon/render/ray_structures.hpp). Where rays are traced in hardware, these can be built from
-// all buffers of the device.
+// Creates memory for acceleration structures (daemon/render/ray_structures.hpp), or in which one is
+// built. Where rays are traced in hardware, these can be built from all buffers of the device.
+Buffer create_structure_memory(Device& device, vk::DeviceSize size);
+// Creates such memory with one structure in it, which is still to be built.
 Buffer create_structure_buffer(Device& device, vk::DeviceSize size,
                                vk::AccelerationStructureTypeKHR type);
 

@@ -393,8 +393,9 @@ void Device::choose_rays() {
                              .minAccelerationStructureScratchOffsetAlignment;
   } else if (options_.hardware_rays) {
     report::log({report::Severity::warning, "render",
-                 name_ + " has no units that trace rays, or its driver does not offer them "
-                         "(VK_KHR_ray_query); they are traced by its compute units, more slowly"});
+                 name_ + ": cannot trace rays in hardware, because its driver lacks "
+                         "VK_KHR_ray_query; compute shaders trace them, more slowly. Update the "
+                         "driver, or leave out --hardware-rays"});
   }
 }
 
@@ -486,8 +487,8 @@ void Device::record(const std::function<void(const vk::raii::CommandBuffer&)>& r
   if (shares_host_memory()) submissions_->finish();
 }
 
-DeviceOptions options_for(DeviceOptions options, std::optional<bool> hardware_rays) {
-  if (!options.hardware_rays) options.hardware_rays = hardware_rays;
+DeviceOptions options_for(DeviceOptions options, bool hardware_rays) {
+  if (!options.hardware_rays && !hardware_rays) options.hardware_rays = false;
   return options;
 }
 std::shared_ptr<Device> open_device(const DeviceOptions& options) {

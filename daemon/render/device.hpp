@@ -175,11 +175,11 @@ class Device {
   std::optional<CardIdentity> card_;
   vk::PhysicalDeviceLimits limits_;
   DeviceLimits allows_{};
+  vk::DeviceSize scratch_alignment_ = 0;  // 0: rays are not traced in hardware
   bool is_cpu_ = false;
   bool lanes_meet_ = false;
   std::uint32_t mapped_types_ = 0;
-  vk::DeviceSize scratch_alignment_ = 0;  // 0: rays are not traced in hardware
-  bool had_gpu_ = false;                  // since it was first opened
+  bool had_gpu_ = false;  // since it was first opened
   std::vector<std::string> missing_drivers_;
   bool missing_is_said_ = false;
   mutable std::mutex drawing_mutex_;

@@ -40,8 +40,9 @@ struct DeviceOptions {
   std::filesystem::path sys = "/sys";
 };
 
-// Returns the options with what a set wishes of hardware_rays, unless they say it themselves.
-DeviceOptions options_for(DeviceOptions options, std::optional<bool> hardware_rays);
+// Returns the options for a set that allows rays in hardware or does not, unless they say it
+// themselves.
+DeviceOptions options_for(DeviceOptions options, bool hardware_rays);
 
 // Returns the folder for files that a program makes again when they are gone, as the XDG Base
 // Directory Specification has it: $XDG_CACHE_HOME/previzd, or ~/.cache/previzd; empty: neither is

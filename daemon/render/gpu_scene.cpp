@@ -166,6 +166,7 @@ void GpuScene::upload_tree(const std::vector<glm::uvec4>& bvh) {
 
 void GpuScene::upload_meshes() {
   // The memory of another scene is free for this one.
+  structures_.clear();
   for (Buffer* buffer : {&bvh_, &vertices_, &triangles_, &extras_}) *buffer = {};
   work_.trees += scene_.meshes.size();
   std::vector<glm::uvec4> bvh(scene::top_bvh_texels(scene_.instances.size()));

@@ -1,5 +1,7 @@
 #include "daemon/render/ray_structures.hpp"
 
+#include <algorithm>
+
 #include "daemon/scene/bvh.hpp"
 #include "shaders/lib/shared.h"
 
@@ -8,10 +10,16 @@ namespace {
 
 using Type = vk::AccelerationStructureTypeKHR;
 using BuildFlag = vk::BuildAccelerationStructureFlagBitsKHR;
+using BuildInfo = vk::AccelerationStructureBuildGeometryInfoKHR;
 
 // A vertex is two vectors, of which the first has the position (shaders/lib/scene.glsl,
 // "vertices").
 constexpr vk::DeviceSize vertex_bytes = 2 * sizeof(glm::vec4);
+constexpr vk::DeviceSize structure_alignment = 256;  // Vulkan's
+
+vk::DeviceSize round_up(vk::DeviceSize value, vk::DeviceSize to) {
+  return (value + to - 1) / to * to;
+}
 
 vk::DeviceOrHostAddressConstKHR in(const Device& device, const Buffer& buffer,
                                    vk::DeviceSize offset = 0) {
@@ -26,55 +34,109 @@ vk::TransformMatrixKHR rows_of(const glm::dmat4& m) {
   return rows;
 }
 
+BuildInfo info_of(const vk::AccelerationStructureGeometryKHR& geometry, Type type, bool deforms) {
+  return BuildInfo(type, deforms ? BuildFlag::ePreferFastBuild : BuildFlag::ePreferFastTrace,
+                   vk::BuildAccelerationStructureModeKHR::eBuild, {}, {}, geometry);
+}
+
+vk::AccelerationStructureBuildSizesInfoKHR sizes_of(const Device& device, const BuildInfo& info,
+                                                    std::uint32_t count) {
+  return device.vk().getAccelerationStructureBuildSizesKHR(
+      vk::AccelerationStructureBuildTypeKHR::eDevice, info, count);
+}
+
 }  // namespace
 
+// What is left out becomes a point at a corner of another triangle: its own could be anywhere.
 RayStructures::Mesh RayStructures::mesh_of(const scene::Mesh& from, std::uint32_t first_vertex,
                                            bool deforms) {
-  Mesh mesh{.triangles = std::vector(from.triangles.size(), glm::uvec3(0)),
+  const std::vector<std::uint32_t> traced = scene::traced_triangles(from, deforms);
+  if (traced.empty()) return {};
+  Mesh mesh{.triangles = {},
             .first_vertex = first_vertex,
             .vertices = static_cast<std::uint32_t>(from.positions.size()),
             .deforms = deforms};
-  for (const std::uint32_t triangle : scene::traced_triangles(from, deforms))
-    mesh.triangles[triangle] = from.triangles[triangle];
+  mesh.triangles.assign(from.triangles.size(), glm::uvec3(from.triangles[traced[0]].x));
+  for (const std::uint32_t triangle : traced) mesh.triangles[triangle] = from.triangles[triangle];
   return mesh;
 }
 
 Purpose RayStructures::for_rays() const {
-  return {device_, "the rays that the graphics card's own units trace",
-          "simplify the meshes of the set, or set quality.hardware_rays to false"};
+  return {device_, "the rays that the graphics card traces in hardware",
+          "simplify the meshes of the set, or set quality.hardware_rays to false and start previzd "
+          "again"};
+}
+
+void RayStructures::clear() {
+  meshes_.clear();
+  for (Buffer* buffer : {&indices_, &bottom_, &scratch_}) *buffer = {};
+}
+
+void RayStructures::upload_indices(std::span<const Mesh> meshes) {
+  std::vector<glm::uvec3> indices;
+  for (const Mesh& from : meshes) {
+    meshes_.push_back({.structure = {},
+                       .first_byte = indices.size() * sizeof(glm::uvec3),
+                       .triangles = static_cast<std::uint32_t>(from.triangles.size()),
+                       .first_vertex = from.first_vertex,
+                       .vertices = from.vertices,
+                       .deforms = from.deforms});
+    indices.insert(indices.end(), from.triangles.begin(), from.triangles.end());
+  }
+  upload_storage(device_, indices_, indices);
 }
 
 void RayStructures::build(std::span<const Mesh> meshes, const Buffer& vertices) {
   const Purpose purpose = for_rays();
-  meshes_.clear();
-  for (const Mesh& from : meshes) {
-    MeshStructure& mesh = meshes_.emplace_back();
-    mesh.triangles = static_cast<std::uint32_t>(from.triangles.size());
-    mesh.first_vertex = from.first_vertex;
-    mesh.vertices = from.vertices;
-    mesh.deforms = from.deforms;
-    if (from.triangles.empty() || from.vertices == 0) continue;
-    upload_storage(device_, mesh.indices, from.triangles);
-    build(mesh, vertices);
-    if (!mesh.deforms) mesh.indices = {};
+  clear();
+  upload_indices(meshes);
+  std::vector<vk::DeviceSize> sizes;
+  vk::DeviceSize all = 0, most_scratch = 0, most_later = 0;
+  for (const MeshStructure& mesh : meshes_) {
+    const auto geometry = geometry_of(mesh, vertices);
+    const auto needed =
+        sizes_of(device_, info_of(geometry, Type::eBottomLevel, mesh.deforms), mesh.triangles);
+    sizes.push_back(mesh.triangles > 0 ? needed.accelerationStructureSize : 0);
+    all += round_up(sizes.back(), structure_alignment);
+    most_scratch = std::max(most_scratch, needed.buildScratchSize);
+    if (mesh.deforms) most_later = std::max(most_later, needed.buildScratchSize);
   }
+  bottom_ = create_structure_memory(device_, all);
+  reserve_scratch(most_scratch);
+  vk::DeviceSize offset = 0;
+  for (std::size_t i = 0; i < meshes_.size(); ++i) {
+    if (sizes[i] == 0) continue;
+    meshes_[i].structure = {
+        new Structure(device_.vk(), vk::AccelerationStructureCreateInfoKHR(
+                                        {}, bottom_.buffer, offset, sizes[i], Type::eBottomLevel)),
+        Retire<Structure>{&device_}};
+    offset += round_up(sizes[i], structure_alignment);
+    reshape(i, vertices);
+  }
+  scratch_ = {};
+  if (most_later > 0) return reserve_scratch(most_later);
+  indices_ = {};
 }
 
-void RayStructures::reshape(std::size_t mesh, const Buffer& vertices) {
-  const Purpose purpose = for_rays();
-  if (meshes_[mesh].structure.buffer) build(meshes_[mesh], vertices);
-}
-
-void RayStructures::build(MeshStructure& mesh, const Buffer& vertices) {
+vk::AccelerationStructureGeometryKHR RayStructures::geometry_of(const MeshStructure& mesh,
+                                                                const Buffer& vertices) const {
   const vk::AccelerationStructureGeometryTrianglesDataKHR triangles(
       vk::Format::eR32G32B32Sfloat, in(device_, vertices, mesh.first_vertex * vertex_bytes),
-      vertex_bytes, mesh.vertices - 1, vk::IndexType::eUint32, in(device_, mesh.indices));
+      vertex_bytes, std::max(mesh.vertices, 1u) - 1, vk::IndexType::eUint32,
+      in(device_, indices_, mesh.first_byte));
   // A surface that lets light through would take it twice from a ray that is told of it twice.
-  const vk::AccelerationStructureGeometryKHR geometry(
-      vk::GeometryTypeKHR::eTriangles, triangles,
-      vk::GeometryFlagBitsKHR::eNoDuplicateAnyHitInvocation);
-  build(mesh.structure, geometry, Type::eBottomLevel,
-        mesh.deforms ? BuildFlag::ePreferFastBuild : BuildFlag::ePreferFastTrace, mesh.triangles);
+  return {vk::GeometryTypeKHR::eTriangles, triangles,
+          vk::GeometryFlagBitsKHR::eNoDuplicateAnyHitInvocation};
+}
+
+void RayStructures::reshape(std::size_t index, const Buffer& vertices) {
+  const MeshStructure& mesh = meshes_[index];
+  if (!mesh.structure) return;
+  const auto geometry = geometry_of(mesh, vertices);
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
+    record_build(commands, **mesh.structure, info_of(geometry, Type::eBottomLevel, mesh.deforms),
+                 mesh.triangles);
+  });
 }
 
 void RayStructures::place(std::span<const Instance> instances) {
@@ -82,7 +144,7 @@ void RayStructures::place(std::span<const Instance> instances) {
   std::vector<vk::AccelerationStructureInstanceKHR> records;
   for (std::uint32_t i = 0; i < instances.size(); ++i) {
     const Instance& instance = instances[i];
-    const Buffer& mesh = meshes_[instance.mesh].structure;
+    const MeshStructure& mesh = meshes_[instance.mesh];
     vk::AccelerationStructureInstanceKHR& record = records.emplace_back();
     record.transform = rows_of(instance.placed);
     record.instanceCustomIndex = i & 0xffffffu;
@@ -91,41 +153,47 @@ void RayStructures::place(std::span<const Instance> instances) {
     record.setFlags(instance.is_open ? vk::GeometryInstanceFlagBitsKHR::eForceNoOpaque
                                      : vk::GeometryInstanceFlagBitsKHR::eForceOpaque);
     // An address of 0 makes an instance that is never met.
-    if (mesh.buffer && instance.presence != 0)
+    if (mesh.structure && instance.presence != 0)
       record.accelerationStructureReference =
-          device_.vk().getAccelerationStructureAddressKHR({mesh.structure});
+          device_.vk().getAccelerationStructureAddressKHR({**mesh.structure});
   }
   upload_storage(device_, instances_, records);
-  const vk::AccelerationStructureGeometryInstancesDataKHR data(VK_FALSE, in(device_, instances_));
-  build(top_, vk::AccelerationStructureGeometryKHR(vk::GeometryTypeKHR::eInstances, data),
-        Type::eTopLevel, BuildFlag::ePreferFastTrace, static_cast<std::uint32_t>(instances.size()));
+  const vk::AccelerationStructureGeometryKHR geometry(
+      vk::GeometryTypeKHR::eInstances,
+      vk::AccelerationStructureGeometryInstancesDataKHR(VK_FALSE, in(device_, instances_)));
+  const BuildInfo info = info_of(geometry, Type::eTopLevel, false);
+  const auto count = static_cast<std::uint32_t>(instances.size());
+  const auto sizes = sizes_of(device_, info, count);
+  if (!top_.buffer || top_.size < sizes.accelerationStructureSize) {
+    top_ = {};
+    top_ = create_structure_buffer(device_, sizes.accelerationStructureSize, Type::eTopLevel);
+  }
+  reserve_scratch(sizes.buildScratchSize);
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
+    record_build(commands, top_.structure, info, count);
+  });
 }
 
-// The memory of a structure that is large enough is used again, and so is that for building.
-void RayStructures::build(Buffer& structure, const vk::AccelerationStructureGeometryKHR& geometry,
-                          Type type, vk::BuildAccelerationStructureFlagsKHR flags,
-                          std::uint32_t count) {
-  vk::AccelerationStructureBuildGeometryInfoKHR info(
-      type, flags, vk::BuildAccelerationStructureModeKHR::eBuild, {}, {}, geometry);
-  const vk::AccelerationStructureBuildSizesInfoKHR sizes =
-      device_.vk().getAccelerationStructureBuildSizesKHR(
-          vk::AccelerationStructureBuildTypeKHR::eDevice, info, count);
-  if (!structure.buffer || structure.size < sizes.accelerationStructureSize)
-    structure = create_structure_buffer(device_, sizes.accelerationStructureSize, type);
-  const vk::DeviceSize alignment = device_.scratch_alignment();
-  if (!scratch_.buffer || scratch_.size < sizes.buildScratchSize + alignment)
-    scratch_ = create_storage_buffer(device_, sizes.buildScratchSize + alignment);
-  info.dstAccelerationStructure = structure.structure;
-  const vk::DeviceAddress scratch = in(device_, scratch_).deviceAddress;
-  info.scratchData.deviceAddress = (scratch + alignment - 1) / alignment * alignment;
+void RayStructures::reserve_scratch(vk::DeviceSize bytes) {
+  bytes += device_.scratch_alignment();
+  if (scratch_.buffer && scratch_.size >= bytes) return;
+  scratch_ = {};
+  scratch_ = create_structure_memory(device_, bytes);
+}
+
+// One build after another uses the scratch memory.
+void RayStructures::record_build(const vk::raii::CommandBuffer& commands,
+                                 vk::AccelerationStructureKHR structure, BuildInfo info,
+                                 std::uint32_t count) {
+  info.dstAccelerationStructure = structure;
+  info.scratchData.deviceAddress =
+      round_up(in(device_, scratch_).deviceAddress, device_.scratch_alignment());
   const vk::AccelerationStructureBuildRangeInfoKHR range(count, 0, 0, 0);
-  device_.record([&](const vk::raii::CommandBuffer& commands) {
-    device_.clock().start(
-        commands, type == Type::eTopLevel ? "structure of instances" : "structure of a mesh");
-    commands.buildAccelerationStructuresKHR(info, &range);
-    device_.clock().stop(commands);
-    device_.submissions().barrier(commands);
-  });
+  device_.clock().start(
+      commands, info.type == Type::eTopLevel ? "structure of objects" : "structure of a mesh");
+  commands.buildAccelerationStructuresKHR(info, &range);
+  device_.clock().stop(commands);
+  device_.submissions().barrier(commands);
 }
 
 }  // namespace previz::render

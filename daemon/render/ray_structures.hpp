@@ -18,15 +18,17 @@ class RayStructures {
  public:
   explicit RayStructures(Device& device) : device_(device) {}
 
-  // `triangles` are indices into the mesh's own vertices. Those that no ray may meet have three
-  // times the same, so that the others keep their numbers.
+  // `triangles` are indices into the mesh's own vertices. Those that no ray may meet are points, so
+  // that the others keep their numbers.
   struct Mesh {
     std::vector<glm::uvec3> triangles;
     std::uint32_t first_vertex = 0, vertices = 0;
     bool deforms = false;
   };
-  // Triangles that our own trees leave out become points.
+  // Leaves out what our own trees do.
   static Mesh mesh_of(const scene::Mesh& mesh, std::uint32_t first_vertex, bool deforms);
+  // Frees the structures of all meshes.
+  void clear();
   // Builds the structures of the meshes, whose vertices lie in `vertices` as the shaders read them.
   void build(std::span<const Mesh> meshes, const Buffer& vertices);
   // Builds the structure of a mesh that deforms for the vertices that there are now.
@@ -44,21 +46,26 @@ class RayStructures {
   const Buffer& top() const { return top_; }
 
  private:
-  Purpose for_rays() const;
+  using Structure = vk::raii::AccelerationStructureKHR;
   struct MeshStructure {
-    Buffer structure, indices;  // indices: only of a mesh that deforms, later
+    std::unique_ptr<Structure, Retire<Structure>> structure;  // null: it has no triangle
+    vk::DeviceSize first_byte = 0;                            // of its indices
     std::uint32_t triangles = 0, first_vertex = 0, vertices = 0;
     bool deforms = false;
   };
 
-  void build(MeshStructure& mesh, const Buffer& vertices);
-  void build(Buffer& structure, const vk::AccelerationStructureGeometryKHR& geometry,
-             vk::AccelerationStructureTypeKHR type, vk::BuildAccelerationStructureFlagsKHR flags,
-             std::uint32_t count);
+  Purpose for_rays() const;
+  void upload_indices(std::span<const Mesh> meshes);
+  vk::AccelerationStructureGeometryKHR geometry_of(const MeshStructure& mesh,
+                                                   const Buffer& vertices) const;
+  void record_build(const vk::raii::CommandBuffer& commands, vk::AccelerationStructureKHR structure,
+                    vk::AccelerationStructureBuildGeometryInfoKHR info, std::uint32_t count);
+  void reserve_scratch(vk::DeviceSize bytes);
 
   Device& device_;
-  std::vector<MeshStructure> meshes_;
+  Buffer indices_, bottom_;  // of all meshes
   Buffer instances_, top_, scratch_;
+  std::vector<MeshStructure> meshes_;  // in `bottom_`, which therefore goes after them
 };
 
 }  // namespace previz::render

@@ -241,7 +241,7 @@ struct Quality {
   double fps = 0;          // preview: kept by fewer samples, then pixels; 0: the others decide
   std::vector<PreviewStep> steps;  // how fps is held, best first; empty: scale, then ever smaller
   bool cpu_instead = false;        // live: the CPU draws while the GPU that was there is gone
-  std::optional<bool> hardware_rays = {};  // absent: wherever a graphics card has units for them
+  bool hardware_rays = true;       // traced by a graphics card's own units, where it has such
 };
 
 // The kinds of press that an action can be bound to.

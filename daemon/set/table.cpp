@@ -298,7 +298,7 @@ Keys quality_keys(Quality& q) {
       {"scale", &q.scale, plain.within(0.01, 1), "Size of the preview, relative to the camera's picture; offline rendering is always full size."},
       {"fps", &q.fps, plain.within(0, 240), "Frame rate that the preview holds by changing its samples (1 to 50) and, if one sample is too many, its size (up to scale), or by the [[quality.preview]] tables. 0: samples and scale stay as set."},
       {"cpu_instead", &q.cpu_instead, plain, "Live, if the graphics card is gone: render on the CPU, slowly, as long as the set runs. Otherwise the plate is shown until the card is back. A rig that never had a card always renders on the CPU."},
-      {"hardware_rays", &q.hardware_rays, plain, "Traces rays by the units that a graphics card has for them (NVIDIA RTX, AMD from the RX 6000 series on, Intel Arc), which is several times as fast. False: by its compute units, as on cards without such units. The picture is the same but for rounding. Default: if there are such units. Live it is read at the start of the service.", optional("true")},
+      {"hardware_rays", &q.hardware_rays, plain, "Lets the graphics card trace rays in hardware, where its driver does so (VK_KHR_ray_query: NVIDIA RTX, AMD from the RX 6000 series on, Intel Arc). False: compute shaders trace them, as on any other card. The picture is the same but for rounding; `previzd bench` shows what it brings. Live it is read when the service starts."},
   };
 }
 

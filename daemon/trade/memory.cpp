@@ -268,10 +268,11 @@ std::string settings_words(const set::Set& set, const TradeSettings& settings) {
 }
 
 std::string memory_key(TradeFrame& frame, const scene::Scene& scene, double scale,
-                       const std::string& device) {
+                       const render::DeviceFacts& device) {
   session::Sha256 hash;
-  hash.add(fmt::format("{} previzd {} {} {} {} {}\n", version, PREVIZ_VERSION, device, scale,
-                       frame.index(), frame.exposure()));
+  hash.add(fmt::format("{} previzd {} {} {} {} {} {} {}\n", version, PREVIZ_VERSION, device.name,
+                       device.driver, device.traces_in_hardware, scale, frame.index(),
+                       frame.exposure()));
   hash.add(frame.set_text());
   hash.add(set::intrinsics_toml(frame.calibration()) + set::response_toml(frame.calibration()));
   for (const auto& [name, path] : scene::assets_of(frame.set()))
@@ -290,7 +291,7 @@ TradeMemory load_memory(const fs::path& directory, const std::string& key, std::
     TradeMemory memory;
     const json rows = json::parse(session::read_file(rows_file(directory)));
     if (rows.at("key").get<std::string>() != key) {
-      why_not = "it is of another frame, set, size, device or version";
+      why_not = "it is of another frame, set, size, device, driver or version";
       return {};
     }
     read_rows(rows, memory);

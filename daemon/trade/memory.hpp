@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/render/gpu.hpp"
 #include "daemon/render/layers.hpp"
 #include "daemon/trade/answer.hpp"
 #include "daemon/trade/axes.hpp"
@@ -75,7 +76,7 @@ std::string settings_words(const set::Set& set, const TradeSettings& settings);
 // device, scale, set, what its files hold, and the frame with its pose and its light. Throws
 // previz::Error for a file that cannot be read.
 std::string memory_key(TradeFrame& frame, const scene::Scene& scene, double scale,
-                       const std::string& device);
+                       const render::DeviceFacts& device);
 
 // Returns what is kept in the directory under this key; nothing if it holds none, or of another
 // key. What cannot be read is said in `why_not`.

@@ -109,7 +109,7 @@ TradeReport run_trade(const TradeOptions& given, std::ostream& out) {
   for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
   const std::shared_ptr<render::Device> device =
       render::open_device(render::options_for(options.device, frame.set().quality.hardware_rays));
-  const std::string key = memory_key(frame, scene, options.scale, render::device_name(*device));
+  const std::string key = memory_key(frame, scene, options.scale, render::facts_of(*device));
   TradeMemory memory = remembered(options, directory, key, out);
   const auto save = [&](const TradeReport& report) {
     session::replace_file(directory / "trade.csv", trade_csv(report));

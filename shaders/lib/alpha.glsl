@@ -57,9 +57,12 @@ bool closest_candidate_met(QueriedRay ray, uint flags, inout Hit hit) {
 bool closest_through(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, uvec2 source,
                      out Hit hit) {
   const QueriedRay ray = QueriedRay(origin, t_min, direction, t_max, worlds, source);
-  hit = Hit(t_max, vec2(0.0), 0xffffffffu, 0xffffffffu, 0u);
+  hit = query_nothing(t_max);
   if (!closest_candidate_met(ray, gl_RayFlagsNoneEXT, hit)) return false;
-  if (query_is_source(ray, hit) && !closest_candidate_met(ray, gl_RayFlagsNoOpaqueEXT, hit)) return false;
+  if (query_is_source(ray, hit)) {
+    hit = query_nothing(t_max);
+    if (!closest_candidate_met(ray, gl_RayFlagsNoOpaqueEXT, hit)) return false;
+  }
   Hit candidate;
   query_begin(query_around(ray, hit), gl_RayFlagsNoOpaqueEXT);
   while (query_next(ray, candidate))
@@ -68,10 +71,21 @@ bool closest_through(vec3 origin, vec3 direction, float t_min, float t_max, uint
 }
 
 Gain share_through(vec3 origin, vec3 direction, float t_max, uint worlds, uvec2 source, Gain share) {
-  const QueriedRay ray = QueriedRay(origin, 0.0, direction, t_max, worlds, source);
+  QueriedRay ray = QueriedRay(origin, 0.0, direction, t_max, worlds, source);
+  bool is_source;
+  const uint dark = query_blocked(ray, gl_RayFlagsCullNoOpaqueEXT, is_source);
+  uint shown = gl_RayFlagsNoOpaqueEXT;
+  if (!is_source) {  // only open surfaces are left, for the worlds that are not dark
+    shown = gl_RayFlagsCullOpaqueEXT;
+    share.mixed *= float((dark & WORLD_MIXED) == 0u);
+    share.real *= float((dark & WORLD_REAL) == 0u);
+    worlds &= ~dark;
+    ray.worlds = worlds;
+    if (worlds == 0u) return share;
+  }
   Hit hit;
-  Hit last = Hit(t_max, vec2(0.0), NO_INDEX, NO_INDEX, 0u);
-  query_begin(ray, gl_RayFlagsNoOpaqueEXT);
+  Hit last = query_nothing(t_max);
+  query_begin(ray, shown);
   while (worlds != 0u && query_next(ray, hit)) {
     // On an edge that two triangles share both may be met, one after the other.
     const bool is_passed = hit.instance == last.instance && abs(hit.t - last.t) <= query_tie(ray, hit.t);

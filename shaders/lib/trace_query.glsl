@@ -23,7 +23,7 @@ struct QueriedRay {
   uvec2 source;
 };
 
-// All functions share one query; each that begins one has seen the end of the last.
+// All functions share one query: of two there is never need at once.
 rayQueryEXT query;
 
 // A ray that is none, with a NaN in it, meets nothing: for the hardware, anything could follow from it.
@@ -92,15 +92,18 @@ bool query_prefers(QueriedRay ray, Hit other, Hit hit) {
   return same ? other.primitive < hit.primitive : other.instance < hit.instance;
 }
 
+Hit query_nothing(float t_max) { return Hit(t_max, vec2(0.0), 0xffffffffu, 0xffffffffu, 0u); }
+
 bool trace_closest(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds, uvec2 source,
                    out Hit hit) {
-  hit = Hit(t_max, vec2(0.0), 0xffffffffu, 0xffffffffu, 0u);
+  hit = query_nothing(t_max);
   const QueriedRay ray = QueriedRay(origin, t_min, direction, t_max, worlds, source);
   query_begin(ray, gl_RayFlagsOpaqueEXT);
   rayQueryProceedEXT(query);
   if (!query_found(hit)) return false;
   Hit candidate;
   if (query_is_source(ray, hit)) {
+    hit = query_nothing(t_max);
     query_begin(ray, gl_RayFlagsNoOpaqueEXT);
     while (query_next(ray, candidate)) rayQueryConfirmIntersectionEXT(query);
     if (!query_found(hit)) return false;
@@ -111,26 +114,39 @@ bool trace_closest(vec3 origin, vec3 direction, float t_min, float t_max, uint w
   return true;
 }
 
-// Returns the presence of anything on the ray, 0 if there is nothing.
-uint query_any(QueriedRay ray) {
+// Returns the presence of the first thing that is found on the ray, 0 if there is nothing.
+// `is_source`: it is the triangle that the ray leaves, and there may be others.
+uint query_any(QueriedRay ray, uint flags, inout bool is_source) {
   Hit hit;
-  query_begin(ray, gl_RayFlagsOpaqueEXT | gl_RayFlagsTerminateOnFirstHitEXT);
+  query_begin(ray, flags | gl_RayFlagsTerminateOnFirstHitEXT);
   rayQueryProceedEXT(query);
   if (!query_found(hit)) return 0u;
-  if (!query_is_source(ray, hit)) return hit.presence;
-  Hit candidate;
-  query_begin(ray, gl_RayFlagsNoOpaqueEXT | gl_RayFlagsTerminateOnFirstHitEXT);
-  while (query_next(ray, candidate)) rayQueryConfirmIntersectionEXT(query);
-  return query_found(hit) ? hit.presence : 0u;
+  is_source = is_source || query_is_source(ray, hit);
+  return hit.presence;
+}
+
+// Returns the worlds in which something opaque, as the flags say, is on the ray; no answer if
+// `is_source` comes back.
+uint query_blocked(QueriedRay ray, uint flags, out bool is_source) {
+  is_source = false;
+  const uint worlds = ray.worlds;
+  const uint blocked = query_any(ray, flags, is_source) & worlds;
+  if (is_source || blocked == 0u || blocked == worlds) return blocked;
+  ray.worlds = worlds & ~blocked;  // what is in the way of one world is in that alone
+  return blocked | (query_any(ray, flags, is_source) & worlds);
 }
 
 uint trace_blocked(vec3 origin, vec3 direction, float t_min, float t_max, uint worlds,
                    uvec2 source) {
-  QueriedRay ray = QueriedRay(origin, t_min, direction, t_max, worlds, source);
-  uint blocked = query_any(ray) & worlds;
-  if (blocked == 0u || blocked == worlds) return blocked;
-  ray.worlds = worlds & ~blocked;  // something in the way of one world is in that alone
-  return blocked | (query_any(ray) & worlds);
+  const QueriedRay ray = QueriedRay(origin, t_min, direction, t_max, worlds, source);
+  bool is_source;
+  uint blocked = query_blocked(ray, gl_RayFlagsOpaqueEXT, is_source);
+  if (!is_source) return blocked;
+  blocked = 0u;
+  Hit candidate;
+  query_begin(ray, gl_RayFlagsNoOpaqueEXT);
+  while (blocked != worlds && query_next(ray, candidate)) blocked |= candidate.presence & worlds;
+  return blocked;
 }
 
 #endif

@@ -74,8 +74,8 @@ TEST(BenchReport, SaysInJsonWhatTheTableSays) {
   EXPECT_EQ(json["left_out"][0]["why"], "it would take about 30 s");
   const std::string table = bench_table(example());
   for (const char* words :
-       {"Card <A>, driver Driver 1.2, 8.0 GB of memory",
-        "rays are traced by its own units for them", "copies: 12.0 GB/s up, 11.0 GB/s down",
+       {"Card <A>, driver Driver 1.2, 8.0 GB of memory", "rays are traced by its hardware for rays",
+        "copies: 12.0 GB/s up, 11.0 GB/s down",
         "2000.0 million rays per second, 500.0 million shadow rays per second",
         "submissions 1, waits 1, allocations 0", "20.0 frames per second; the set asks for 25",
         "not measured: 1280x720, 8 samples, 5000 triangles, it would take about 30 s"})
@@ -88,7 +88,7 @@ TEST(BenchReport, IsAPageThatIsWholeAndEscapesNames) {
   EXPECT_THAT(page, HasSubstr("<h1>40.0 frames per second at 1920x1080</h1>"));
   EXPECT_THAT(page, HasSubstr("Card &lt;A&gt;"));
   EXPECT_THAT(page, Not(HasSubstr("Card <A>")));
-  EXPECT_THAT(page, HasSubstr("traced by its own units for them"));
+  EXPECT_THAT(page, HasSubstr("traced by its hardware for rays"));
   EXPECT_THAT(page, HasSubstr("all others"));
   EXPECT_THAT(bench_page(BenchReport{}), HasSubstr("Nothing was measured"));
 }

@@ -14,7 +14,8 @@ using render::Device;
 using render::Purpose;
 
 std::shared_ptr<Device> as_gpu() {
-  return render::open_device({.validation = true, .name = "", .as_gpu = true});
+  return render::open_device(
+      {.validation = true, .name = "", .as_gpu = true, .hardware_rays = false});
 }
 
 PFN_vkAllocateMemory& allocate_of(Device& device) {

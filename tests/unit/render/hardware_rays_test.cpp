@@ -123,6 +123,14 @@ TEST_F(HardwareRays, MeetNothingWhereThereIsNothing) {
   scene::Mesh broken = rectangle_mesh({1, 1});
   for (glm::vec3& position : broken.positions) position.x = std::nanf("");
   add(view.scene, broken, diffuse(glm::vec3(1)));
+  // Of this one a triangle is left, behind the camera.
+  scene::Mesh torn = rectangle_mesh({1, 1});
+  torn.positions.insert(torn.positions.end(), {{0, std::nanf(""), 0}, {1e30f, 0, 0}, {0, 1, 2}});
+  torn.normals.resize(torn.positions.size(), glm::vec3(0, 0, 1));
+  if (!torn.uvs.empty()) torn.uvs.resize(torn.positions.size());
+  torn.triangles = {{4, 0, 1}, {5, 0, 1}, {0, 1, 6}};
+  for (int i = 0; i < 4; ++i) torn.positions[static_cast<std::size_t>(i)].z = 2;
+  add(view.scene, torn, diffuse(glm::vec3(1)));
   add(view.scene, rectangle_mesh({1, 1}), diffuse(glm::vec3(1)), glm::dmat4(0.0));
   SetRenderer hardware(view, {}, set::LightSampling::importance, hardware_);
   EXPECT_EQ(mean(hardware.rendered_clean(1).mixed), glm::dvec3(0.25));
@@ -130,10 +138,18 @@ TEST_F(HardwareRays, MeetNothingWhereThereIsNothing) {
 
 TEST_F(HardwareRays, CanBeRefused) {
   EXPECT_FALSE(trees_->traces_in_hardware());
-  EXPECT_EQ(render::options_for({}, true).hardware_rays, true);
-  render::DeviceOptions refused;
-  refused.hardware_rays = false;
-  EXPECT_EQ(render::options_for(refused, true).hardware_rays, false);
+}
+
+// A set can refuse them, and the command line says more than a set. Nobody asks a CPU device for
+// them by a set.
+TEST(DeviceOptions, TakeFromASetThatItRefusesHardwareRays) {
+  EXPECT_EQ(render::options_for({}, true).hardware_rays, std::nullopt);
+  EXPECT_EQ(render::options_for({}, false).hardware_rays, false);
+  for (const bool asked : {false, true}) {
+    render::DeviceOptions options;
+    options.hardware_rays = asked;
+    EXPECT_EQ(render::options_for(options, !asked).hardware_rays, asked);
+  }
 }
 
 }  // namespace previz::test::hardware_rays_test

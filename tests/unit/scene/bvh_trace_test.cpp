@@ -21,6 +21,7 @@ class BvhTrace : public testing::TestWithParam<By> {
  protected:
   static void SetUpTestSuite() {
     render::DeviceOptions options{.validation = true, .name = ""};
+    options.hardware_rays = false;
     trees_ = std::make_unique<render::Device>(options);
     options.hardware_rays = true;
     hardware_ = std::make_unique<render::Device>(options);
