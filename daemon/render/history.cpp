@@ -157,7 +157,10 @@ MovedInstances History::moved() const {
 
 std::vector<gpu::GpuMotion> History::motions() const {
   const Frame &now = frames_[now_], &past = frames_[1 - now_];
-  std::vector<gpu::GpuMotion> result(std::max<std::size_t>(now.stances.size(), 1));
+  // Nothing deforms unless it is said below: there may be no memory for its points.
+  gpu::GpuMotion unknown{};
+  unknown.points = gpu::NO_INDEX;
+  std::vector<gpu::GpuMotion> result(std::max<std::size_t>(now.stances.size(), 1), unknown);
   if (!past.is_shown || past.stances.size() != now.stances.size()) return result;
   const glm::dvec3 camera_now(now.view.world_from_camera[3]);
   const glm::dvec3 camera_before(past.view.world_from_camera[3]);
@@ -175,7 +178,6 @@ std::vector<gpu::GpuMotion> History::motions() const {
       for (int c = 0; c < 4; ++c) is_finite &= std::isfinite(result[i].before_from_now[r][c]);
     const GpuScene::Stance &stance = now.stances[i], &before = past.stances[i];
     result[i].is_known = is_finite && are_comparable(stance, before) ? 1 : 0;
-    result[i].points = gpu::NO_INDEX;
     if (!before.deformed) continue;
     if (result[i].is_known == 1 && stance.deformed->shape != before.deformed->shape)
       result[i].points = points - stance.deformed->first_vertex;
