@@ -6,7 +6,8 @@
 #
 #   tests/run.sh              the gate: release asan format lint
 #   tests/run.sh full         the gate, with all tests in release, and then
-#                             bench lint-all long gpu_code debian13 asan-all tsan fuzz mutations soak package rig_vm
+#                             bench lint-all long gpu_code other_devices debian13 asan-all tsan fuzz mutations soak package
+#                             rig_vm
 #   tests/run.sh STEP...      only the named steps
 #
 #   release    builds everything but the benchmarks and soak, and runs the tests; in the gate without
@@ -19,6 +20,8 @@
 #   long       the cases that tests/*/CMakeLists.txt leave out of the gate (LONG), in the release build
 #   gpu_code   what the compilers of five GPUs make of the shaders: registers, spills, lanes
 #              (tests/gpu_code/run.sh)
+#   other_devices  the renderer's tests on other CPU drivers, and as if on four graphics cards
+#              (tests/other_devices/run.sh)
 #   debian13   builds, runs the tests and the demo, and installs the package in Debian 13
 #              (tests/debian13/run.sh)
 #   asan-all   every test program under ASan and UBSan, with two storms of five minutes (tests/storm)
@@ -31,7 +34,8 @@
 #   package    builds the .deb and installs it in a bare Debian (tests/package/run.sh)
 #   rig_vm     runs the drivers, then the package, on a rig in a VM, and brings faults upon it
 #              (tests/rig_vm/run.sh)
-# package needs root or user namespaces, rig_vm, gpu_code and debian13 need root, and all four the network.
+# package needs root or user namespaces, rig_vm, gpu_code and debian13 need root, and these four and
+# other_devices the network.
 #
 # A case may be skipped only if tests/skips.txt says why; any other skip is a failure.
 set -uo pipefail
@@ -42,8 +46,8 @@ gate=(release asan format lint)
 steps=("$@")
 gate_only=OFF
 [[ ${#steps[@]} -gt 0 ]] || { steps=("${gate[@]}") gate_only=ON; }
-[[ ${steps[*]} != full ]] || steps=("${gate[@]}" bench lint-all long gpu_code debian13 asan-all tsan fuzz
-  mutations soak package rig_vm)
+[[ ${steps[*]} != full ]] || steps=("${gate[@]}" bench lint-all long gpu_code other_devices debian13 asan-all
+  tsan fuzz mutations soak package rig_vm)
 failures=()
 summaries=()
 costs=()
@@ -150,10 +154,11 @@ for name in "${steps[@]}"; do
     lint) check "lint" tests/lint/run.sh ;;
     lint-all) check "lint-all" tests/lint/run.sh all ;;
     bench | fuzz | soak) check "$name" "$name" ;;
-    mutations | package | rig_vm | gpu_code | debian13) check "$name" "tests/$name/run.sh" ;;
+    mutations | package | rig_vm | gpu_code | other_devices | debian13) check "$name" "tests/$name/run.sh" ;;
     *)
       echo "tests/run.sh: no step '$name'; allowed: full, or of release, asan, format, lint," \
-        "bench, lint-all, long, gpu_code, debian13, asan-all, tsan, fuzz, mutations, soak, package and rig_vm" >&2
+        "bench, lint-all, long, gpu_code, other_devices, debian13, asan-all, tsan, fuzz, mutations, soak," \
+        "package and rig_vm" >&2
       exit 2
       ;;
   esac
