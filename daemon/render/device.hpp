@@ -164,13 +164,13 @@ class Device {
   const DeviceOptions options_;
   vk::raii::Context context_;
   std::atomic<std::uint64_t> validation_messages_ = 0;
-  bool has_labels_ = false;
   std::atomic<std::uint64_t> made_buffers_ = 0, made_programs_ = 0;
   std::atomic<std::uint64_t> awaited_programs_ = 0, ahead_programs_ = 0;
   vk::raii::Instance instance_{nullptr};
   vk::raii::DebugUtilsMessengerEXT messenger_{nullptr};
   vk::raii::PhysicalDevice physical_{nullptr};
   std::uint32_t queue_family_ = 0;
+  std::uint32_t mapped_types_ = 0;
   std::string name_;
   std::optional<CardIdentity> card_;
   vk::PhysicalDeviceLimits limits_;
@@ -178,10 +178,10 @@ class Device {
   vk::DeviceSize scratch_alignment_ = 0;  // 0: rays are not traced in hardware
   bool is_cpu_ = false;
   bool lanes_meet_ = false;
-  std::uint32_t mapped_types_ = 0;
+  bool has_labels_ = false;
   bool had_gpu_ = false;  // since it was first opened
-  std::vector<std::string> missing_drivers_;
   bool missing_is_said_ = false;
+  std::vector<std::string> missing_drivers_;
   mutable std::mutex drawing_mutex_;
   Drawing drawing_;
   vk::raii::Device device_{nullptr};
