@@ -4,13 +4,14 @@
 # With may_refuse a failed case counts as refused if every one of its failures says that the device is too small.
 function end_of_program() {
   if (open == "") return
-  printf "  FAILED: %s: the program ended within it\n", open
+  printf "  FAILED: %s: the program ended within it%s\n", open, why
   failed++
   open = ""
 }
 
 FNR == 1 { end_of_program() }
-/^\[ RUN      \]/ { open = $4; wrong = 0; too_small = 0 }
+/^\[ RUN      \]/ { open = $4; wrong = 0; too_small = 0; why = "" }
+/^guard_pages: / { why = "; " $0 }
 /: Failure$|^unknown file: Failure/ { wrong++ }
 / allows 65536|65536 pixels that the Vulkan device can address/ { too_small++; words = $0 }
 /^\[       OK \] .* ms\)$/ { passed++; open = "" }
