@@ -10,8 +10,8 @@
 #include "shaders/lib/denoise.glsl"
 
 // denoise_guide.comp makes the guide; w: its variance, the mean over the channels.
-uniform textureBuffer guides;
-uniform textureBuffer reals;  // mean(Lr), over white and albedo, gets the signal's weights
+PREVIZ_FETCHED(vec4, guides)
+PREVIZ_FETCHED(vec4, reals)  // mean(Lr), over white and albedo, gets the signal's weights
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
 layout(scalar) writeonly buffer DenoisedReals { vec4 denoised_reals[]; };
@@ -57,7 +57,7 @@ void main() {
   if (index >= denoise.width * denoise.height) return;
   const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
   const Pixel here = load_pixel(at);
-  const vec4 guide = texelFetch(guides, int(index));
+  const vec4 guide = fetch(guides, int(index));
   // The guide lies between pixels, and does not see what is finer than its step. Where pixels know
   // their variance, their values show that.
   const float fall = pow(float(denoise.step), FALL_WITH_STEP);
@@ -81,7 +81,7 @@ void main() {
       if (x != 0 || y != 0) {
         if (!are_alike(here, there, off)) continue;
         const float foretold = here.inverse_depth + dot(slope, vec2(off));
-        float distance = guide_distance(guide, texelFetch(guides, pixel_index(at + off)), guide_scale) +
+        float distance = guide_distance(guide, fetch(guides, pixel_index(at + off)), guide_scale) +
                          surface_distance(here, there, foretold);
         if (denoise.single_sample == 0u)
           distance += value_distance(here, there, value_scale);
@@ -92,7 +92,7 @@ void main() {
       overlap += weight * there.overlap;
       total += weight;
       squares += weight * weight;
-      if (has_companions) real += weight * texelFetch(reals, pixel_index(at + off)).rgb;
+      if (has_companions) real += weight * fetch(reals, pixel_index(at + off)).rgb;
     }
   overlap /= total;
   if (denoise.step > 1u) overlap *= pow(total * total / squares, 1.0 - OVERLAP_POWER);

@@ -8,7 +8,7 @@
 
 #include "shaders/lib/denoise.glsl"
 
-uniform textureBuffer caustics;  // over white; variance
+PREVIZ_FETCHED(vec4, caustics)  // over white; variance
 layout(scalar) writeonly buffer DenoisedCaustics { vec4 denoised_caustics[]; };
 
 // A neighbour's weight has fallen to 1 / e where it is off by so many standard deviations.
@@ -21,7 +21,7 @@ void main() {
   if (index >= denoise.width * denoise.height) return;
   const ivec2 at = ivec2(index % denoise.width, index / denoise.width);
   const Pixel here = load_pixel(at);
-  const vec4 own = texelFetch(caustics, int(index));
+  const vec4 own = fetch(caustics, int(index));
   const vec2 slope = inverse_depth_slopes(at, here.inverse_depth);
   vec3 sum = vec3(0.0);
   float variance = 0.0;
@@ -32,7 +32,7 @@ void main() {
       if (!is_inside(at + off)) continue;
       const Pixel there = load_pixel(at + off);
       if (!are_alike(here, there, off)) continue;
-      const vec4 other = texelFetch(caustics, pixel_index(at + off));
+      const vec4 other = fetch(caustics, pixel_index(at + off));
       const vec3 by = other.rgb - own.rgb;
       const float foretold = here.inverse_depth + dot(slope, vec2(off));
       const float noise = NOISE_SCALE * NOISE_SCALE * (own.w + other.w) + LEAST_VARIANCE;

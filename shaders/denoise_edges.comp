@@ -12,11 +12,11 @@
 
 // An edge has the uncovered part of its change here, over white and albedo. An outline that is mixed anew
 // has its other side, over white, and the number of samples of that.
-uniform textureBuffer uncovered;
-uniform textureBuffer reals;
-uniform textureBuffer albedos;  // RGBA16F
+PREVIZ_FETCHED(vec4, uncovered)
+PREVIZ_FETCHED(vec4, reals)
+PREVIZ_FETCHED_HALVES(albedos)
 // The light of photons, over white, is here with has_caustics; no level has seen it. An edge's is in its signal.
-uniform textureBuffer caustics;
+PREVIZ_FETCHED(vec4, caustics)
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
 layout(scalar) writeonly buffer DenoisedUncovered { vec4 denoised_uncovered[]; };
@@ -31,10 +31,10 @@ struct Parts {
   vec3 uncovered;  // mean((1 - M)(Lm - Lr))
 };
 
-vec3 albedo_at(ivec2 at) { return texelFetch(albedos, pixel_index(at)).rgb; }
+vec3 albedo_at(ivec2 at) { return fetch(albedos, pixel_index(at)).rgb; }
 
 vec3 caustic_at(ivec2 at) {
-  return denoise.has_caustics != 0u ? texelFetch(caustics, pixel_index(at)).rgb : vec3(0.0);
+  return denoise.has_caustics != 0u ? fetch(caustics, pixel_index(at)).rgb : vec3(0.0);
 }
 
 // Returns the pixel with its albedo and with the light of photons.
@@ -51,7 +51,7 @@ Parts load_parts(ivec2 at) {
   p.pixel = load_lit(at);
   p.uncovered = p.pixel.signal;
   if (is_edge(p.pixel))
-    p.uncovered = min(texelFetch(uncovered, pixel_index(at)).rgb * albedo_at(at), DENOISE_MOST_WHITES);
+    p.uncovered = min(fetch(uncovered, pixel_index(at)).rgb * albedo_at(at), DENOISE_MOST_WHITES);
   else if (p.pixel.cover == 1.0)
     p.uncovered = vec3(0.0);
   p.covered = p.pixel.signal - p.uncovered;
@@ -137,12 +137,12 @@ void mix_edge(ivec2 at, Parts here, inout Shown shown) {
 const float HALF_KNOWING = 8.0;
 
 // Returns the share that rays have found, or less than 0 where they have found none.
-float found_at(ivec2 at) { return texelFetch(albedos, pixel_index(at)).w - 1.0; }
+float found_at(ivec2 at) { return fetch(albedos, pixel_index(at)).w - 1.0; }
 
 // Returns the mean of an outline's own samples of its other side; the fourth component is how far they know
 // it, from 0 to 1.
 vec4 kept_other(ivec2 at) {
-  const vec4 kept = texelFetch(uncovered, pixel_index(at));
+  const vec4 kept = fetch(uncovered, pixel_index(at));
   return vec4(min(kept.rgb, DENOISE_MOST_WHITES), kept.w / (kept.w + HALF_KNOWING));
 }
 
@@ -155,7 +155,7 @@ vec4 other_around(ivec2 at, float own_cover) {
       const ivec2 there = at + ivec2(x, y);
       if (!is_inside(there) || (x == 0 && y == 0)) continue;
       const float near = 1.0 / (1.0 + float(x * x + y * y));
-      const float cover = texelFetch(surfaces, pixel_index(there)).w;
+      const float cover = fetch(surfaces, pixel_index(there)).w;
       if (cover == 1.0 - own_cover) {
         sum += near * vec4(load_lit(there).signal, 1.0);
       } else if (cover == own_cover && found_at(there) >= 0.0) {
@@ -198,5 +198,5 @@ void main() {
   denoised_variances[index] = shown.variance;
   if (denoise.has_companions == 0u) return;
   denoised_uncovered[index] = vec4(shown.uncovered, 0.0);
-  denoised_reals[index] = vec4(texelFetch(reals, int(index)).rgb * albedo_at(at), 0.0);
+  denoised_reals[index] = vec4(fetch(reals, int(index)).rgb * albedo_at(at), 0.0);
 }

@@ -8,7 +8,7 @@
 
 #include "shaders/lib/denoise.glsl"
 
-uniform textureBuffer albedos;  // w: 0, or 1 and more at an outline that is mixed anew
+PREVIZ_FETCHED_HALVES(albedos)  // w: 0, or 1 and more at an outline that is mixed anew
 // The levels of the transform read these.
 layout(scalar) writeonly buffer DenoisedSignals { vec4 denoised_signals[]; };
 layout(scalar) writeonly buffer DenoisedVariances { vec4 denoised_variances[]; };
@@ -65,7 +65,7 @@ vec3 variance_with_history(ivec2 at, Pixel here) {
     return vec3(DENOISE_MOST_WHITES * DENOISE_MOST_WHITES);
   if (here.overlap >= LEAST_KNOWING) {
     const float evenness = min(here.overlap / LEAST_KNOWING - 1.0, 1.0);
-    const bool is_outline = texelFetch(albedos, pixel_index(at)).w > 0.0;
+    const bool is_outline = fetch(albedos, pixel_index(at)).w > 0.0;
     const float least = is_outline ? LEFT_AT_OUTLINES : LEFT_BY_EVENNESS;
     const float left = here.cover > 0.0 ? 1.0 : mix(1.0, least, evenness);
     return left * max(here.variance, mean_variance(at, here));

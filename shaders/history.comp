@@ -6,9 +6,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_samplerless_texture_functions : require
 
-#include "shaders/lib/halves.glsl"
+#include "shaders/lib/fetch.glsl"
 #include "shaders/lib/history.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
@@ -29,13 +28,13 @@ layout(scalar) readonly buffer Befores { vec2 befores[]; };
 layout(scalar) readonly buffer BentPlaces { vec3 bent_places[]; };
 layout(scalar) readonly buffer Covers { float covers[]; };
 // The history up to the frame before, of its picture.
-uniform textureBuffer past_places;
-uniform utextureBuffer past_things;
-uniform textureBuffer past_lights;
-uniform utextureBuffer past_spreads;
-uniform utextureBuffer past_albedos;
-uniform utextureBuffer past_others;
-uniform utextureBuffer past_caustics;
+PREVIZ_FETCHED(vec4, past_places)
+PREVIZ_FETCHED(uvec2, past_things)
+PREVIZ_FETCHED(vec4, past_lights)
+PREVIZ_FETCHED(uvec2, past_spreads)
+PREVIZ_FETCHED(uvec2, past_albedos)
+PREVIZ_FETCHED(uvec2, past_others)
+PREVIZ_FETCHED(uvec2, past_caustics)
 // The history up to this frame. Four halves each, but for the light.
 layout(scalar) writeonly buffer KeptLights { vec4 kept_lights[]; };     // own: change over white and albedo;
                                                                         // 1 / samples, or 0: none yet
@@ -112,7 +111,7 @@ bool is_partly(float mask) { return mask > 0.0 && mask < 1.0; }
 
 bool is_same_surface(int index, uint normal, Wanted wanted) {
   if (wanted.is_loose) return true;
-  const vec3 off = texelFetch(past_places, index).xyz - wanted.position;
+  const vec3 off = fetch(past_places, index).xyz - wanted.position;
   return abs(dot(off, wanted.normal)) <= MOST_OFF_PLANE * length(wanted.position) &&
          dot(geometric_of(normal), wanted.normal) >= LEAST_ALIKE;
 }
@@ -125,9 +124,9 @@ bool is_same_thing(uint thing, Wanted wanted) {
 int own_index(ivec2 at, Wanted wanted) {
   if (!is_inside(at, history.width_before, history.height_before)) return -1;
   const int index = at.y * int(history.width_before) + at.x;
-  const uvec2 thing = texelFetch(past_things, index).xy;
+  const uvec2 thing = fetch(past_things, index);
   if (!is_same_thing(thing.x, wanted) || !is_same_surface(index, thing.y, wanted)) return -1;
-  return texelFetch(past_lights, index).w > 0.0 ? index : -1;
+  return fetch(past_lights, index).w > 0.0 ? index : -1;
 }
 
 // Returns how far the places that a mirror shows are apart from a pixel to the next, along one axis.
@@ -169,7 +168,7 @@ bool find_in_mirror(ivec2 at, inout Wanted wanted) {
     const int index = own_index_near(ivec2(floor(wanted.at + 0.5)), wanted);
     if (index < 0) return false;
     const vec2 there = vec2(index % int(history.width_before), index / int(history.width_before));
-    const vec3 off = wanted.position - texelFetch(past_places, index).xyz;
+    const vec3 off = wanted.position - fetch(past_places, index).xyz;
     const float x = dot(off, slope_x), y = dot(off, slope_y);
     const vec2 step = vec2(yy * x - xy * y, xx * y - xy * x) / determinant;
     wanted.at = there + clamp(step, -LONGEST_STEP, LONGEST_STEP);
@@ -211,13 +210,13 @@ bool find_before(ivec2 at, ivec2 source, bool in_mirrors, out Wanted wanted) {
   return true;
 }
 
-vec3 past_albedo(int index) { return unpack_halves(texelFetch(past_albedos, index).xy); }
+vec3 past_albedo(int index) { return unpack_halves(fetch(past_albedos, index)); }
 
 // Returns a pixel's own side with its light over `albedo`, if that is known.
 Own load_own(int index, vec3 albedo) {
-  const vec4 light = texelFetch(past_lights, index);
-  const vec4 spread = unpack_four_halves(texelFetch(past_spreads, index).xy);
-  const vec4 caustic = history.white_ratio * unpack_four_halves(texelFetch(past_caustics, index).xy);
+  const vec4 light = fetch(past_lights, index);
+  const vec4 spread = unpack_four_halves(fetch(past_spreads, index));
+  const vec4 caustic = history.white_ratio * unpack_four_halves(fetch(past_caustics, index));
   const vec3 kept = past_albedo(index);
   vec3 factor = vec3(history.white_ratio);
   if (is_known(albedo) && !is_known(kept)) factor /= albedo;
@@ -231,17 +230,17 @@ Own load_own(int index, vec3 albedo) {
 bool load_other(ivec2 at, float of, Wanted wanted, out Other other) {
   if (!is_inside(at, history.width_before, history.height_before)) return false;
   const int index = at.y * int(history.width_before) + at.x;
-  const uint thing = texelFetch(past_things, index).x;
+  const uint thing = fetch(past_things, index).x;
   const float side = class_of(thing);
   if (side == of) {
-    const vec4 light = texelFetch(past_lights, index);
+    const vec4 light = fetch(past_lights, index);
     if (!is_same_thing(thing, wanted) || !(light.w > 0.0)) return false;
     const Own own = load_own(index, vec3(0.0));
     other = Other((is_known(own.albedo) ? own.albedo : vec3(1.0)) * own.light + own.caustic.rgb,
                   1.0 / light.w);
     return true;
   }
-  const vec4 kept = unpack_four_halves(texelFetch(past_others, index).xy);
+  const vec4 kept = unpack_four_halves(fetch(past_others, index));
   other = Other(history.white_ratio * kept.rgb, abs(kept.w));
   return side == 1.0 - of && other.samples > 0.0;
 }
@@ -438,7 +437,7 @@ bool was_thin(Wanted wanted) {
   const ivec2 at = ivec2(floor(wanted.at + 0.5));
   if (!is_inside(at, history.width_before, history.height_before)) return false;
   const int index = at.y * int(history.width_before) + at.x;
-  return unpack_four_halves(texelFetch(past_others, index).xy).w < 0.0;
+  return unpack_four_halves(fetch(past_others, index)).w < 0.0;
 }
 
 // The sides of a pixel by this frame's samples alone.

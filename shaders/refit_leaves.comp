@@ -2,16 +2,16 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
-#extension GL_EXT_samplerless_texture_functions : require
 
+#include "shaders/lib/fetch.glsl"
 #include "shaders/lib/refit.glsl"
 
-uniform textureBuffer vertices;  // see lib/scene.glsl
+PREVIZ_FETCHED(vec4, vertices)  // see lib/scene.glsl
 layout(scalar) readonly buffer RefitLeaves { GpuRefitLeaf refit_leaves[]; };
 
 // Returns a vertex in grid space; the scale is a power of two, so it is exact.
 vec3 grid_vertex(uint vertex) {
-  return texelFetch(vertices, int(2u * (refit.first_vertex + vertex))).xyz * refit.scale;
+  return fetch(vertices, int(2u * (refit.first_vertex + vertex))).xyz * refit.scale;
 }
 
 void main() {

@@ -187,6 +187,7 @@ Buffer create_indirect_buffer(Device& device, vk::DeviceSize size) {
 Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format,
                            bool is_storage) {
   using Usage = vk::BufferUsageFlagBits;
+  if (device.reads_storage()) return create_storage_buffer(device, size);
   check_buffer(device, {size, size / texel_bytes_of(format), is_storage});
   Buffer result =
       create_device_buffer(device, size, Usage::eUniformTexelBuffer | Usage::eStorageBuffer);

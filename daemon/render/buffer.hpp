@@ -64,8 +64,9 @@ class Purpose {
 // does not allow so large a buffer or has no memory for it.
 Buffer create_storage_buffer(Device& device, vk::DeviceSize size);
 Buffer create_indirect_buffer(Device& device, vk::DeviceSize size);
-// Creates a buffer that shaders read as texels. It is written by uploads, or with `is_storage` by
-// shaders, for which a device may allow less.
+// Creates a buffer that shaders fetch from (shaders/lib/fetch.glsl), as texels where the device
+// reads texels. It is written by uploads, or with `is_storage` by shaders, for which a device may
+// allow less.
 Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format,
                            bool is_storage = false);
 

@@ -22,8 +22,8 @@ void CameraMap::resize(std::uint32_t pixels) {
 }
 
 std::span<const Pass> CameraMap::passes() {
-  static constexpr Pass all[] = {{"camera_measured", camera_measured_spv, false},
-                                 {"camera_depth", camera_depth_spv, true, camera_depth_query_spv},
+  static constexpr Pass all[] = {{"camera_measured", camera_measured_spv},
+                                 {"camera_depth", camera_depth_spv, camera_depth_query_spv},
                                  {"camera_usable", camera_usable_spv}};
   return all;
 }

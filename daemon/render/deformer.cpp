@@ -85,9 +85,9 @@ Purpose Deformer::for_deformation() const {
 void Deformer::upload(std::vector<Place> places) {
   if (meshes_.empty()) return;
   if (!has_kernels_) {
-    deform_ = Kernel(device_, "deform", deform_spv);
-    refit_leaves_ = Kernel(device_, "refit_leaves", refit_leaves_spv);
-    refit_nodes_ = Kernel(device_, "refit_nodes", refit_nodes_spv);
+    deform_ = Kernel(device_, Pass{"deform", deform_spv}, 0);
+    refit_leaves_ = Kernel(device_, Pass{"refit_leaves", refit_leaves_spv}, 0);
+    refit_nodes_ = Kernel(device_, Pass{"refit_nodes", refit_nodes_spv}, 0);
     has_kernels_ = true;
   }
   std::uint32_t boxes = 0;

@@ -51,11 +51,11 @@ Denoiser::Denoiser(Device& device, std::size_t most_pixels)
 }
 
 std::span<const Pass> Denoiser::passes() {
-  static constexpr Pass all[] = {{"denoise_variance", denoise_variance_spv, false},
-                                 {"denoise_guide", denoise_guide_spv, false},
-                                 {"denoise", denoise_spv, false},
-                                 {"denoise_caustics", denoise_caustics_spv, false},
-                                 {"denoise_edges", denoise_edges_spv, false}};
+  static constexpr Pass all[] = {{"denoise_variance", denoise_variance_spv},
+                                 {"denoise_guide", denoise_guide_spv},
+                                 {"denoise", denoise_spv},
+                                 {"denoise_caustics", denoise_caustics_spv},
+                                 {"denoise_edges", denoise_edges_spv}};
   return all;
 }
 

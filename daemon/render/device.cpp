@@ -537,9 +537,11 @@ void keep_programs(Device& device) {
 }
 
 PictureMemory memory_of(const Device& device) {
-  return {.bytes = device.memory_bytes(),
-          .texels = device.limits().maxTexelBufferElements,
-          .read_back = device.shares_host_memory()};
+  const DeviceLimits& allows = device.allows();
+  return {
+      .bytes = device.memory_bytes(),
+      .pixels = device.reads_storage() ? allows.storage_bytes / whole_pixel_bytes : allows.texels,
+      .read_back = device.shares_host_memory()};
 }
 
 DeviceTimes take_times(Device& device) {

@@ -33,6 +33,9 @@ inline constexpr vk::ImageUsageFlags card_picture_usage =
 
 class Device {
  public:
+  // A CPU device reads texels where it addresses so many, of 256 MiB; Vulkan guarantees 65536.
+  static constexpr std::uint32_t enough_texels = 1 << 24;
+
   // Throws previz::Error saying what is missing and which devices were found.
   explicit Device(DeviceOptions options);
   ~Device();
@@ -64,6 +67,11 @@ class Device {
   // Returns whether the host works in the device's own memory; otherwise it uploads and downloads
   // by copies, and the device is wide enough to have many samples in flight.
   bool shares_host_memory() const { return is_cpu_ && !options_.as_gpu; }
+  // Returns whether what many invocations read at random is read as storage, rather than as texels
+  // (shaders/lib/fetch.glsl).
+  bool reads_storage() const {
+    return !shares_host_memory() || limits_.maxTexelBufferElements < enough_texels;
+  }
   // Returns a bit for each type of the device's own memory that the host can write: of a graphics
   // card that is part of the processor. Reading it may be slow.
   std::uint32_t mapped_types() const { return mapped_types_; }

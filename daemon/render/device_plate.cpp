@@ -96,8 +96,8 @@ bool may_yuv_be_at_least(const Frame& frame, std::uint32_t least) {
 }  // namespace
 
 std::span<const Pass> DevicePlate::passes() {
-  static constexpr Pass all[] = {{"plate_codes", plate_codes_spv, false},
-                                 {"plate_scale", plate_scale_spv, false}};
+  static constexpr Pass all[] = {{"plate_codes", plate_codes_spv},
+                                 {"plate_scale", plate_scale_spv}};
   return all;
 }
 

@@ -37,10 +37,10 @@ bool are_comparable(const GpuScene::Stance& a, const GpuScene::Stance& b) {
 // could not do a picture of 3840x2160 in one.
 constexpr std::uint32_t most_pixels_at_once = 1u << 21;
 
-constexpr Pass show_pass{"history_show", history_show_spv, false};
+constexpr Pass show_pass{"history_show", history_show_spv};
 constexpr Pass frame_passes[] = {
-    {"history_surface", history_surface_spv, true, history_surface_query_spv},
-    {"history_cover", history_cover_spv, true, history_cover_query_spv},
+    {"history_surface", history_surface_spv, history_surface_query_spv},
+    {"history_cover", history_cover_spv, history_cover_query_spv},
     {"history", history_spv}};
 
 double frames_after(double change) {

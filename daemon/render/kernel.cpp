@@ -34,8 +34,8 @@ vk::DescriptorType descriptor_of(BufferKind kind) {
 }
 
 std::shared_ptr<const Program> compile(const Device& device, const std::string& name,
-                                       const SpirvInfo& info,
                                        const std::vector<std::uint32_t>& spirv) {
+  const SpirvInfo info = describe_spirv(spirv);
   if (const auto past = past_limits(device.allows(), info, Push::most_bytes))
     throw Error("Vulkan: pass \"" + name + "\" needs " + past->asked + ", but " + device.name() +
                 " allows " + std::to_string(past->allowed));
@@ -77,41 +77,40 @@ const std::vector<std::uint32_t>& specialised(std::span<const std::uint32_t> spi
   return modules.try_emplace(key, std::move(module)).first->second;
 }
 
-std::uint32_t device_bits(const Device& device) {
-  return (device.shares_host_memory() ? 0 : gpu::DEVICE_IS_CARD) |
-         (device.lanes_meet() ? gpu::DEVICE_LANES_MEET : 0);
-}
-
-std::vector<std::uint32_t> values_of(const Pass& pass, std::uint32_t features,
-                                     std::uint32_t device) {
-  if (!pass.has_features) return {};
-  return {features, device};
-}
-
 std::vector<std::uint32_t> as_for(std::uint32_t device, const std::vector<std::uint32_t>& module) {
   return (device & gpu::DEVICE_LANES_MEET) != 0 ? with_uniform_subgroups(module) : module;
+}
+
+// Leaves out the features that the module does not ask about.
+std::vector<std::uint32_t> asked_values(std::span<const std::uint32_t> spirv,
+                                        std::vector<std::uint32_t> constants) {
+  if (!constants.empty()) constants.front() &= describe_spirv(spirv).asked_bits;
+  return constants;
 }
 
 // A pass with the constants that it reads something of, and the way to compile it.
 struct ToCompile {
   ToCompile(const Device& device, const Pass& pass, std::vector<std::uint32_t> constants)
-      : spirv(pass.spirv_for(device)), info(describe_spirv(spirv)), values(std::move(constants)) {
-    if (!values.empty()) values.front() &= info.asked_bits;
+      : spirv(pass.spirv_for(device)), values(asked_values(spirv, std::move(constants))) {
     compile_now = [this, &device, &pass] {
-      return compile(device, pass.name, info,
-                     as_for(device_bits(device), specialised(spirv, values)));
+      return compile(device, pass.name, as_for(device_bits(device), specialised(spirv, values)));
     };
   }
   ToCompile(const ToCompile&) = delete;
   ToCompile& operator=(const ToCompile&) = delete;
 
   const std::span<const std::uint32_t> spirv;
-  const SpirvInfo info;
-  std::vector<std::uint32_t> values;
+  const std::vector<std::uint32_t> values;
   std::function<std::shared_ptr<const Program>()> compile_now;
 };
 
 }  // namespace
+
+std::uint32_t device_bits(const Device& device) {
+  return (device.shares_host_memory() ? 0 : gpu::DEVICE_IS_CARD) |
+         (device.lanes_meet() ? gpu::DEVICE_LANES_MEET : 0) |
+         (device.reads_storage() ? gpu::DEVICE_READS_STORAGE : 0);
+}
 
 Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> spirv,
                std::initializer_list<std::uint32_t> constants)
@@ -121,7 +120,7 @@ Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> 
 
 Kernel::Kernel(Device& device, const Pass& pass, std::uint32_t features)
     : device_(&device), name_(pass.name) {
-  use(pass, values_of(pass, features, device_bits(device)));
+  use(pass, {features, device_bits(device)});
 }
 
 void Kernel::use(const Pass& pass, std::vector<std::uint32_t> constants) {
@@ -139,13 +138,11 @@ void make_kernels(std::initializer_list<Kernel*> kernels, Device& device,
 
 std::vector<std::uint32_t> module_of(const Pass& pass, std::uint32_t features,
                                      std::uint32_t device) {
-  std::vector<std::uint32_t> values = values_of(pass, features, device);
-  if (!values.empty()) values.front() &= describe_spirv(pass.spirv).asked_bits;
-  return as_for(device, specialised(pass.spirv, values));
+  return as_for(device, specialised(pass.spirv, asked_values(pass.spirv, {features, device})));
 }
 
 void compile_ahead(Device& device, const Pass& pass, std::uint32_t features) {
-  const ToCompile wanted(device, pass, values_of(pass, features, device_bits(device)));
+  const ToCompile wanted(device, pass, {features, device_bits(device)});
   device.program_ahead(wanted.spirv.data(), wanted.values, wanted.compile_now);
 }
 

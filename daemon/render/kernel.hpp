@@ -18,7 +18,7 @@
 namespace previz::render {
 
 // Maps the names of the shaders' variables to buffers. A pass takes those that it declares and
-// uses.
+// uses; what it fetches it takes by the name that it fetches it by (shaders/lib/fetch.glsl).
 using Buffers = std::map<std::string_view, const Buffer*>;
 
 // The push constants of a dispatch: a structure of shaders/lib/render_shared.h.
@@ -52,12 +52,11 @@ struct Program {
   vk::raii::Pipeline pipeline{nullptr};
 };
 
-// A pass has what its kernel is made of.
+// A pass has what its kernel is made of. Its specialisation constant 0 has the FEATURE_* bits, and
+// 1 the device's DEVICE_* bits.
 struct Pass {
   const char* name;
   std::span<const std::uint32_t> spirv;  // static
-  bool has_features = true;  // specialisation constant 0 has the FEATURE_* bits, and 1 the
-                             // device's DEVICE_* bits; otherwise no constant is set
   // The same pass for a device that traces rays in hardware; empty: it traces none.
   std::span<const std::uint32_t> query = {};
 
@@ -110,6 +109,9 @@ class Kernel {
 // Makes each of the kernels of the pass in its place.
 void make_kernels(std::initializer_list<Kernel*> kernels, Device& device,
                   std::span<const Pass> passes, std::uint32_t features = 0);
+
+// Returns what the device is, as DEVICE_* bits.
+std::uint32_t device_bits(const Device& device);
 
 // Returns the SPIR-V that a driver gets for a pass: without what the features switch off, and as it
 // is for a device with these DEVICE_* bits.

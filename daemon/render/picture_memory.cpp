@@ -67,8 +67,8 @@ std::uint64_t picture_bytes(int width, int height, bool read_back) {
 void refuse_too_large(int width, int height, const PictureMemory& memory) {
   const std::string picture = "a picture of " + size_words(width, height);
   if (width < 1 || height < 1) throw Error(picture + " has no pixel");
-  if (rays_of(width, height) > memory.texels)
-    throw Error(picture + " exceeds the " + std::to_string(memory.texels) +
+  if (rays_of(width, height) > memory.pixels)
+    throw Error(picture + " exceeds the " + std::to_string(memory.pixels) +
                 " pixels that the Vulkan device can address; make it smaller");
   const std::uint64_t bytes = picture_bytes(width, height, memory.read_back);
   if (bytes > memory.bytes)

@@ -66,9 +66,8 @@ Presenter::Presenter(Device& device, const lighting::Response& response)
 }
 
 std::span<const Pass> Presenter::passes() {
-  static constexpr Pass all[] = {{"composite", composite_spv, false},
-                                 {"present", present_spv, false},
-                                 {"scan_out", scan_out_spv, false}};
+  static constexpr Pass all[] = {
+      {"composite", composite_spv}, {"present", present_spv}, {"scan_out", scan_out_spv}};
   return all;
 }
 

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <iterator>
 #include <spirv-tools/optimizer.hpp>
+#include <string_view>
 #include <unordered_map>
 #include <utility>
 
@@ -40,6 +41,7 @@ constexpr std::uint32_t mode_local_size = 17, mode_local_size_id = 38;
 constexpr std::uint32_t mode_subgroup_uniform_control_flow = 4421;
 constexpr std::uint32_t capability_group_non_uniform = 61;
 constexpr std::uint32_t decoration_spec_id = 1, decoration_binding = 33;
+constexpr std::string_view fetched_suffix = "_storage";  // shaders/lib/fetch.glsl
 constexpr std::uint32_t storage_uniform_constant = 0, storage_storage_buffer = 12;
 
 // Everything that a module says about one of its ids.
@@ -94,8 +96,8 @@ std::uint32_t asked_bits(std::span<const std::uint32_t> spirv, const std::vector
 }  // namespace
 
 // A variable's name is its own or, where a block without an instance name declares it, that of the
-// block's first member. Variables that are declared in a header and not used here have no binding
-// of their own: the compiler leaves all of them at 0.
+// block's first member, without the suffix of what is fetched. Variables that are declared in a
+// header and not used here have no binding of their own: the compiler leaves all of them at 0.
 SpirvInfo describe_spirv(std::span<const std::uint32_t> spirv) {
   SpirvInfo info;
   std::vector<SpirvId> ids(spirv[3]);
@@ -150,12 +152,13 @@ SpirvInfo describe_spirv(std::span<const std::uint32_t> spirv) {
     const bool is_storage = variable.storage == storage_storage_buffer;
     if (!variable.is_used || !(is_storage || variable.storage == storage_uniform_constant))
       continue;
-    const char* own = variable.name;
     const SpirvId& type = ids[ids[variable.type].pointee];
+    std::string_view name = *variable.name != 0 ? variable.name : type.first_member;
+    if (name.ends_with(fetched_suffix)) name.remove_suffix(fetched_suffix.size());
     const BufferKind kind = is_storage                       ? BufferKind::storage
                             : type.is_acceleration_structure ? BufferKind::acceleration_structure
                                                              : BufferKind::texels;
-    info.bindings.push_back({*own != 0 ? own : type.first_member, variable.binding, kind});
+    info.bindings.push_back({std::string(name), variable.binding, kind});
   }
   info.asked_bits = asked_bits(spirv, ids, feature_id);
   return info;

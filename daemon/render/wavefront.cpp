@@ -37,10 +37,10 @@ constexpr double least_photon_radius = 1e-15, most_photon_radius = 0.5;
 
 constexpr Pass path_passes[] = {{"generate", generate_spv},
                                 {"advance", advance_spv},
-                                {"extend", extend_spv, true, extend_query_spv},
+                                {"extend", extend_spv, extend_query_spv},
                                 {"shade", shade_spv},
                                 {"prepare_shadow", prepare_shadow_spv},
-                                {"shadow", shadow_spv, true, shadow_query_spv},
+                                {"shadow", shadow_spv, shadow_query_spv},
                                 {"accumulate", accumulate_spv}};
 
 std::uint32_t round_up(std::uint32_t value, std::uint32_t to) {

@@ -2,12 +2,13 @@
 #ifndef PREVIZ_ALBEDO_TABLE_GLSL
 #define PREVIZ_ALBEDO_TABLE_GLSL
 
+#include "shaders/lib/fetch.glsl"
 #include "shaders/lib/render_shared.h"
 
-// R32F, tables of ALBEDO_SIDE^2: the reflection's, that of sheen if any surface has some, then for
+// Tables of ALBEDO_SIDE^2: the reflection's, that of sheen if any surface has some, then for
 // each rough glass one seen from outside and one from inside, and for each anisotropic metal
 // ANISOTROPIC_TABLES.
-uniform textureBuffer albedo;
+PREVIZ_FETCHED(float, albedo)
 
 // Looks up a table bilinearly; `place` is the column and the row, each from 0 to 1.
 float interpolate_albedo(uint table, vec2 place) {
@@ -17,10 +18,8 @@ float interpolate_albedo(uint table, vec2 place) {
   const vec2 f = at - low;
   const int first = int(table * ALBEDO_SIDE * ALBEDO_SIDE + uint(low.y) * ALBEDO_SIDE + uint(low.x));
   const int side = int(ALBEDO_SIDE);
-  const float below =
-      mix(texelFetch(albedo, first).r, texelFetch(albedo, first + 1).r, f.x);
-  const float above =
-      mix(texelFetch(albedo, first + side).r, texelFetch(albedo, first + side + 1).r, f.x);
+  const float below = mix(fetch(albedo, first), fetch(albedo, first + 1), f.x);
+  const float above = mix(fetch(albedo, first + side), fetch(albedo, first + side + 1), f.x);
   return mix(below, above, f.y);
 }
 

@@ -6,9 +6,9 @@
 #include "shaders/lib/calibrated_ray.glsl"
 #include "shaders/lib/lens.glsl"
 
-// RGBA32F, width * height: radiance, 1 / depth of the surface (0: not to be used). This is a view of
+// width * height: radiance, 1 / depth of the surface (0: not to be used). This is a view of
 // camera_usable.comp's plate.
-uniform textureBuffer seen_radiance;
+PREVIZ_FETCHED(vec4, seen_radiance)
 
 // A point is taken for the surface that the plate shows if its depth differs from that surface's by
 // no more than this share.
@@ -43,8 +43,8 @@ bool measured_radiance(vec3 position, out vec3 radiance) {
   const vec2 low = floor(at);
   const int first = int(low.y) * int(frame.width) + int(low.x);
   const int below = first + int(frame.width);
-  const vec4 p00 = texelFetch(seen_radiance, first), p10 = texelFetch(seen_radiance, first + 1);
-  const vec4 p01 = texelFetch(seen_radiance, below), p11 = texelFetch(seen_radiance, below + 1);
+  const vec4 p00 = fetch(seen_radiance, first), p10 = fetch(seen_radiance, first + 1);
+  const vec4 p01 = fetch(seen_radiance, below), p11 = fetch(seen_radiance, below + 1);
   if (min(min(p00.w, p10.w), min(p01.w, p11.w)) <= 0.0) return false;
   const vec2 f = at - low;
   const vec4 seen = mix(mix(p00, p10, f.x), mix(p01, p11, f.x), f.y);

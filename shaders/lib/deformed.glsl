@@ -20,7 +20,7 @@ vec3 position_before(Hit hit, Surface s, GpuMotion motion, out float bent) {
   bent = 0.0;
   if (motion.points == NO_INDEX) return moved(motion.before_from_now, s.position);
   const GpuInstance instance = instances[hit.instance];
-  const uvec3 index = texelFetch(triangles, int(instance.first_triangle + hit.primitive)).xyz;
+  const uvec3 index = fetch(triangles, int(instance.first_triangle + hit.primitive)).xyz;
   const vec3 a = past_point(instance, motion, index.x);
   const vec3 b = past_point(instance, motion, index.y);
   const vec3 c = past_point(instance, motion, index.z);

@@ -4,18 +4,18 @@
 #ifndef PREVIZ_DENOISE_GLSL
 #define PREVIZ_DENOISE_GLSL
 
-#extension GL_EXT_samplerless_texture_functions : require
 
+#include "shaders/lib/fetch.glsl"
 #include "shaders/lib/render_shared.h"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
 
 layout(scalar, push_constant) uniform Denoise { GpuDenoise denoise; };
-// RGBA32F, width * height: the signal (the change of the composite) over the sensor's white and over
+// width * height: the signal (the change of the composite) over the sensor's white and over
 // the surface's albedo, 1 / depth (0: none).
-uniform textureBuffer signals;
-uniform textureBuffer variances;  // of the signal, to be multiplied by the fourth component
-uniform textureBuffer surfaces;   // normal, mean(M) or DENOISE_HIGHLIGHT
+PREVIZ_FETCHED(vec4, signals)
+PREVIZ_FETCHED(vec4, variances)  // of the signal, to be multiplied by the fourth component
+PREVIZ_FETCHED(vec4, surfaces)   // normal, mean(M) or DENOISE_HIGHLIGHT
 
 // A neighbour's weight has fallen to 1 / e at a squared chord between the normals of NORMAL_SCALE,
 // or where the inverse depth is off what the surface's
@@ -41,9 +41,9 @@ bool is_inside(ivec2 at) {
 
 Pixel load_pixel(ivec2 at) {
   const int index = pixel_index(at);
-  const vec4 signal = texelFetch(signals, index);
-  const vec4 surface = texelFetch(surfaces, index);
-  const vec4 variance = texelFetch(variances, index);
+  const vec4 signal = fetch(signals, index);
+  const vec4 surface = fetch(surfaces, index);
+  const vec4 variance = fetch(variances, index);
   return Pixel(signal.rgb, signal.w, variance.rgb, variance.w, surface.xyz, surface.w);
 }
 
@@ -69,8 +69,8 @@ float inverse_depth_slope(ivec2 at, ivec2 off, float here) {
   const ivec2 behind = at + reach * off;
   float falling = 3.4e38;
   float rising = 3.4e38;
-  if (is_inside(before)) falling = (here - texelFetch(signals, pixel_index(before)).w) / float(reach);
-  if (is_inside(behind)) rising = (texelFetch(signals, pixel_index(behind)).w - here) / float(reach);
+  if (is_inside(before)) falling = (here - fetch(signals, pixel_index(before)).w) / float(reach);
+  if (is_inside(behind)) rising = (fetch(signals, pixel_index(behind)).w - here) / float(reach);
   const bool is_one_surface = max(rising, falling) < 3.4e38 &&
                               abs(rising - falling) <= 0.5 * max(abs(rising), abs(falling));
   if (is_one_surface) return 0.5 * (rising + falling);

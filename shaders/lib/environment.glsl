@@ -6,11 +6,11 @@
 #include "shaders/lib/octahedral.h"
 #include "shaders/lib/scene.glsl"
 
-// RGBA32F, (size + 2)^2: the map with a border that is wrapped by the octahedral rule.
-uniform textureBuffer environment;
-// RGBA32F, a quadtree of sampling density: level l has 4^l texels, each with the densities of its
+// (size + 2)^2: the map with a border that is wrapped by the octahedral rule.
+PREVIZ_FETCHED(vec4, environment)
+// A quadtree of sampling density: level l has 4^l texels, each with the densities of its
 // four children; the mean density is 1 on every level.
-uniform textureBuffer importance;
+PREVIZ_FETCHED(vec4, importance)
 
 // Interpolates bilinearly between texel centres; a border of one texel holds what lies over the
 // edge.
@@ -21,9 +21,9 @@ vec3 environment_radiance(vec3 direction) {
   const vec2 low = clamp(floor(at), vec2(0.0), vec2(float(size)));
   const vec2 f = at - low;
   const int first = int(low.y) * stride + int(low.x);
-  const vec3 top = mix(texelFetch(environment, first).rgb, texelFetch(environment, first + 1).rgb, f.x);
-  const vec3 bottom = mix(texelFetch(environment, first + stride).rgb,
-                          texelFetch(environment, first + stride + 1).rgb, f.x);
+  const vec3 top = mix(fetch(environment, first).rgb, fetch(environment, first + 1).rgb, f.x);
+  const vec3 bottom = mix(fetch(environment, first + stride).rgb,
+                          fetch(environment, first + stride + 1).rgb, f.x);
   return mix(top, bottom, f.y);
 }
 
@@ -40,7 +40,7 @@ float environment_pdf(vec3 direction) {
   const vec2 at = (octahedral_point(direction) * 0.5 + 0.5) * size;
   const uvec2 texel = uvec2(clamp(at, vec2(0.0), vec2(size - 1.0)));
   const vec4 densities =
-      texelFetch(importance, importance_texel(frame.environment_levels - 1u, texel >> 1));
+      fetch(importance, importance_texel(frame.environment_levels - 1u, texel >> 1));
   return densities[(texel.x & 1u) + 2u * (texel.y & 1u)] / (4.0 * PI);
 }
 
@@ -59,7 +59,7 @@ vec3 environment_sample(vec2 u, out float pdf) {
   uvec2 texel = uvec2(0u);
   float density = 1.0;
   for (uint level = 0u; level < frame.environment_levels; ++level) {
-    const vec4 c = texelFetch(importance, importance_texel(level, texel));
+    const vec4 c = fetch(importance, importance_texel(level, texel));
     const bool right = pick_half(c.x + c.z, c.y + c.w, u.x);
     const bool down = pick_half(right ? c.y : c.x, right ? c.w : c.z, u.y);
     texel = texel * 2u + uvec2(right, down);

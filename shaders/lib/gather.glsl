@@ -7,14 +7,13 @@
 #include "shaders/lib/bsdf.glsl"
 #include "shaders/lib/photon_grid.glsl"
 
-// The photons of one pass, in a hash grid (lib/photon_grid.glsl). These are views of
-// sorted_photons and buckets, because texel buffers are read faster on lavapipe.
+// The photons of one pass, in a hash grid (lib/photon_grid.glsl): views of sorted_photons and buckets.
 //
-// RGBA32F, TEXELS_PER_PHOTON texels a photon, those of a bucket together: position, Dirac vertices;
+// TEXELS_PER_PHOTON a photon, those of a bucket together: position, Dirac vertices;
 // direction; normal; flux in the real world. The fluxes of red, green and blue in the mixed world
 // are the fourth components of the second and third texel and the first one of the fourth.
-uniform textureBuffer found_photons;
-uniform utextureBuffer found_buckets;  // RG32UI: first photon, number of photons
+PREVIZ_FETCHED(vec4, found_photons)
+PREVIZ_FETCHED(uvec2, found_buckets)  // first photon, number of photons
 
 // A photon belongs to another surface if the normal of its surface is more than 60 degrees off, or
 // if it lies further above or below this one than SAME_SURFACE_HEIGHT.
@@ -43,11 +42,11 @@ float scaled_variance(float variance, float scale) {
 void gather_photon(uint photon, float closeness, Surface s, Lobes l, bool differing,
                    inout GatheredPair sum) {
   const int first = int(photon * TEXELS_PER_PHOTON);
-  const vec4 normal = texelFetch(found_photons, first + 2);
+  const vec4 normal = fetch(found_photons, first + 2);
   // The side from which the photon came is left to the BSDF: rough glass accepts both.
   if (abs(dot(normal.xyz, s.geometric_normal)) < SAME_SURFACE_COS) return;
-  const vec4 direction = texelFetch(found_photons, first + 1);
-  const vec4 fluxes = texelFetch(found_photons, first + 3);
+  const vec4 direction = fetch(found_photons, first + 1);
+  const vec4 fluxes = fetch(found_photons, first + 3);
   const vec3 mixed = vec3(direction.w, normal.w, fluxes.x);
   const vec3 real = fluxes.yzw;
   if (differing && mixed == real) return;
@@ -81,11 +80,11 @@ ivec3 neighbour_cell(ivec3 first, uint corner) {
 void gather_cell(ivec3 first, uint corner, int level, float radius, Surface s, Lobes l, uint most_vertices,
                  bool differing, inout GatheredPair sum) {
   const uvec2 bucket =
-      texelFetch(found_buckets, int(photon_bucket(neighbour_cell(first, corner), level))).xy;
+      fetch(found_buckets, int(photon_bucket(neighbour_cell(first, corner), level)));
   const uint end = bucket.x + bucket.y;
   for (uint chunk = bucket.x; chunk < end; chunk += LOOP_CHUNK) {
     for (uint i = chunk; i < min(chunk + LOOP_CHUNK, end); ++i) {
-      const vec4 photon = texelFetch(found_photons, int(i * TEXELS_PER_PHOTON));
+      const vec4 photon = fetch(found_photons, int(i * TEXELS_PER_PHOTON));
       const vec3 off = photon.xyz - s.position;
       const float closeness = 1.0 - dot(off, off) / (radius * radius);
       if (closeness <= 0.0 || uint(photon.w) > most_vertices) continue;

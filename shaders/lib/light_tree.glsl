@@ -7,14 +7,14 @@
 #include "shaders/lib/sampler.glsl"
 #include "shaders/lib/scene.glsl"
 
-// The tree's nodes, three texels to a GpuLightNode; lavapipe reads texel buffers faster.
-uniform utextureBuffer light_tree;
+// The tree's nodes, three to a GpuLightNode.
+PREVIZ_FETCHED(uvec4, light_tree)
 
 GpuLightNode light_node(uint index) {
   const int first = 3 * int(index);
-  const uvec4 a = texelFetch(light_tree, first);
-  const uvec4 b = texelFetch(light_tree, first + 1);
-  const uvec4 c = texelFetch(light_tree, first + 2);
+  const uvec4 a = fetch(light_tree, first);
+  const uvec4 b = fetch(light_tree, first + 1);
+  const uvec4 c = fetch(light_tree, first + 2);
   return GpuLightNode(uintBitsToFloat(a.xyz), uintBitsToFloat(a.w), uintBitsToFloat(b.xyz),
                       uintBitsToFloat(b.w), uintBitsToFloat(c.x), uintBitsToFloat(c.y), c.z, c.w);
 }

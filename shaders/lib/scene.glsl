@@ -2,17 +2,17 @@
 #ifndef PREVIZ_SCENE_GLSL
 #define PREVIZ_SCENE_GLSL
 
+#include "shaders/lib/fetch.glsl"
 #include "shaders/lib/render_shared.h"
 
 layout(constant_id = 0) const uint FEATURES = 0xffffffffu;
 bool has_feature(uint feature) { return (FEATURES & feature) != 0u; }
 
-// What many invocations read at random comes as texel buffers, which are faster on lavapipe.
-uniform textureBuffer vertices;    // RGBA32F, 2 texels a vertex: position, u; normal, v (object space)
-uniform utextureBuffer triangles;  // RGBA32UI, 1 texel a triangle: three indices into the vertices
-uniform utextureBuffer extras;     // RG32UI, of GpuInstance: colours as four 16-bit fractions, and texture
-                                   // coordinates as two floats
-uniform utextureBuffer texels;     // RG32UI, all textures one after the other: four halves a texel, linear
+PREVIZ_FETCHED(vec4, vertices)    // 2 a vertex: position, u; normal, v (object space)
+PREVIZ_FETCHED(uvec4, triangles)  // 1 a triangle: three indices into the vertices
+PREVIZ_FETCHED(uvec2, extras)     // of GpuInstance: colours as four 16-bit fractions, and texture
+                                  // coordinates as two floats
+PREVIZ_FETCHED(uvec2, texels)     // all textures one after the other: four halves a texel, linear
 layout(scalar) readonly buffer Instances { GpuInstance instances[]; };
 layout(scalar) readonly buffer Materials { GpuMaterial materials[]; };
 layout(scalar) readonly buffer Textures { GpuTexture textures[]; };
@@ -48,7 +48,7 @@ struct Surface {
 };
 
 vec4 fetch_texel(GpuTexture t, ivec2 at) {
-  const uvec2 bits = texelFetch(texels, int(t.first_texel) + at.y * int(t.width) + at.x).xy;
+  const uvec2 bits = fetch(texels, int(t.first_texel) + at.y * int(t.width) + at.x);
   return vec4(unpackHalf2x16(bits.x), unpackHalf2x16(bits.y));
 }
 
@@ -158,7 +158,7 @@ struct Triangle {
 // Returns what a vertex of the instance has beside its place, its normal and its first texture
 // coordinates.
 uvec2 vertex_extra(GpuInstance instance, uint vertex, uint which) {
-  return texelFetch(extras, int(instance.first_extra + vertex * instance.extras_per_vertex + which)).xy;
+  return fetch(extras, int(instance.first_extra + vertex * instance.extras_per_vertex + which));
 }
 
 // Returns the factors of the base colour and of the alpha that the mesh states at a point of a triangle
@@ -257,17 +257,17 @@ vec3 tangent_near(vec3 direction, vec3 normal) {
 }
 
 vec2 hit_uv(uint instance, uint primitive, vec2 barycentrics) {
-  const uvec3 index = texelFetch(triangles, int(instances[instance].first_triangle + primitive)).xyz;
+  const uvec3 index = fetch(triangles, int(instances[instance].first_triangle + primitive)).xyz;
   const vec3 b = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
   vec2 uv = vec2(0.0);
   for (int i = 0; i < 3; ++i)
-    uv += b[i] * vec2(texelFetch(vertices, int(2u * index[i])).w,
-                      texelFetch(vertices, int(2u * index[i]) + 1).w);
+    uv += b[i] * vec2(fetch(vertices, int(2u * index[i])).w,
+                      fetch(vertices, int(2u * index[i]) + 1).w);
   return uv;
 }
 
 float vertex_alpha(uint instance, uint primitive, vec2 barycentrics) {
-  const uvec3 index = texelFetch(triangles, int(instances[instance].first_triangle + primitive)).xyz;
+  const uvec3 index = fetch(triangles, int(instances[instance].first_triangle + primitive)).xyz;
   return vertex_color(instances[instance], index, vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics)).a;
 }
 
@@ -484,13 +484,13 @@ vec3 lacquer_normal(Surface s) { return has_clear_normal() ? s.clear_normal : s.
 // third vertex.
 Surface make_surface(GpuHit hit, vec3 direction, float footprint) {
   const GpuInstance instance = instances[hit.instance];
-  const uvec3 index = texelFetch(triangles, int(instance.first_triangle + hit.primitive)).xyz;
-  const vec4 p0 = texelFetch(vertices, int(2u * index.x));
-  const vec4 p1 = texelFetch(vertices, int(2u * index.y));
-  const vec4 p2 = texelFetch(vertices, int(2u * index.z));
-  const vec4 n0 = texelFetch(vertices, int(2u * index.x) + 1);
-  const vec4 n1 = texelFetch(vertices, int(2u * index.y) + 1);
-  const vec4 n2 = texelFetch(vertices, int(2u * index.z) + 1);
+  const uvec3 index = fetch(triangles, int(instance.first_triangle + hit.primitive)).xyz;
+  const vec4 p0 = fetch(vertices, int(2u * index.x));
+  const vec4 p1 = fetch(vertices, int(2u * index.y));
+  const vec4 p2 = fetch(vertices, int(2u * index.z));
+  const vec4 n0 = fetch(vertices, int(2u * index.x) + 1);
+  const vec4 n1 = fetch(vertices, int(2u * index.y) + 1);
+  const vec4 n2 = fetch(vertices, int(2u * index.z) + 1);
   const vec3 b = vec3(1.0 - hit.barycentrics.x - hit.barycentrics.y, hit.barycentrics);
 
   Surface s;

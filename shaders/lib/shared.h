@@ -32,12 +32,12 @@ PREVIZ_CONST uint WORKGROUP_SIZE = 64u;
 // Bits of specialisation constant 1: what the device is (lib/device.glsl).
 PREVIZ_CONST uint DEVICE_IS_CARD = 1u;
 PREVIZ_CONST uint DEVICE_LANES_MEET = 2u;
+PREVIZ_CONST uint DEVICE_READS_STORAGE = 4u;  // lib/fetch.glsl
 
-// The scene as lib/trace.glsl reads it is one texel buffer of RGBA32UI in set 0, made by
-// daemon/scene/bvh.hpp (on lavapipe a texel buffer is 1.4 to 1.7 times as fast as a storage
-// buffer). It consists of records of four texels, one cache line, in blocks of eight; the children
-// of a node are one block. Record 0 is the space in which a ray starts: that of the top level, or
-// of the only instance.
+// The scene as lib/trace.glsl reads it is one buffer of texels of four words, made by
+// daemon/scene/bvh.hpp. It consists of records of four texels, one cache line, in blocks of eight;
+// the children of a node are one block. Record 0 is the space in which a ray starts: that of the
+// top level, or of the only instance.
 //
 //   any      Texel 0: z, bits 0..7: the kind, RECORD_*.
 //   nothing  All zero: an empty slot. Meeting it has no effect.

@@ -5,12 +5,11 @@
 // each lane makes the test that its record is for. Internal to lib/trace.glsl.
 #ifndef PREVIZ_TRACE_TREE_GLSL
 #define PREVIZ_TRACE_TREE_GLSL
-#extension GL_EXT_samplerless_texture_functions : require
 
-#include "shaders/lib/device.glsl"
+#include "shaders/lib/fetch.glsl"
 #include "shaders/lib/hit.glsl"
 
-uniform utextureBuffer bvh;
+PREVIZ_FETCHED(uvec4, bvh)
 
 // Each level of nodes leaves at most one group of children on the stack, and so does entering an
 // instance.
@@ -57,10 +56,10 @@ struct TraceSpace {
 // Takes the ray into the space of the tree that a space record names.
 TraceSpace trace_enter(uint record, vec3 world_origin, vec3 world_direction) {
   const int texel = int(record * 4u);
-  const uvec4 head = texelFetch(bvh, texel);
-  const vec4 row0 = uintBitsToFloat(texelFetch(bvh, texel + 1));
-  const vec4 row1 = uintBitsToFloat(texelFetch(bvh, texel + 2));
-  const vec4 row2 = uintBitsToFloat(texelFetch(bvh, texel + 3));
+  const uvec4 head = fetch(bvh, texel);
+  const vec4 row0 = uintBitsToFloat(fetch(bvh, texel + 1));
+  const vec4 row1 = uintBitsToFloat(fetch(bvh, texel + 2));
+  const vec4 row2 = uintBitsToFloat(fetch(bvh, texel + 3));
   TraceSpace s;
   s.first_texel = (head.x >> 8) << 5;
   s.presence = head.y >> 8;
@@ -199,10 +198,10 @@ uint trace_rays(const bool shadow, vec3 origin, vec3 direction, float t_min, flo
       group ^= bit;
       const uint slot = ((floatBitsToUint(float(int(bit))) >> 23) - 127u) ^ s.octant;
       const uint texel = s.first_texel + ((group >> 8) << 5) + (slot << 2);
-      const uvec4 head = texelFetch(bvh, int(texel));
-      const uvec4 w1 = texelFetch(bvh, int(texel) + 1);
-      const uvec4 w2 = texelFetch(bvh, int(texel) + 2);
-      const uvec4 w3 = texelFetch(bvh, int(texel) + 3);
+      const uvec4 head = fetch(bvh, int(texel));
+      const uvec4 w1 = fetch(bvh, int(texel) + 1);
+      const uvec4 w2 = fetch(bvh, int(texel) + 2);
+      const uvec4 w3 = fetch(bvh, int(texel) + 3);
       const uint kind = head.z & 0xffu;
 
       // The record is tested as a node.

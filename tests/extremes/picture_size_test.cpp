@@ -75,15 +75,15 @@ TEST(PictureSize, OfEightThousandByAFew) {
 // 7.31 GB.
 TEST(PictureSize, Of8192x4320FitsOrIsRefused) {
   const std::uint64_t texels = 1u << 27;
-  EXPECT_EQ(refusal(8192, 4320, {.bytes = 8 * gib, .texels = texels}), "");
-  const std::string no_memory = refusal(8192, 4320, {.bytes = 4 * gib, .texels = texels});
+  EXPECT_EQ(refusal(8192, 4320, {.bytes = 8 * gib, .pixels = texels}), "");
+  const std::string no_memory = refusal(8192, 4320, {.bytes = 4 * gib, .pixels = texels});
   EXPECT_THAT(no_memory, HasSubstr("8192x4320 takes 7.31 GB"));
   EXPECT_THAT(no_memory, HasSubstr("but there is only 4.29 GB"));
   // Made into layers in the same memory: 140 bytes more.
   const std::string shared =
-      refusal(8192, 4320, {.bytes = 8 * gib, .texels = texels, .read_back = true});
+      refusal(8192, 4320, {.bytes = 8 * gib, .pixels = texels, .read_back = true});
   EXPECT_THAT(shared, HasSubstr("takes 12.3 GB"));
-  const std::string no_texels = refusal(8192, 4320, {.bytes = 64 * gib, .texels = 1u << 16});
+  const std::string no_texels = refusal(8192, 4320, {.bytes = 64 * gib, .pixels = 1u << 16});
   EXPECT_THAT(no_texels, HasSubstr("65536 pixels"));
 }
 
@@ -93,7 +93,7 @@ TEST(PictureSize, Of8192x4320FitsOrIsRefused) {
 TEST(PictureSize, ThatIsAveragedFitsOrIsRefused) {
   constexpr std::uint64_t megabyte = 1'000'000;
   const auto card = [](std::uint64_t megabytes) {
-    return render::PictureMemory{.bytes = megabytes * megabyte, .texels = 1u << 27};
+    return render::PictureMemory{.bytes = megabytes * megabyte, .pixels = 1u << 27};
   };
   EXPECT_EQ(refusal(1000, 1000, 2, card(610), 1320 * megabyte), "");
   EXPECT_EQ(refusal(1000, 1000, 2, card(610), 1300 * megabyte),

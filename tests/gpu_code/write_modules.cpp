@@ -26,7 +26,8 @@ namespace {
 using previz::render::Pass;
 
 // All five GPUs keep their lanes together.
-constexpr std::uint32_t card = previz::gpu::DEVICE_IS_CARD | previz::gpu::DEVICE_LANES_MEET;
+constexpr std::uint32_t card = previz::gpu::DEVICE_IS_CARD | previz::gpu::DEVICE_LANES_MEET |
+                               previz::gpu::DEVICE_READS_STORAGE;
 
 const char* words_for(previz::render::BufferKind kind) {
   using previz::render::BufferKind;
@@ -51,13 +52,13 @@ void write(const std::filesystem::path& stem, const Pass& pass, std::uint32_t fe
 void write_all(const std::filesystem::path& folder, const std::string& name,
                std::uint32_t features) {
   std::vector<Pass> passes = previz::render::passes_for(features);
-  passes.push_back({"deform", deform_spv, false});
-  passes.push_back({"refit_leaves", refit_leaves_spv, false});
-  passes.push_back({"refit_nodes", refit_nodes_spv, false});
+  passes.push_back({"deform", deform_spv});
+  passes.push_back({"refit_leaves", refit_leaves_spv});
+  passes.push_back({"refit_nodes", refit_nodes_spv});
   for (const Pass& pass : passes) {
     const std::filesystem::path stem = folder / (name + "." + pass.name);
     write(stem, pass, features);
-    const Pass by_query{pass.name, pass.query, pass.has_features};
+    const Pass by_query{pass.name, pass.query};
     if (!pass.query.empty()) write(stem.string() + "_query", by_query, features);
   }
 }

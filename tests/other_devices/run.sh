@@ -72,7 +72,7 @@ build_layer() {
 on_lanes() {
   local cases settings=("VK_DRIVER_FILES=$lavapipe" "LP_NATIVE_VECTOR_WIDTH=$(($1 * 32))")
   cases=$(gate_cases render)
-  [[ $1 != 16 ]] || cases+=:CardPictures.*
+  [[ $1 != 16 ]] || cases+=':CardPictures.*'
   run_cases "lanes$1" unit/scene/test_bvh "$(gate_cases bvh)" "${settings[@]}"
   run_cases "lanes$1" unit/render/test_render "$cases" "${settings[@]}"
   run_cases "lanes$1" extremes/test_extremes "$(gate_cases extremes)" "${settings[@]}"

@@ -46,13 +46,14 @@ std::vector<glm::uvec4> scene_texels(const scene::Scene& scene, scene::BvhQualit
 }
 
 GpuTracer::GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels)
-    : GpuTracer(device, texels, !device.shares_host_memory()) {}
+    : GpuTracer(device, texels, render::device_bits(device)) {}
 
-GpuTracer::GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels, bool on_card)
+GpuTracer::GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels,
+                     std::uint32_t bits)
     : device_(device),
-      hits_pass_(device, "closest_hits", closest_hits_spv, {0, on_card}),
-      distances_pass_(device, "closest_distances", closest_distances_spv, {0, on_card}),
-      blocked_pass_(device, "blocked_worlds", blocked_worlds_spv, {0, on_card}),
+      hits_pass_(device, "closest_hits", closest_hits_spv, {0, bits}),
+      distances_pass_(device, "closest_distances", closest_distances_spv, {0, bits}),
+      blocked_pass_(device, "blocked_worlds", blocked_worlds_spv, {0, bits}),
       structures_(device) {
   const render::Purpose purpose(device, "the triangles' tree", "use fewer triangles");
   render::upload_texels(device, bvh_, texels, vk::Format::eR32G32B32A32Uint);
@@ -61,9 +62,11 @@ GpuTracer::GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texe
 GpuTracer::GpuTracer(render::Device& device, const scene::Scene& scene, scene::BvhQuality quality)
     : GpuTracer(device, scene_texels(scene, quality)) {
   if (!device.traces_in_hardware()) return;
-  hits_pass_ = render::Kernel(device, "closest_hits", closest_hits_query_spv);
-  distances_pass_ = render::Kernel(device, "closest_distances", closest_distances_query_spv);
-  blocked_pass_ = render::Kernel(device, "blocked_worlds", blocked_worlds_query_spv);
+  const std::uint32_t bits = render::device_bits(device);
+  hits_pass_ = render::Kernel(device, "closest_hits", closest_hits_query_spv, {0, bits});
+  distances_pass_ =
+      render::Kernel(device, "closest_distances", closest_distances_query_spv, {0, bits});
+  blocked_pass_ = render::Kernel(device, "blocked_worlds", blocked_worlds_query_spv, {0, bits});
   build_structures(scene);
 }
 

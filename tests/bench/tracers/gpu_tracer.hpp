@@ -34,9 +34,9 @@ std::vector<glm::uvec4> scene_texels(const scene::Scene& scene,
 
 class GpuTracer {
  public:
-  // Traces as the renderer does on this device, or as it does on a card or a CPU device.
+  // Traces as the renderer does on this device, or as on one with these DEVICE_* bits.
   GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels);
-  GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels, bool on_card);
+  GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texels, std::uint32_t bits);
   // Traces the scene in hardware if the device does so, otherwise as above.
   GpuTracer(render::Device& device, const scene::Scene& scene, scene::BvhQuality quality);
 

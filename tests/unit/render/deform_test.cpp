@@ -331,6 +331,7 @@ TEST(Deforming, NeedsVerticesThatFitIntoAStorageBuffer) {
   add(scene, large, 0u);
   render::Renderer renderer(shared_device(), {}, pinhole(16, 16, 0.9));
   EXPECT_THROW(renderer.set_scene(scene), Error);
+  if (shared_device()->reads_storage()) return;  // every vertex is then in one
   scene.deformations.clear();
   EXPECT_NO_THROW(renderer.set_scene(scene));
 }

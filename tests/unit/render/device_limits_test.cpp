@@ -82,10 +82,13 @@ TEST(DeviceLimits, OfThisDeviceRefuseABufferByName) {
   EXPECT_GE(allows.push_bytes, push_bytes);
   const auto create_past_it = [&] {
     const render::Purpose purpose(device, "the texels of a test", "use fewer");
-    render::create_texel_buffer(device, 16 * (allows.texels + 1), vk::Format::eR32G32B32A32Sfloat);
+    render::create_texel_buffer(device, std::max(16 * allows.texels, allows.storage_bytes) + 16,
+                                vk::Format::eR32G32B32A32Sfloat);
   };
   EXPECT_THAT(error_of(create_past_it),
-              AllOf(HasSubstr(device.name()), HasSubstr(std::to_string(allows.texels)),
+              AllOf(HasSubstr(device.name()),
+                    HasSubstr(std::to_string(device.reads_storage() ? allows.storage_bytes
+                                                                    : allows.texels)),
                     HasSubstr("for the texels of a test needs "), HasSubstr("; use fewer")));
   EXPECT_EQ(render::validation_messages(device), 0u);
 }

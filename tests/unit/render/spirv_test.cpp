@@ -38,6 +38,31 @@ TEST(Spirv, NamesTheBuffersThatAreUsed) {
   }));
 }
 
+// A device that reads storage needs no texels at all.
+TEST(Spirv, WhatIsFetchedIsTexelsOrStorageByTheDevice) {
+  const auto bindings_for = [](std::uint32_t device) {
+    return describe_spirv(
+               specialise_spirv(shade_spv, std::array<std::uint32_t, 2>{every_feature, device}))
+        .bindings;
+  };
+  const auto kinds_of = [](const std::vector<SpirvInfo::Binding>& bindings,
+                           const std::string& name) {
+    std::vector<render::BufferKind> kinds;
+    for (const SpirvInfo::Binding& binding : bindings)
+      if (binding.name == name) kinds.push_back(binding.kind);
+    return kinds;
+  };
+  const auto as_texels = bindings_for(0), as_storage = bindings_for(gpu::DEVICE_READS_STORAGE);
+  EXPECT_EQ(as_texels.size(), as_storage.size());
+  for (const char* const name : {"vertices", "triangles", "texels", "environment"}) {
+    EXPECT_THAT(kinds_of(as_texels, name), ElementsAre(render::BufferKind::texels)) << name;
+    EXPECT_THAT(kinds_of(as_storage, name), ElementsAre(render::BufferKind::storage)) << name;
+  }
+  EXPECT_TRUE(std::ranges::none_of(
+      as_storage, [](render::BufferKind kind) { return kind == render::BufferKind::texels; },
+      &SpirvInfo::Binding::kind));
+}
+
 TEST(Spirv, KnowsTheFeaturesThatAPassAsksAbout) {
   EXPECT_EQ(describe_spirv(refit_nodes_spv).asked_bits, 0u);
   const std::uint32_t extend = describe_spirv(extend_spv).asked_bits;

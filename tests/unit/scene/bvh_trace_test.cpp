@@ -303,7 +303,9 @@ scene::Mesh nested_squares(int count) {
 void expect_the_same_on_a_card(render::Device& device, const Scene& scene,
                                std::span<const Ray> rays) {
   const auto texels = bench::scene_texels(scene, BvhQuality::medium);
-  bench::GpuTracer on_cpu(device, texels, false), on_card(device, texels, true);
+  const std::uint32_t bits = render::device_bits(device);
+  bench::GpuTracer on_cpu(device, texels, bits & ~gpu::DEVICE_IS_CARD);
+  bench::GpuTracer on_card(device, texels, bits | gpu::DEVICE_IS_CARD);
   std::size_t found = 0, other = 0;
   const std::vector<TracedHit> expected = on_cpu.closest(rays, scene::world_both);
   const std::vector<TracedHit> hits = on_card.closest(rays, scene::world_both);
