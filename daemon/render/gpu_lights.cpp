@@ -193,10 +193,13 @@ double intensity(const gpu::GpuLight& light) {
 
 double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius,
                        const Weights& weights) {
+  std::vector<double> powers;
+  powers.reserve(lights.size());
   double total = 0;
   std::size_t shining = 0;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     const double watts = power_of(lights[i], scene_radius) * weights.of(i);
+    powers.push_back(watts);
     if (!(watts > 0)) continue;  // black, or a triangle whose power is NaN
     total += watts;
     ++shining;
@@ -205,7 +208,7 @@ double select_by_power(std::vector<gpu::GpuLight>& lights, double scene_radius,
   float below = 0;
   for (std::size_t i = 0; i < lights.size(); ++i) {
     gpu::GpuLight& light = lights[i];
-    const double watts = power_of(light, scene_radius) * weights.of(i);
+    const double watts = powers[i];
     if (watts > 0)
       sum += (1 - even_share) * watts / total + even_share / static_cast<double>(shining);
     light.cdf = std::min(static_cast<float>(sum), 1.0f);

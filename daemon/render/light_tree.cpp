@@ -379,6 +379,9 @@ LightTree build_light_tree(PlacedLights& lights, std::size_t lamps,
     const std::size_t own = lights.lights.size();
     return lamp < own ? lamp_bounds(lights, lamp) : bounded[lamp - own].bounds.front();
   });
+  std::size_t count = tree.nodes.size() + shape.size();
+  for (const LightGroup& group : groups) count += group.shape->size();
+  tree.nodes.reserve(count);
   const LampBounds& all = top.bounds.front();
   tree.origin = 0.5 * (all.low + all.high);
   LightTreeWriter(tree, lights, groups, bounded, all.intensity).write_top(top, 0, 0, 0);

@@ -144,6 +144,11 @@ void SceneLights::encode(const scene::Scene& scene) {
   ++encoded_;
   PlacedLights all = state_->lamps;
   const std::size_t lamps = all.lights.size();
+  std::size_t count = lamps;
+  for (const Emitter& emitter : emitters_)
+    count += scene.meshes[scene.instances[emitter.instance].mesh].triangles.size();
+  all.lights.reserve(count);
+  all.positions.reserve(count);
   std::vector<LightGroup> groups;
   for (const Emitter& emitter : emitters_) {
     const auto first = static_cast<std::uint32_t>(all.lights.size());
