@@ -10,11 +10,10 @@ namespace previz::bench {
 
 struct ViewFromAbove {
   ViewFromAbove(const std::shared_ptr<render::Device>& device, const scene::Scene& scene, int width,
-                int height) {
+                int height, set::Estimation estimation = {}) {
     ObserverCalibration calibration;
     calibration.intrinsics = {
         width, height, 1.0 * height, 1.0 * height, 0.5 * (width - 1), 0.5 * (height - 1)};
-    set::Estimation estimation;
     estimation.max_depth = 4;
     renderer = std::make_unique<render::Renderer>(device, estimation, calibration);
     renderer->set_scene(scene);
