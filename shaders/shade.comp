@@ -1,5 +1,7 @@
 // Continues paths that have arrived at a surface or in the environment. A path forks where the
-// worlds part, takes emission, samples a light and scatters (shaders/README.md).
+// worlds part, takes emission, samples a light and scatters (shaders/README.md). A CPU device does all
+// of it in one pass. On a card three share it, one after the other: together they work out the surface
+// three times, but each needs so few registers that a third more lanes are under way.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -15,6 +17,9 @@
 // A path of the difference that is far from all differences survives a vertex with at least this
 // probability, and its throughput is never raised above the inverse.
 const float LEAST_SURVIVAL = 0.1;
+
+layout(constant_id = 2) const uint PARTS = SHADE_ALL;
+bool does(uint part) { return (PARTS & part) != 0u; }
 
 struct Path {
   uint index;
@@ -70,6 +75,7 @@ bool cancels(Path p, Gain gain) {
 }
 
 void receive(Path p, vec3 radiance, Gain gain) {
+  if (!does(SHADE_RECEIVE)) return;
   add_pair(p.slot, p.worlds, p.landed, radiance * gain.mixed, radiance * gain.real);
 }
 
@@ -361,9 +367,11 @@ void fork(Path p, uint other_worlds, float t_hit, out uint forked) {
 
 // These count in 64 bits.
 void count_measured() {
+  if (!does(SHADE_RECEIVE)) return;
   if (atomicAdd(control.measured_low, 1u) == 0xffffffffu) atomicAdd(control.measured_high, 1u);
 }
 void count_unmeasured() {
+  if (!does(SHADE_RECEIVE)) return;
   if (atomicAdd(control.unmeasured_low, 1u) == 0xffffffffu) atomicAdd(control.unmeasured_high, 1u);
 }
 
@@ -459,11 +467,46 @@ void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, o
   if (has_feature(FEATURE_MANY_LIGHTS))
     p.receiver = has_feature(FEATURE_TRANSMISSION) && has_rough_glass(l) ? NO_NORMAL
                                                                          : pack_normal(s.normal);
-  if (has_feature(FEATURE_PHOTONS)) meet_photons(p, s, l);
+  if (does(SHADE_RECEIVE) && has_feature(FEATURE_PHOTONS)) meet_photons(p, s, l);
   const Technique t = make_technique(p, s, l);
-  lit = light_ray(p, s, l, t, random, ray);
-  scattered = scatter(p, s, l, t, random, chance);
+  if (does(SHADE_LIGHT)) lit = light_ray(p, s, l, t, random, ray);
+  if (does(SHADE_SCATTER)) scattered = scatter(p, s, l, t, random, chance);
   p.depth += 1u;
+}
+
+// Takes the light that a ray brings which meets no surface, or lamps before it.
+void receive_on_the_way(Path p, GpuHit hit) {
+  if (!does(SHADE_RECEIVE) || !(has_feature(FEATURE_CAUSTICS) || !is_caustic(p))) return;
+  const bool has_hit = hit.t >= 0.0;
+  if (has_feature(FEATURE_VISIBLE_LIGHTS)) meet_lights(p, has_hit ? hit.t : 3.4e38);
+  if (!has_hit) meet_environment(p);
+}
+
+// Follows a path to the surface that it met: `forked` is the path that goes on behind it, if there is
+// one; the others are those of shade_vertex().
+void meet_surface(inout Path p, GpuHit hit, out uint forked, out GpuShadowRay ray, out bool lit,
+                  out bool scattered) {
+  forked = NO_INDEX;
+  lit = false;
+  scattered = false;
+  const uint presence = instances[hit.instance].presence & p.worlds;
+  if (has_feature(FEATURE_FORKS) && presence != p.worlds) {
+    if (does(SHADE_RECEIVE) && p.depth == 0u) sample_mixed[p.slot].w = 1.0;
+    if (does(SHADE_SCATTER)) fork(p, p.worlds & ~presence, hit.t, forked);
+    p.worlds = presence;
+  }
+  const Surface s = make_surface(hit, p.direction, footprint_of(p, hit.t));
+  if (does(SHADE_RECEIVE) && p.depth == 0u && (p.worlds & WORLD_MIXED) != 0u) write_aov(p, s, hit.t);
+  if (has_feature(FEATURE_PANES) && pass_pane(p, s, hit)) {
+    scattered = p.passes <= MOST_PASSES;
+    if (does(SHADE_SCATTER) && !scattered) atomicAdd(control.stopped_in_layers, 1u);
+    return;
+  }
+  p.medium = medium_before(p.medium, s);
+  p.throughput *= medium_transmittance(p.medium, hit.t);
+  if (does(SHADE_RECEIVE) && (has_feature(FEATURE_CAUSTICS) || !is_caustic(p))) meet_emission(p, s, hit);
+  if (has_feature(FEATURE_CAMERA) && meet_measured(p, s, hit)) return;
+  if (p.depth < frame.max_depth) shade_vertex(p, s, ray, lit, scattered);
 }
 
 void main() {
@@ -476,34 +519,12 @@ void main() {
   if (active_path) {
     p = load_path(queue[active_queue_index(gl_GlobalInvocationID.x)]);
     const GpuHit hit = hits[p.index];
-    const bool takes_light = has_feature(FEATURE_CAUSTICS) || !is_caustic(p);
-    if (has_feature(FEATURE_VISIBLE_LIGHTS) && takes_light)
-      meet_lights(p, hit.t < 0.0 ? 3.4e38 : hit.t);
-    if (hit.t < 0.0) {
-      if (takes_light) meet_environment(p);
-    } else {
-      const uint presence = instances[hit.instance].presence & p.worlds;
-      if (has_feature(FEATURE_FORKS) && presence != p.worlds) {
-        if (p.depth == 0u) sample_mixed[p.slot].w = 1.0;
-        fork(p, p.worlds & ~presence, hit.t, forked);
-        p.worlds = presence;
-      }
-      const Surface s = make_surface(hit, p.direction, footprint_of(p, hit.t));
-      if (p.depth == 0u && (p.worlds & WORLD_MIXED) != 0u) write_aov(p, s, hit.t);
-      if (has_feature(FEATURE_PANES) && pass_pane(p, s, hit)) {
-        scattered = p.passes <= MOST_PASSES;
-        if (!scattered) atomicAdd(control.stopped_in_layers, 1u);
-      } else {
-        p.medium = medium_before(p.medium, s);
-        p.throughput *= medium_transmittance(p.medium, hit.t);
-        if (takes_light) meet_emission(p, s, hit);
-        const bool ends = has_feature(FEATURE_CAMERA) && meet_measured(p, s, hit);
-        if (!ends && p.depth < frame.max_depth) shade_vertex(p, s, ray, lit, scattered);
-      }
-      if (scattered) store_path(p, p.index);
-    }
+    receive_on_the_way(p, hit);
+    if (hit.t >= 0.0) meet_surface(p, hit, forked, ray, lit, scattered);
+    if (does(SHADE_SCATTER) && scattered) store_path(p, p.index);
   }
-  append_shadow(lit, ray);
+  if (does(SHADE_LIGHT)) append_shadow(lit, ray);
+  if (!does(SHADE_SCATTER)) return;
   append_next(forked != NO_INDEX, forked);
   append_next(scattered, p.index);
 }

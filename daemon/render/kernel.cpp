@@ -77,6 +77,11 @@ const std::vector<std::uint32_t>& specialised(std::span<const std::uint32_t> spi
   return modules.try_emplace(key, std::move(module)).first->second;
 }
 
+std::vector<std::uint32_t> values_of(const Pass& pass, std::uint32_t features,
+                                     std::uint32_t device) {
+  return {features, device, pass.parts};
+}
+
 std::vector<std::uint32_t> as_for(std::uint32_t device, const std::vector<std::uint32_t>& module) {
   return (device & gpu::DEVICE_LANES_MEET) != 0 ? with_uniform_subgroups(module) : module;
 }
@@ -120,7 +125,7 @@ Kernel::Kernel(Device& device, const char* name, std::span<const std::uint32_t> 
 
 Kernel::Kernel(Device& device, const Pass& pass, std::uint32_t features)
     : device_(&device), name_(pass.name) {
-  use(pass, {features, device_bits(device)});
+  use(pass, values_of(pass, features, device_bits(device)));
 }
 
 void Kernel::use(const Pass& pass, std::vector<std::uint32_t> constants) {
@@ -138,11 +143,12 @@ void make_kernels(std::initializer_list<Kernel*> kernels, Device& device,
 
 std::vector<std::uint32_t> module_of(const Pass& pass, std::uint32_t features,
                                      std::uint32_t device) {
-  return as_for(device, specialised(pass.spirv, asked_values(pass.spirv, {features, device})));
+  return as_for(
+      device, specialised(pass.spirv, asked_values(pass.spirv, values_of(pass, features, device))));
 }
 
 void compile_ahead(Device& device, const Pass& pass, std::uint32_t features) {
-  const ToCompile wanted(device, pass, {features, device_bits(device)});
+  const ToCompile wanted(device, pass, values_of(pass, features, device_bits(device)));
   device.program_ahead(wanted.spirv.data(), wanted.values, wanted.compile_now);
 }
 

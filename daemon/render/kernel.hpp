@@ -52,13 +52,14 @@ struct Program {
   vk::raii::Pipeline pipeline{nullptr};
 };
 
-// A pass has what its kernel is made of. Its specialisation constant 0 has the FEATURE_* bits, and
-// 1 the device's DEVICE_* bits.
+// A pass has what its kernel is made of. Its specialisation constant 0 has the FEATURE_* bits, 1
+// the device's DEVICE_* bits, and 2 `parts`.
 struct Pass {
   const char* name;
   std::span<const std::uint32_t> spirv;  // static
   // The same pass for a device that traces rays in hardware; empty: it traces none.
   std::span<const std::uint32_t> query = {};
+  std::uint32_t parts = 0;  // that it does of a pass which consists of parts
 
   std::span<const std::uint32_t> spirv_for(const Device& device) const {
     return device.traces_in_hardware() && !query.empty() ? query : spirv;

@@ -10,8 +10,8 @@
 
 namespace previz::render {
 
-std::vector<Pass> passes_for(std::uint32_t features) {
-  std::vector<Pass> passes = Wavefront::passes_for(features);
+std::vector<Pass> passes_for(std::uint32_t features, std::uint32_t device) {
+  std::vector<Pass> passes = Wavefront::passes_for(features, device);
   const auto add = [&](std::span<const Pass> more) {
     passes.insert(passes.end(), more.begin(), more.end());
   };

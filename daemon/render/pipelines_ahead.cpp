@@ -47,7 +47,7 @@ bool PipelinesAhead::work(const std::stop_token& stop) const {
   Failures failures;
   try {
     for (const std::uint32_t features : reachable_()) {
-      for (const Pass& pass : passes_for(features)) {
+      for (const Pass& pass : passes_for(features, device_bits(*device_))) {
         if (stop.stop_requested()) return false;
         try {
           compile_ahead(*device_, pass, features);

@@ -38,10 +38,17 @@ constexpr double least_photon_radius = 1e-15, most_photon_radius = 0.5;
 constexpr Pass path_passes[] = {{"generate", generate_spv},
                                 {"advance", advance_spv},
                                 {"extend", extend_spv, extend_query_spv},
-                                {"shade", shade_spv},
                                 {"prepare_shadow", prepare_shadow_spv},
                                 {"shadow", shadow_spv, shadow_query_spv},
                                 {"accumulate", accumulate_spv}};
+
+// A card shades in parts: see shade.comp.
+std::vector<Pass> shade_passes(std::uint32_t device) {
+  if ((device & gpu::DEVICE_IS_CARD) == 0) return {{"shade", shade_spv, {}, gpu::SHADE_ALL}};
+  return {{"shade_receive", shade_spv, {}, gpu::SHADE_RECEIVE},
+          {"shade_light", shade_spv, {}, gpu::SHADE_LIGHT},
+          {"shade_scatter", shade_spv, {}, gpu::SHADE_SCATTER}};
+}
 
 std::uint32_t round_up(std::uint32_t value, std::uint32_t to) {
   return (value + to - 1) / to * to;
@@ -200,11 +207,12 @@ void Wavefront::use_scene(Buffers scene, std::uint32_t features) {
   if (features != features_) create_kernels(features);
 }
 
-std::vector<Pass> Wavefront::passes_for(std::uint32_t features) {
+std::vector<Pass> Wavefront::passes_for(std::uint32_t features, std::uint32_t device) {
   std::vector<Pass> passes(std::begin(path_passes), std::end(path_passes));
   const auto add = [&](std::span<const Pass> more) {
     passes.insert(passes.end(), more.begin(), more.end());
   };
+  add(shade_passes(device));
   if ((features & gpu::FEATURE_PHOTONS) != 0) add(PhotonMap::passes());
   if ((features & gpu::FEATURE_CAMERA) != 0) add(CameraMap::passes());
   return passes;
@@ -212,8 +220,11 @@ std::vector<Pass> Wavefront::passes_for(std::uint32_t features) {
 
 void Wavefront::create_kernels(std::uint32_t features) {
   features_.reset();  // stays empty if creating a kernel throws
-  make_kernels({&generate_, &advance_, &extend_, &shade_, &prepare_shadow_, &shadow_, &accumulate_},
-               device_, path_passes, features);
+  make_kernels({&generate_, &advance_, &extend_, &prepare_shadow_, &shadow_, &accumulate_}, device_,
+               path_passes, features);
+  shade_.clear();
+  for (const Pass& pass : shade_passes(device_bits(device_)))
+    shade_.emplace_back(device_, pass, features);
   if ((features & gpu::FEATURE_PHOTONS) != 0) photons_.create_kernels(features);
   if ((features & gpu::FEATURE_CAMERA) != 0) camera_.create_kernels(features);
   features_ = features;
@@ -271,7 +282,8 @@ void Wavefront::record_batch(const Recording& recording, const gpu::GpuBatch& ba
   const std::uint32_t segments = max_depth + (by_camera ? 3 : 2) + passes();
   for (std::uint32_t segment = 0; segment < segments; ++segment) {
     record_extension(recording);
-    shade_.dispatch_indirect(recording, control_, offsetof(gpu::GpuControl, extend_groups));
+    for (Kernel& shade : shade_)
+      shade.dispatch_indirect(recording, control_, offsetof(gpu::GpuControl, extend_groups));
     prepare_shadow_.dispatch(recording, 1);
     shadow_.dispatch_indirect(recording, control_, offsetof(gpu::GpuControl, shadow_groups));
   }

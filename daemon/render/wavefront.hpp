@@ -27,8 +27,9 @@ class Wavefront {
   // ones.
   void resize(int width, int height);
   std::uint32_t paths_a_slot() const { return paths_a_slot_; }
-  // Returns the passes that use_scene() makes kernels of for these features.
-  static std::vector<Pass> passes_for(std::uint32_t features);
+  // Returns the passes that use_scene() makes kernels of for these features, on a device with these
+  // DEVICE_* bits.
+  static std::vector<Pass> passes_for(std::uint32_t features, std::uint32_t device);
 
   // Uses the scene in these buffers, which must stay where they are, and the pipelines for
   // `features`.
@@ -113,7 +114,8 @@ class Wavefront {
   std::vector<Buffer> pixels_;    // of the tiles; those of smaller pictures may use a part of them
   std::vector<Buffer> caustics_;  // likewise
   std::optional<std::uint32_t> features_;  // of the kernels, once they are made
-  Kernel generate_, advance_, extend_, shade_, prepare_shadow_, shadow_, accumulate_;
+  Kernel generate_, advance_, extend_, prepare_shadow_, shadow_, accumulate_;
+  std::vector<Kernel> shade_;  // one after the other
   Buffer ray_origin_, ray_direction_, throughput_, receivers_, hits_, queue_, shadow_rays_,
       sample_mixed_, sample_real_, sample_landed_, sample_aov_, sample_albedo_, sample_caustic_,
       limits_, control_;

@@ -45,6 +45,13 @@ PREVIZ_CONST uint COMPOSITE_ADDITIVE = 0u;
 PREVIZ_CONST uint COMPOSITE_RATIO = 1u;
 PREVIZ_CONST uint COMPOSITE_HYBRID = 2u;
 
+// Bits of specialisation constant 2 of shade.comp: what it does at the ends of the paths. A pass that
+// does not scatter leaves the paths as they are.
+PREVIZ_CONST uint SHADE_RECEIVE = 1u;  // adds the light that arrives, and what is seen
+PREVIZ_CONST uint SHADE_LIGHT = 2u;    // samples a light
+PREVIZ_CONST uint SHADE_SCATTER = 4u;  // forks, and samples the next direction
+PREVIZ_CONST uint SHADE_ALL = 7u;
+
 // The fourth component of SAMPLE_REAL says what was traced for the slot.
 PREVIZ_CONST float SAMPLE_FULL = 0.0f;        // both radiances
 PREVIZ_CONST float SAMPLE_DIFFERENCE = 1.0f;  // only the difference of the two

@@ -42,7 +42,7 @@ void write(const std::filesystem::path& stem, const Pass& pass, std::uint32_t fe
   code.write(reinterpret_cast<const char*>(module.data()),
              static_cast<std::streamsize>(module.size() * sizeof(std::uint32_t)));
   std::ofstream bindings(stem.string() + ".bindings");
-  for (const auto& binding : previz::render::describe_spirv(pass.spirv).bindings)
+  for (const auto& binding : previz::render::describe_spirv(module).bindings)
     bindings << binding.number << ' ' << words_for(binding.kind) << '\n';
   code.close();
   bindings.close();
@@ -51,7 +51,7 @@ void write(const std::filesystem::path& stem, const Pass& pass, std::uint32_t fe
 
 void write_all(const std::filesystem::path& folder, const std::string& name,
                std::uint32_t features) {
-  std::vector<Pass> passes = previz::render::passes_for(features);
+  std::vector<Pass> passes = previz::render::passes_for(features, card);
   passes.push_back({"deform", deform_spv});
   passes.push_back({"refit_leaves", refit_leaves_spv});
   passes.push_back({"refit_nodes", refit_nodes_spv});
