@@ -430,7 +430,7 @@ void Device::create_device() {
   vk::PhysicalDeviceRayQueryFeaturesKHR queries(VK_TRUE);
   vk::PhysicalDeviceAccelerationStructureFeaturesKHR structures(VK_TRUE);
   if (traces_in_hardware()) {
-    extensions.insert(extensions.end(), std::begin(ray_extensions), std::end(ray_extensions));
+    for (const char* const extension : ray_extensions) extensions.push_back(extension);
     features12.bufferDeviceAddress = VK_TRUE;
     queries.pNext = std::exchange(features13.pNext, &structures);
     structures.pNext = &queries;

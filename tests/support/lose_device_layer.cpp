@@ -178,7 +178,7 @@ PFN_vkVoidFunction own(const char* name) {
 
 }  // namespace
 
-extern "C" VK_LAYER_EXPORT VKAPI_ATTR VkResult VKAPI_CALL
+extern "C" VKAPI_ATTR VkResult VKAPI_CALL
 vkNegotiateLoaderLayerInterfaceVersion(VkNegotiateLayerInterface* interface) {
   interface->loaderLayerInterfaceVersion = 2;
   interface->pfnGetInstanceProcAddr = instance_address;
