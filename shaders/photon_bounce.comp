@@ -149,7 +149,7 @@ uint meet_surface(inout Flight f, Surface s, GpuHit hit, vec2 random) {
   return f.vertices < frame.max_depth ? FLIGHT_GOES_ON : FLIGHT_OVER;
 }
 
-// Stores a photon, with its flux in the worlds that it is in, and counts it in its bucket.
+// Stores a photon, with its flux in the worlds that it is in.
 void store_photon(uint path, Flight f, Surface s) {
   photons[path].position = s.position;
   photons[path].vertices = f.vertices;
@@ -157,7 +157,7 @@ void store_photon(uint path, Flight f, Surface s) {
   photons[path].normal = s.geometric_normal;
   photons[path].mixed *= (f.worlds & WORLD_MIXED) != 0u ? f.flux : vec3(0.0);
   photons[path].real *= (f.worlds & WORLD_REAL) != 0u ? f.flux : vec3(0.0);
-  atomicAdd(buckets[photon_bucket(s.position)].count, 1u);
+  photon_keys[path] = photon_bucket(s.position);
 }
 
 void main() {

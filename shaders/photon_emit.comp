@@ -27,8 +27,8 @@ void main() {
   const uint photon = gl_GlobalInvocationID.x;
   bool leaves = false;
   if (photon < frame.photon_count) {
-    photons[2u * photon].vertices = 0u;
-    photons[2u * photon + 1u].vertices = 0u;
+    photon_keys[2u * photon] = NO_INDEX;
+    photon_keys[2u * photon + 1u] = NO_INDEX;
     // There may be nothing to aim at: another variant of the set has the mirror.
     if (frame.specular_bound_count > 0u) leaves = emit(photon);
   }

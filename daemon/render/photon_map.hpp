@@ -25,8 +25,8 @@ class PhotonMap {
   // These record a pass of photons, in this order: emission fills the queue of paths; after each
   // extension, as many work groups as `groups` holds at `offset` bounce the photons off what they
   // hit; sorting makes the map. All take the buffers of the scene and of the paths, and a GpuBatch
-  // whose first_sample is the pass and whose photon_radius is the radius. The work of an
-  // invocation grows only with the logarithm of the photons in one place.
+  // whose first_sample is the pass and whose photon_radius is the radius. The work of sorting does
+  // not depend on where the photons are.
   std::uint32_t count() const { return photons_; }  // emitted a pass
   void record_emission(const Recording& recording);
   void record_bounce(const Recording& recording, const Buffer& groups, vk::DeviceSize offset);
@@ -35,10 +35,10 @@ class PhotonMap {
 
  private:
   Device& device_;
-  Kernel emit_, bounce_, share_out_, scatter_, sort_, merge_;
+  Kernel emit_, bounce_, count_, scan_, place_, finish_;
   std::uint32_t photons_ = 0, bucket_count_ = 0;
   std::uint32_t room_ = 0;  // photons that the buffers have room for
-  Buffer photon_buffer_, order_, filled_, control_, sorted_, buckets_;
+  Buffer photon_buffer_, keys_, order_, counts_, control_, sorted_, buckets_;
 };
 
 }  // namespace previz::render

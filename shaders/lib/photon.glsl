@@ -6,9 +6,8 @@
 #include "shaders/lib/photon_grid.glsl"
 
 layout(scalar) buffer Photons { GpuPhoton photons[]; };  // 2 * photon_count; two, for a fork
-layout(scalar) buffer Order { uint photon_order[]; };    // photons, those of a bucket together
-layout(scalar) buffer Filled { uint filled[]; };         // of a bucket, while the order is made; then
-                                                         // the order in turns with photon_order
+layout(scalar) buffer Keys { uint photon_keys[]; };      // of photons: the bucket; NO_INDEX: not stored
+layout(scalar) buffer Order { uvec2 photon_order[]; };   // buckets and photons, twice (photon_sort.glsl)
 layout(scalar) buffer PhotonControl { GpuPhotonControl photon_control; };
 layout(scalar) buffer Sorted { vec4 sorted_photons[]; };  // found_photons, to write
 layout(scalar) buffer Buckets { GpuPhotonBucket buckets[]; };  // a power of two; found_buckets

@@ -100,7 +100,7 @@ struct GpuShadowRay {
 // A photon that arrived, by way of Dirac lobes only, at a surface with a lobe that is not Dirac.
 struct GpuPhoton {
   vec3 position;
-  uint vertices;   // Dirac vertices on its way; 0: it was not stored
+  uint vertices;   // Dirac vertices on its way
   vec3 direction;  // unit, in which it travelled
   vec3 normal;     // geometric, on the side from which it arrived
   // Its flux in each world: watts, not yet divided by the number of photons of the pass. Until the
@@ -110,19 +110,21 @@ struct GpuPhoton {
 };
 
 struct GpuPhotonBucket {
-  uint first;  // in photon_order
+  uint first;  // of sorted_photons
   uint count;
 };
 
-struct GpuPhotonControl {
-  uint merge_groups[4];  // indirect dispatch arguments, padding; 0 unless some bucket is large
-  uint stored;
-};
+// Photons are sorted by so many bits of their bucket's number at a time (lib/photon_sort.glsl). A work
+// group has the counts of each digit for each of its invocations, which takes 16 KiB of its memory.
+PREVIZ_CONST uint PHOTON_DIGIT_BITS = 7u;
+PREVIZ_CONST uint PHOTON_DIGITS = 1u << PHOTON_DIGIT_BITS;
+PREVIZ_CONST uint PHOTON_RUN = 32u;  // keys that an invocation moves
+PREVIZ_CONST uint MOST_PHOTON_PASSES = 5u;  // for the 32 bits of any bucket's number
 
-// One invocation sorts a bucket of no more photons than these; larger ones are merged by all, in runs
-// that grow by PHOTON_RUNS_MERGED from pass to pass, from 1.
-PREVIZ_CONST uint SMALL_BUCKET = 64u;
-PREVIZ_CONST uint PHOTON_RUNS_MERGED = 8u;
+struct GpuPhotonControl {
+  uint stored;
+  uint totals[MOST_PHOTON_PASSES * PHOTON_DIGITS];  // of each digit, pass by pass of the sort
+};
 
 // The sums of a pixel's samples. They are two-float sums (value = high + low), so that 1e7 samples
 // lose nothing (shaders/README.md, "Accumulation").
@@ -286,7 +288,7 @@ struct GpuBatch {
   uint first_sample, samples;
   float photon_radius;        // over the distance from the camera; the photons of a pass serve the
                               // sample of the same index
-  uint photon_merge;          // number of the pass of photon_merge.comp
+  uint photon_digit;          // of the buckets' numbers, by which photons are sorted; 0: the lowest
 };
 
 // Push constants of the denoiser's passes.
@@ -479,7 +481,7 @@ static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 32);
 static_assert(sizeof(GpuPhoton) == 64);
 static_assert(sizeof(GpuPhotonBucket) == 8);
-static_assert(sizeof(GpuPhotonControl) == 20);
+static_assert(sizeof(GpuPhotonControl) == 4 + 4 * MOST_PHOTON_PASSES * PHOTON_DIGITS);
 static_assert(sizeof(GpuInfluence) == 24);
 static_assert(sizeof(GpuMorphOffset) == 24);
 static_assert(sizeof(GpuDeform) == 40);
