@@ -11,9 +11,13 @@
 const uint WORDS = PHOTON_DIGITS / 2u;
 shared uint counts[WORDS * WORKGROUP_SIZE];
 
+// Returns where the counts of a run are. What invocations use at the same time, the same word of all
+// runs or all words of a run, is in different banks of a card's memory.
+uint place_of(uint run, uint word) { return run * WORDS + (word ^ run); }
+
 // Returns how many of the digit there were, and counts one more.
 uint count_one(uint lane, uint digit) {
-  const uint word = lane * WORDS + (digit >> 1);
+  const uint word = place_of(lane, digit >> 1);
   const uint shift = (digit & 1u) * 16u;
   const uint before = counts[word];
   counts[word] = before + (1u << shift);
@@ -23,9 +27,9 @@ uint count_one(uint lane, uint digit) {
 void add_up_runs(uint lane) {
   for (uint word = lane; word < WORDS; word += WORKGROUP_SIZE) {
     uint sum = 0u;
-    for (uint i = word; i < WORDS * WORKGROUP_SIZE; i += WORDS) {
-      const uint count = counts[i];
-      counts[i] = sum;
+    for (uint run = 0u; run < WORKGROUP_SIZE; ++run) {
+      const uint count = counts[place_of(run, word)];
+      counts[place_of(run, word)] = sum;
       sum += count;
     }
   }
@@ -35,7 +39,7 @@ void main() {
   const uint lane = gl_LocalInvocationIndex;
   const uint block = gl_WorkGroupID.x;
   if (block * BLOCK_KEYS >= key_count()) return;
-  for (uint word = 0u; word < WORDS; ++word) counts[lane * WORDS + word] = 0u;
+  for (uint word = 0u; word < WORDS; ++word) counts[place_of(lane, word)] = 0u;
   const uint first = block * BLOCK_KEYS + lane * PHOTON_RUN;
   const uint end = min(first + PHOTON_RUN, key_count());
   for (uint place = first; place < end; ++place) {

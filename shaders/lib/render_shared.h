@@ -115,7 +115,8 @@ struct GpuPhotonBucket {
 };
 
 // Photons are sorted by so many bits of their bucket's number at a time (lib/photon_sort.glsl). A work
-// group has the counts of each digit for each of its invocations, which takes 16 KiB of its memory.
+// group has the counts of each digit for each of its invocations, which takes 16 KiB of its memory:
+// there are as many invocations as pairs of digits.
 PREVIZ_CONST uint PHOTON_DIGIT_BITS = 7u;
 PREVIZ_CONST uint PHOTON_DIGITS = 1u << PHOTON_DIGIT_BITS;
 PREVIZ_CONST uint PHOTON_RUN = 32u;  // keys that an invocation moves
