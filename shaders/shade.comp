@@ -1,7 +1,7 @@
 // Continues paths that have arrived at a surface or in the environment. A path forks where the
 // worlds part, takes emission, samples a light and scatters (shaders/README.md). A CPU device does all
 // of it in one pass. On a card three share it, one after the other: together they work out the surface
-// three times, but each needs so few registers that a third more lanes are under way.
+// three times, but each needs so few registers that more lanes are under way (tests/bench/RESULTS.md).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require

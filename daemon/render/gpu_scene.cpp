@@ -224,8 +224,8 @@ void GpuScene::build_structures() {
 }
 
 // Throws if the buffers of a scene with deforming meshes are too large: the shapes are written
-// through storage buffers, which may be smaller than the texel buffers that all meshes are read
-// from.
+// through storage buffers, which may be smaller than the texel buffers from which all meshes are
+// read on a device that reads texels.
 void GpuScene::check_deforming() const {
   const vk::DeviceSize most = device_.limits().maxStorageBufferRange;
   for (const Buffer* buffer : {&bvh_, &vertices_})

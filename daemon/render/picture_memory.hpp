@@ -9,7 +9,7 @@ namespace previz::render {
 // A picture is shown in bands of about this many pixels (daemon/render/presenter.hpp).
 inline constexpr std::size_t most_band_pixels = std::size_t{1} << 21;
 
-// The bytes of a pixel in the largest buffer that a whole picture needs: that of the camera's rays.
+// The bytes of a pixel in the largest buffer that every picture needs whole: the camera's rays.
 inline constexpr std::size_t whole_pixel_bytes = 2 * sizeof(float);
 
 // The memory that is available for a picture, the device's (memory_of() in daemon/render/gpu.hpp).

@@ -4,7 +4,6 @@
 #ifndef PREVIZ_DENOISE_GLSL
 #define PREVIZ_DENOISE_GLSL
 
-
 #include "shaders/lib/fetch.glsl"
 #include "shaders/lib/render_shared.h"
 

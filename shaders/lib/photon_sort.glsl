@@ -21,7 +21,10 @@ uint count_index(uint digit, uint block) { return digit * block_count() + block;
 
 // The first pass sees all slots, the others only photons that are stored: the first leaves the rest out.
 bool is_first_pass() { return batch.photon_digit == 0u; }
-uint key_count() { return is_first_pass() ? slots() : photon_control.stored; }
+uint key_count() {
+  if (is_first_pass()) return slots();
+  return photon_control.stored;
+}
 
 uint digit_of(uint key) {
   return (key >> (batch.photon_digit * PHOTON_DIGIT_BITS)) & (PHOTON_DIGITS - 1u);

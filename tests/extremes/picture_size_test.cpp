@@ -74,17 +74,17 @@ TEST(PictureSize, OfEightThousandByAFew) {
 // 8192x4320 is 35.4 million pixels of 185 bytes and a ray of 8, and 2.1 million of a band of 230:
 // 7.31 GB.
 TEST(PictureSize, Of8192x4320FitsOrIsRefused) {
-  const std::uint64_t texels = 1u << 27;
-  EXPECT_EQ(refusal(8192, 4320, {.bytes = 8 * gib, .pixels = texels}), "");
-  const std::string no_memory = refusal(8192, 4320, {.bytes = 4 * gib, .pixels = texels});
+  const std::uint64_t pixels = 1u << 27;
+  EXPECT_EQ(refusal(8192, 4320, {.bytes = 8 * gib, .pixels = pixels}), "");
+  const std::string no_memory = refusal(8192, 4320, {.bytes = 4 * gib, .pixels = pixels});
   EXPECT_THAT(no_memory, HasSubstr("8192x4320 takes 7.31 GB"));
   EXPECT_THAT(no_memory, HasSubstr("but there is only 4.29 GB"));
   // Made into layers in the same memory: 140 bytes more.
   const std::string shared =
-      refusal(8192, 4320, {.bytes = 8 * gib, .pixels = texels, .read_back = true});
+      refusal(8192, 4320, {.bytes = 8 * gib, .pixels = pixels, .read_back = true});
   EXPECT_THAT(shared, HasSubstr("takes 12.3 GB"));
-  const std::string no_texels = refusal(8192, 4320, {.bytes = 64 * gib, .pixels = 1u << 16});
-  EXPECT_THAT(no_texels, HasSubstr("65536 pixels"));
+  const std::string no_pixels = refusal(8192, 4320, {.bytes = 64 * gib, .pixels = 1u << 16});
+  EXPECT_THAT(no_pixels, HasSubstr("65536 pixels"));
 }
 
 // A megapixel that is averaged with two frames on each side takes 5 kept frames of 182 bytes a

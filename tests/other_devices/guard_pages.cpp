@@ -3,8 +3,7 @@
 // driver for CPUs that does not check where shaders read and write, and so runs above SwiftShader
 // (run.sh): Mesa's reads zeros there, and drops what is written.
 //
-// The texels' buffers are guarded against writes alone, since SwiftShader fetches texels for idle
-// lanes, too. A buffer that shares its memory with others is guarded only where that memory ends.
+// A buffer that shares its memory with others is guarded only where that memory ends.
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -33,7 +32,6 @@ struct Guarded {
 };
 std::mutex guarded_mutex;
 std::map<VkDeviceMemory, Guarded> guarded;
-std::map<VkBuffer, bool> has_texels;
 
 // Each command buffer says where the device is: it writes the number of a pass here before it
 // begins.
@@ -86,12 +84,7 @@ VkResult create_buffer(VkDevice device, const VkBufferCreateInfo* info,
   external.handleTypes = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT;
   VkBufferCreateInfo of_driver = *info;
   of_driver.pNext = &external;
-  const VkResult result =
-      next<PFN_vkCreateBuffer>(device, "vkCreateBuffer")(device, &of_driver, allocator, buffer);
-  const std::lock_guard lock(guarded_mutex);
-  if (result == VK_SUCCESS)
-    has_texels[*buffer] = (info->usage & VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT) != 0;
-  return result;
+  return next<PFN_vkCreateBuffer>(device, "vkCreateBuffer")(device, &of_driver, allocator, buffer);
 }
 
 // The driver's objects live as long as the process.
@@ -171,21 +164,7 @@ VkDeviceSize begin_of(VkDeviceMemory memory) {
   return found != guarded.end() ? found->second.pages - found->second.bytes : 0;
 }
 
-void let_read_past(VkDeviceMemory memory) {
-  const std::lock_guard lock(guarded_mutex);
-  const auto found = guarded.find(memory);
-  if (found == guarded.end()) return;
-  mprotect(found->second.all, guard_bytes, PROT_READ);
-  mprotect(found->second.all + guard_bytes + found->second.pages, guard_bytes, PROT_READ);
-}
-
-bool is_of_texels(VkBuffer buffer) {
-  const std::lock_guard lock(guarded_mutex);
-  return has_texels.at(buffer);
-}
-
 VkResult bind(VkDevice device, VkBuffer buffer, VkDeviceMemory memory, VkDeviceSize offset) {
-  if (is_of_texels(buffer)) let_read_past(memory);
   return next<PFN_vkBindBufferMemory>(device, "vkBindBufferMemory")(device, buffer, memory,
                                                                     begin_of(memory) + offset);
 }

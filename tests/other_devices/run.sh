@@ -23,7 +23,7 @@ failures=0
 card_cases='Buffers.*:MappedMemory.*:AsGpu.*:Kernel.*:DeviceLimits.*:DevicePlate.*'
 card_cases+=':Memory/DevicePlates.*:CardPictures.*:PlatePool.*:PassClock.*:PipelineCacheTest.*:Composite.*'
 card_cases+=':Show.*:History.OfAStill*:DeformingHistory.*:Deforming.*:DenoiseSparse.*:PhotonSort.*:Photons.*'
-card_cases+=':ManyLamps.*:Alpha.*:LayerTextures.*'
+card_cases+=':ManyLamps.*:Alpha.*:LayerTextures.*:CameraRadiance.*:Pane.*'
 
 # The filter by which CTest leaves the long cases of a program out.
 gate_cases() {
@@ -96,6 +96,7 @@ on_swiftshader() {
   local settings=("VK_DRIVER_FILES=$out/swiftshader/vk_swiftshader_icd.json"
     "VK_LAYER_PATH=/usr/share/vulkan/explicit_layer.d:$out/layer"
     VK_INSTANCE_LAYERS=VK_LAYER_KHRONOS_validation:VK_LAYER_PREVIZ_guard_pages)
+  run_cases swiftshader unit/scene/test_bvh "$(gate_cases bvh)" "${settings[@]}"
   run_cases swiftshader unit/render/test_render "$(gate_cases render):CardPictures.*:LiveBudget*" "${settings[@]}"
   run_cases swiftshader extremes/test_extremes "$(gate_cases extremes)" "${settings[@]}"
 }

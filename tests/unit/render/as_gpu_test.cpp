@@ -100,6 +100,54 @@ void expect_the_pictures_of_a_cpu(const std::shared_ptr<render::Device>& as_gpu)
   EXPECT_GT(render::work_of(*as_gpu).submissions, 0u);
 }
 
+// A mirror that shows what the camera has seen, below a tinted pane, both in the mixed world alone,
+// and more lamps than are chosen without a tree: what a card does in passes of its own.
+View mirror_below_a_pane() {
+  View view = empty_view({0, -1.5, 1}, {0, 0.2, 0.2}, pinhole(width, height, 0.9), glm::vec3(0.1f));
+  add(view.scene, rectangle_mesh({4, 4}), diffuse(glm::vec3(0.5f)));
+  const glm::dmat4 leaning = glm::rotate(at({0, 0.5, 0.4}), 1.9, glm::dvec3(1, 0, 0));
+  add(view.scene, rectangle_mesh({0.5, 0.4}), metal(glm::vec3(1), 0), leaning, scene::world_mixed);
+  add(view.scene, rectangle_mesh({0.4, 0.6}), pane({0.9f, 0.6f, 0.2f}), at({0.3, 0, 0.5}),
+      scene::world_mixed);
+  for (int i = 0; i < 8; ++i)
+    view.scene.lights.push_back(
+        sphere_lamp({0.4 * i - 1.4, 0.3 * (i % 3), 1.5}, 0.05, glm::dvec3(1 + i % 2)));
+  return view;
+}
+
+struct Counted {
+  render::Layers layers;
+  render::Counters counters;
+};
+
+Counted by_camera_on(const std::shared_ptr<render::Device>& device) {
+  SetRenderer renderer(mirror_below_a_pane(), {.real_radiance = set::RealRadiance::camera},
+                       set::LightSampling::importance, device);
+  renderer.begin({.plate = std::make_shared<const Plate>(random_plate(width, height, 8)),
+                  .exposure = 0.5,
+                  .world_from_camera = mirror_below_a_pane().world_from_camera});
+  renderer.render(8);
+  return {renderer.layers(), renderer.counters()};
+}
+
+// Every path is counted once, and where it goes does not depend on how the work is shared out.
+TEST(AsGpu, ShadesInPartsAsACpuDoesAtOnce) {
+  const auto as_gpu = render::open_device({.validation = true, .name = "", .as_gpu = true});
+  if (!as_gpu->is_cpu()) GTEST_SKIP() << "the device is a graphics card";
+  if (!shared_device()->shares_host_memory()) GTEST_SKIP() << "PREVIZ_AS_GPU is set";
+  const Counted expected = by_camera_on(shared_device()), found = by_camera_on(as_gpu);
+  EXPECT_GT(found.counters.measured, 0u);
+  EXPECT_EQ(found.counters.measured, expected.counters.measured);
+  EXPECT_EQ(found.counters.unmeasured, expected.counters.unmeasured);
+  EXPECT_EQ(found.counters.rays, expected.counters.rays);
+  EXPECT_EQ(found.counters.shadow_rays, expected.counters.shadow_rays);
+  EXPECT_EQ(found.counters.stopped_in_layers, expected.counters.stopped_in_layers);
+  EXPECT_TRUE(found.layers.mixed == expected.layers.mixed);
+  EXPECT_TRUE(found.layers.diff == expected.layers.diff);
+  EXPECT_TRUE(found.layers.variance == expected.layers.variance);
+  EXPECT_EQ(render::validation_messages(*as_gpu), 0u);
+}
+
 TEST(AsGpu, HasThePicturesOfACpuBitForBit) {
   expect_the_pictures_of_a_cpu(
       render::open_device({.validation = true, .name = "", .as_gpu = true}));

@@ -5,6 +5,7 @@
 
 #include "daemon/render/feature.hpp"
 #include "daemon/render/kernel.hpp"
+#include "daemon/render/passes.hpp"
 #include "shaders/accumulate.spv.h"
 #include "shaders/extend.spv.h"
 #include "shaders/generate.spv.h"
@@ -61,6 +62,16 @@ TEST(Spirv, WhatIsFetchedIsTexelsOrStorageByTheDevice) {
   EXPECT_TRUE(std::ranges::none_of(
       as_storage, [](render::BufferKind kind) { return kind == render::BufferKind::texels; },
       &SpirvInfo::Binding::kind));
+}
+
+// With all features, each pass of a card has no more storage buffers than Mesa's CPU device allows,
+// on which cards are tested.
+TEST(Spirv, APassOfACardNeedsFewStorageBuffers) {
+  constexpr std::uint32_t card = gpu::DEVICE_IS_CARD | gpu::DEVICE_READS_STORAGE;
+  for (const render::Pass& pass : render::passes_for(every_feature, card)) {
+    const SpirvInfo info = describe_spirv(render::module_of(pass, every_feature, card));
+    EXPECT_LE(info.bindings.size(), 32u) << pass.name;
+  }
 }
 
 TEST(Spirv, KnowsTheFeaturesThatAPassAsksAbout) {

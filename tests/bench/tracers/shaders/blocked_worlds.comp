@@ -8,7 +8,7 @@ writeonly buffer Blocked { uint blocked[]; };
 void main() {
   const uint i = gl_GlobalInvocationID.x;
   if (i >= count) return;
-  const vec4 origin = texelFetch(rays, int(2u * i));
-  const vec4 direction = texelFetch(rays, int(2u * i + 1u));
+  const vec4 origin = fetch(rays, int(2u * i));
+  const vec4 direction = fetch(rays, int(2u * i + 1u));
   blocked[i] = trace_blocked(origin.xyz, direction.xyz, origin.w, direction.w, worlds);
 }

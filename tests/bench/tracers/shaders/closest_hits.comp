@@ -13,8 +13,8 @@ writeonly buffer Hits { FoundHit hits[]; };
 void main() {
   const uint i = gl_GlobalInvocationID.x;
   if (i >= count) return;
-  const vec4 origin = texelFetch(rays, int(2u * i));
-  const vec4 direction = texelFetch(rays, int(2u * i + 1u));
+  const vec4 origin = fetch(rays, int(2u * i));
+  const vec4 direction = fetch(rays, int(2u * i + 1u));
   Hit hit;
   const bool found = trace_closest(origin.xyz, direction.xyz, origin.w, direction.w, worlds, hit);
   hits[i] = FoundHit(found ? hit.t : -1.0, hit.barycentrics.x, hit.barycentrics.y, hit.instance,

@@ -1,9 +1,9 @@
-// The rays of a test or benchmark: two texels each, and what the dispatch is about.
-#extension GL_EXT_samplerless_texture_functions : require
+// The rays of a test or benchmark, two elements each, and what the dispatch is about.
+#include "shaders/lib/fetch.glsl"
 #include "shaders/lib/trace.glsl"
 
 layout(local_size_x = WORKGROUP_SIZE) in;
-uniform textureBuffer rays;  // origin, t_min; direction, t_max
+PREVIZ_FETCHED(vec4, rays)  // origin, t_min; direction, t_max
 layout(push_constant) uniform Batch {
   uint count;
   uint worlds;
