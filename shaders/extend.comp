@@ -10,7 +10,7 @@ void main() {
   if (gl_GlobalInvocationID.x >= control.active_count) return;
   const uint path = queue[active_queue_index(gl_GlobalInvocationID.x)];
   const vec4 origin = ray_origin[path];
-  const uint bits = floatBitsToUint(path_throughput[path].w);
+  const uint bits = path_throughput[path].state;
   // The path leaves its last hit, unless it starts here or resumes on its way.
   const bool leaves_surface = path_depth(bits) > 0u && origin.w == 0.0;
   const uvec2 source =

@@ -57,7 +57,7 @@ void main() {
     const bool difference =
         has_feature(FEATURE_DIFFERENCE) && !may_be_covered(pixel) && !may_be_clipped(pixel);
     const uint bits = WORLD_BOTH | (difference ? PATH_DIFFERENCE : 0u);
-    path_throughput[path] = vec4(1.0, 1.0, 1.0, uintBitsToFloat(bits));
+    path_throughput[path] = GpuThroughput(vec3(1.0), bits);
     sample_mixed[slot] = vec4(0.0);
     sample_real[slot] = vec4(0.0, 0.0, 0.0, difference ? SAMPLE_DIFFERENCE : SAMPLE_FULL);
     if (has_feature(FEATURE_CAMERA)) sample_landed[slot] = vec4(0.0);

@@ -26,9 +26,9 @@ struct Flight {
 Flight load_flight(uint path) {
   const vec4 origin = ray_origin[path];
   const vec4 direction = ray_direction[path];
-  const vec4 flux = path_throughput[path];
-  const uint bits = floatBitsToUint(flux.w);
-  return Flight(origin.xyz, origin.w, direction.xyz, direction.w, flux.rgb, path_worlds(bits),
+  const GpuThroughput carried = path_throughput[path];
+  const uint bits = carried.state;
+  return Flight(origin.xyz, origin.w, direction.xyz, direction.w, carried.factor, path_worlds(bits),
                 path_depth(bits), path_medium(bits), path_passes(bits), path_is_behind(bits));
 }
 
@@ -38,7 +38,7 @@ void store_flight(Flight f, uint path) {
   const uint bits = f.worlds | (f.is_behind ? PATH_BEHIND : 0u) |
                     (f.passes << PATH_PASSES_SHIFT) | (f.vertices << PATH_DEPTH_SHIFT) |
                     (f.medium << PATH_MEDIUM_SHIFT);
-  path_throughput[path] = vec4(f.flux, uintBitsToFloat(bits));
+  path_throughput[path] = GpuThroughput(f.flux, bits);
 }
 
 // Samples the Dirac lobes of a surface in the direction of light. It is the adjoint of

@@ -43,9 +43,9 @@ struct Path {
 Path load_path(uint index) {
   const vec4 origin = ray_origin[index];
   const vec4 direction = ray_direction[index];
-  const vec4 throughput = path_throughput[index];
-  const uint bits = floatBitsToUint(throughput.w);
-  return Path(index, path_slot(index), origin.xyz, origin.w, direction.xyz, direction.w, throughput.rgb,
+  const GpuThroughput throughput = path_throughput[index];
+  const uint bits = throughput.state;
+  return Path(index, path_slot(index), origin.xyz, origin.w, direction.xyz, direction.w, throughput.factor,
               path_worlds(bits), path_depth(bits), (bits & PATH_ROUGH) != 0u,
               (has_feature(FEATURE_DIFFERENCE) || has_feature(FEATURE_CAMERA)) &&
                   (bits & PATH_DIFFERENCE) != 0u,
@@ -61,7 +61,7 @@ void store_path(Path p, uint index) {
                     (p.difference ? PATH_DIFFERENCE : 0u) | (p.landed ? PATH_LANDED : 0u) |
                     (p.is_behind ? PATH_BEHIND : 0u) | (p.passes << PATH_PASSES_SHIFT) |
                     (p.depth << PATH_DEPTH_SHIFT) | (p.medium << PATH_MEDIUM_SHIFT);
-  path_throughput[index] = vec4(p.throughput, uintBitsToFloat(bits));
+  path_throughput[index] = GpuThroughput(p.throughput, bits);
   if (has_feature(FEATURE_MANY_LIGHTS)) path_receiver[index] = p.receiver;
 }
 

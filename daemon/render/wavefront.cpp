@@ -147,7 +147,7 @@ void Wavefront::create_path_buffers(std::uint32_t slots) {
     *old = Buffer{};  // frees the old memory before the new is allocated
   ray_origin_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
   ray_direction_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
-  throughput_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
+  throughput_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuThroughput));
   receivers_ = create_storage_buffer(device_, paths * sizeof(std::uint32_t));
   hits_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuHit));
   queue_ = create_storage_buffer(device_, 2 * paths * sizeof(std::uint32_t));

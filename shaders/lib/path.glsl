@@ -13,7 +13,7 @@
 // more: path 2 slots + slot.
 layout(scalar) buffer RayOrigin { vec4 ray_origin[]; };         // of a path: origin, t_min
 layout(scalar) buffer RayDirection { vec4 ray_direction[]; };   // of a path: unit direction, pdf (0: no MIS)
-layout(scalar) buffer Throughput { vec4 path_throughput[]; };   // of a path: throughput, bits of PATH_*
+layout(scalar) buffer Throughput { GpuThroughput path_throughput[]; };  // of a path
 layout(scalar) buffer Receivers { uint path_receiver[]; };     // of a path: see lib/light_tree.glsl
 layout(scalar) buffer Hits { GpuHit hits[]; };                  // of a path
 layout(scalar) buffer Queue { uint queue[]; };                  // [2][paths]: paths to extend, ping-pong

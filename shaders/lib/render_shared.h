@@ -79,6 +79,13 @@ PREVIZ_CONST uint MAX_MEDIUM = 0xfffu;
 // A path meets and passes no more sides of coloured panes than these.
 PREVIZ_CONST uint MOST_PASSES = 8u;
 
+// What a path carries. The state is a word: read as a float it would be denormal, which a device may
+// take for zero.
+struct GpuThroughput {
+  vec3 factor;
+  uint state;  // bits of PATH_*
+};
+
 struct GpuHit {
   float t;  // below 0: nothing was hit
   vec2 barycentrics;
@@ -480,6 +487,7 @@ static_assert(offsetof(GpuLight, uv0) == 112);
 static_assert(sizeof(GpuFrame) == 240);
 static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 32);
+static_assert(sizeof(GpuThroughput) == 16);
 static_assert(sizeof(GpuPhoton) == 64);
 static_assert(sizeof(GpuPhotonBucket) == 8);
 static_assert(sizeof(GpuPhotonControl) == 4 + 4 * MOST_PHOTON_PASSES * PHOTON_DIGITS);
