@@ -189,7 +189,8 @@ void Deformer::record(const vk::raii::CommandBuffer& commands, Mesh& mesh, const
   }
 }
 
-void Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh, const Buffer& vertices) {
+std::vector<std::size_t> Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh,
+                                          const Buffer& vertices) {
   watch_last();
   std::vector<Mesh*> changed;
   std::vector<std::size_t> refitted;
@@ -204,7 +205,7 @@ void Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh, const B
     changed.push_back(&mesh);
     refitted.push_back(i);
   }
-  if (changed.empty()) return;
+  if (changed.empty()) return {};
   take_better_trees(changed, bvh);
   upload_shapes();
   const Buffers buffers = {
@@ -222,11 +223,12 @@ void Deformer::deform(std::span<const scene::Shape> shapes, Buffer& bvh, const B
     }
     device_.submissions().barrier(commands);
   });
-  if (!costs_down_.are_here()) return;
-  refitted_ = std::move(refitted);
+  if (!costs_down_.are_here()) return refitted;
+  refitted_ = refitted;
   costs_.resize(changed.size());
   costs_down_.add(device_, roots_, std::as_writable_bytes(std::span(costs_)));
   if (costs_down_.are_here()) watch_last();
+  return refitted;
 }
 
 // Looks at what the trees that were refitted last have come to cost.

@@ -36,8 +36,9 @@ class Deformer {
   void upload(std::vector<Place> places);
 
   // Gives each mesh that was added its shape, in the scene's buffers. A mesh whose bounds would be
-  // past what can be traced keeps the shape that it has.
-  void deform(std::span<const scene::Shape> shapes, Buffer& bvh, const Buffer& vertices);
+  // past what can be traced keeps the shape that it has. Returns the indices of those that changed.
+  std::vector<std::size_t> deform(std::span<const scene::Shape> shapes, Buffer& bvh,
+                                  const Buffer& vertices);
   // Returns whether the mesh that was added as number i has this shape.
   bool has_shape(std::size_t i, const scene::Shape& shape) const {
     return meshes_[i].shape == shape;

@@ -99,12 +99,8 @@ void GpuScene::set_scene(const scene::Scene& scene, double specular_alpha, bool 
 void GpuScene::deform(const std::vector<scene::Shape>& shapes) {
   assert(shapes.size() == scene_.deformations.size());
   if (shapes.empty()) return;
-  std::vector<std::optional<scene::Shape>> before;
-  for (std::size_t i = 0; i < shapes.size(); ++i) before.push_back(deformer_.shape(i));
-  deformer_.deform(shapes, bvh_, vertices_);
-  for (std::size_t i = 0; device_.traces_in_hardware() && i < shapes.size(); ++i)
-    if (deformer_.shape(i) != before[i])
-      structures_.reshape(scene_.deformations[i].mesh, vertices_);
+  for (const std::size_t i : deformer_.deform(shapes, bvh_, vertices_))
+    if (device_.traces_in_hardware()) structures_.reshape(scene_.deformations[i].mesh, vertices_);
   shapes_ = shapes;
   for (std::size_t i = 0; i < shapes.size(); ++i) {
     const scene::Deformation& deformation = scene_.deformations[i];
