@@ -126,7 +126,8 @@ TEST_P(BenchOn, MeasuresALiveFrameOfWhichItKnowsEveryPart) {
   EXPECT_NEAR(figures.ms, figures.begin_ms + figures.record_ms + figures.show_ms, 1e-9);
   EXPECT_LE(figures.waited_ms, figures.ms);
   EXPECT_GT(figures.interval_ms, 0);
-  for (const char* pass : {"extend", "shade", "shadow", "photon_emit", "history", "denoise"})
+  const char* const shading = GetParam() ? "shade_light" : "shade";
+  for (const char* pass : {"extend", shading, "shadow", "photon_emit", "history", "denoise"})
     EXPECT_GT(figures.ms_of(pass), 0) << pass;
   EXPECT_GT(figures.rays, 64u * 36u);
   EXPECT_EQ(figures.work.allocations, 0u);
