@@ -14,8 +14,7 @@ export LINT_ALL
 mkdir -p "${XDG_CACHE_HOME:-$HOME/.cache}/previzd/lint"
 rm -rf build/lint
 cmake --preset lint --log-level=WARNING >/dev/null || exit
-cmake --build build/lint --target previz_render_shaders previz_tracer_shaders \
-  >/dev/null || exit
+cmake --build build/lint --target previz_render_shaders previz_tracer_shaders >/dev/null || exit
 status=0
 # The largest first, since one that is begun last is waited for.
 find build/lint -name 'unity_*.cxx' -printf '%s %p\n' | sort -rn | cut -d' ' -f2 |
