@@ -212,8 +212,8 @@ scene::Scene spheres_on_table(int a_side) {
   scene.instances.pop_back();
   for (int i = 0; i < a_side * a_side; ++i) {
     scene::Instance& placed = scene.instances.emplace_back(sphere);
-    const glm::dvec3 at((i % a_side + 0.5) * spacing - 1, (i / a_side + 0.5) * spacing - 1,
-                        0.5 * spacing);
+    const int column = i % a_side, row = i / a_side;
+    const glm::dvec3 at((column + 0.5) * spacing - 1, (row + 0.5) * spacing - 1, 0.5 * spacing);
     placed.world_from_object = glm::scale(glm::translate(glm::dmat4(1), at), glm::dvec3(spacing));
   }
   return scene;
@@ -261,7 +261,8 @@ scene::Scene sheet_over_table(bool emits) {
   for (int i = 0; i < 4 && !emits; ++i) {
     set::Light lamp;
     lamp.type = set::LightType::rectangle;
-    lamp.position = {i % 2 - 0.5, i / 2 - 0.5, 0.4};
+    const int column = i % 2, row = i / 2;
+    lamp.position = {column - 0.5, row - 0.5, 0.4};
     lamp.width_m = lamp.height_m = 0.5;
     lamp.emission = glm::dvec3(2);
     add_lamp(scene, lamp);
