@@ -103,9 +103,11 @@ PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& respo
                        std::vector<float>(plate.samples.size())};
   each_pixel(plate.samples.size() / 3, [&](std::size_t pixel) {
     for (std::size_t i = 3 * pixel; i < 3 * pixel + 3; ++i) {
-      result.value[i] = of_code.value[plate.samples[i]];
-      result.variance[i] = of_code.variance[plate.samples[i]];
-      result.clipped[i] = of_code.clipped[plate.samples[i]];
+      // A device makes a smaller preview's plate; one that fails may bring any code.
+      const std::size_t code = std::min<std::size_t>(plate.samples[i], inverse.size() - 1);
+      result.value[i] = of_code.value[code];
+      result.variance[i] = of_code.variance[code];
+      result.clipped[i] = of_code.clipped[code];
     }
   });
   return result;

@@ -16,6 +16,18 @@ View real_set() {
   return random_scene(3, {.width = 70, .height = 50, .virtual_objects = 0});
 }
 
+// A device that fails may bring a plate whose codes no camera has. They count as white; nothing is
+// read past the response.
+TEST(Composite, OfCodesThatNoCameraHasTakesTheLast) {
+  const lighting::Response response({}, 8);
+  Plate plate = random_plate(1, 1, 8);
+  plate.samples = {255, 256, 65535};
+  const render::PlateRadiance radiance = render::plate_radiance(plate, response, 1);
+  EXPECT_EQ(radiance.value[1], radiance.value[0]);
+  EXPECT_EQ(radiance.value[2], radiance.value[0]);
+  EXPECT_EQ(radiance.clipped[2], radiance.clipped[0]);
+}
+
 TEST(Composite, WithoutAVirtualObjectThePlateComesBackBitForBit) {
   View view = real_set();
   for (const int bits : {8, 16}) {
