@@ -208,8 +208,8 @@ void begin_label(VkCommandBuffer commands, const VkDebugUtilsLabelEXT* label) {
   next<PFN_vkCmdBeginDebugUtilsLabelEXT>(commands, "vkCmdBeginDebugUtilsLabelEXT")(commands, label);
 }
 
-PFN_vkVoidFunction own(std::string_view name) {
-  static const std::map<std::string_view, PFN_vkVoidFunction> functions = {
+const Functions& own_functions() {
+  static const Functions functions = {
       {"vkGetInstanceProcAddr", untyped(instance_function)},
       {"vkGetDeviceProcAddr", untyped(device_function)},
       {"vkCreateInstance", untyped(create_instance)},
@@ -221,8 +221,7 @@ PFN_vkVoidFunction own(std::string_view name) {
       {"vkFreeMemory", untyped(free_memory)},
       {"vkCmdBeginDebugUtilsLabelEXT", untyped(begin_label)},
   };
-  const auto found = functions.find(name);
-  return found != functions.end() ? found->second : nullptr;
+  return functions;
 }
 
 }  // namespace

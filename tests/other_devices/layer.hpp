@@ -1,5 +1,5 @@
 // What every layer needs: its place in the chain between the program and the driver. A layer is one
-// file that includes this one and defines own().
+// file that includes this one and defines own_functions().
 #pragma once
 
 #include <vulkan/vk_layer.h>
@@ -12,9 +12,9 @@
 
 namespace {
 
-// What is below this layer, for an instance or for a device of it. Functions of physical devices
-// are asked for as the instance is created: later, the loader of Debian 12 answers with those above
-// this layer.
+// The next layer's or the driver's functions, of an instance or of a device of it. Those of
+// physical devices are asked for as the instance is created: later, the loader of Debian 12 answers
+// with those above this layer.
 struct Below {
   VkInstance instance = VK_NULL_HANDLE;
   PFN_vkGetInstanceProcAddr of_instance = nullptr;
@@ -99,7 +99,13 @@ VkResult create_device(VkPhysicalDevice physical, const VkDeviceCreateInfo* info
   return result;
 }
 
-PFN_vkVoidFunction own(std::string_view name);
+using Functions = std::map<std::string_view, PFN_vkVoidFunction>;
+const Functions& own_functions();
+
+PFN_vkVoidFunction own(std::string_view name) {
+  const auto found = own_functions().find(name);
+  return found != own_functions().end() ? found->second : nullptr;
+}
 
 PFN_vkVoidFunction device_function(VkDevice device, const char* name) {
   const PFN_vkVoidFunction mine = own(name);

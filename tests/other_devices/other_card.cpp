@@ -176,8 +176,8 @@ VkResult allocate(VkDevice device, const VkMemoryAllocateInfo* info,
   return result;
 }
 
-PFN_vkVoidFunction own(std::string_view name) {
-  static const std::map<std::string_view, PFN_vkVoidFunction> functions = {
+const Functions& own_functions() {
+  static const Functions functions = {
       {"vkGetInstanceProcAddr", untyped(instance_function)},
       {"vkGetDeviceProcAddr", untyped(device_function)},
       {"vkCreateInstance", untyped(create_instance)},
@@ -190,8 +190,7 @@ PFN_vkVoidFunction own(std::string_view name) {
       {"vkGetBufferMemoryRequirements2", untyped(get_requirements2)},
       {"vkAllocateMemory", untyped(allocate)},
   };
-  const auto found = functions.find(name);
-  return found != functions.end() ? found->second : nullptr;
+  return functions;
 }
 
 }  // namespace
