@@ -61,6 +61,72 @@ uint mirror_of(uint instance, uint way) {
   return 1u + hash_bits(instance) % 7u + (hash_bits(way) % 8u << 3);
 }
 
+// What is kept of a pixel's own surface while a ray from it is followed over mirrors.
+struct OwnSurface {
+  vec3 normal;
+  uint instance;
+  uint of_class;  // for pack_thing
+  float left;     // as left_after
+  bool is_known;  // where it was before
+};
+
+// Stores what a pixel shows where its ray ends: `position` is from the camera, `most` samples may be carried
+// along, and `thing` is the instance or NO_THING. `mirrors` are on the way.
+void store_seen(uint index, OwnSurface own, MirroredRay ray, uint mirrors, vec3 position, vec3 normal,
+                uint thing, float most) {
+  // A lobe this wide shows the light of its surroundings, too, which is that of the surface itself.
+  if (ray.alpha > SHARP_ALPHA) most = min(most, own.left);
+  places[index] = vec4(position, own.is_known ? most : 0.0);
+  const uint mirror = mirrors > 0u ? mirror_of(own.instance, ray.way) : 0u;
+  things[index] = uvec2(pack_thing(thing, own.of_class, mirror), pack_normals(normal, own.normal));
+}
+
+// Finds what a pixel shows, over mirrors and through glass. The rays of the camera and of the mirrors take one
+// way through the code, which fits the registers of a graphics card.
+void find_seen(uint index, MirroredRay ray) {
+  OwnSurface own;
+  for (uint mirrors = 0u; mirrors <= MOST_MIRRORS; ++mirrors) {
+    Hit hit;
+    if (!trace_closest(ray.origin, ray.direction, 0.0, 3.4e38, WORLD_MIXED, ray.source, hit)) {
+      if (mirrors > 0u)
+        store_seen(index, own, ray, mirrors, FAR_AWAY * ray.direction, -ray.direction, NO_THING, ANY_NUMBER);
+      return;
+    }
+    const Surface s =
+        make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), ray.direction, 0.0);
+    // What shines through, through a hole or through a pane, is not at this surface.
+    const bool is_pane = lets_light_through(instances[hit.instance].material);
+    if (is_pane && mirrors == 0u) {
+      things[index].x = pack_thing(NO_THING, SEE_THROUGH_CLASS, 0u);
+      return;
+    }
+    vec3 elsewhere;
+    const bool is_mirror = !is_pane && shows_elsewhere(s, elsewhere);
+    if (is_pane || (is_mirror && mirrors == MOST_MIRRORS)) {
+      store_seen(index, own, ray, mirrors, s.position, s.geometric_normal, hit.instance, 0.0);
+      return;
+    }
+    if (mirrors == 0u || !is_mirror) {
+      const GpuMotion motion = motions[hit.instance];
+      const bool is_known = motion.is_known != 0u;
+      float bent;
+      const vec3 before = position_before(hit, s, motion, bent);
+      if (motion.points != NO_INDEX) bent_places[index] = before;
+      const float left = left_after(change_by_moved(s, hit.instance, bent));
+      if (mirrors == 0u) {
+        if (is_known) befores[index] = project_before(before);
+        own = OwnSurface(s.normal, hit.instance, hit.presence == WORLD_BOTH ? 0u : 1u, left, is_known);
+      }
+      if (!is_mirror) {
+        const float most = is_known ? most_samples(s, turn_of(s.position, motion)) : 0.0;
+        store_seen(index, own, ray, mirrors, s.position, s.geometric_normal, hit.instance, min(most, left));
+        return;
+      }
+    }
+    ray = ray_from_mirror(ray, s, hit, elsewhere);
+  }
+}
+
 void main() {
   if (gl_GlobalInvocationID.x >= batch.width * batch.height) return;
   const uint index = batch.y * frame.width + gl_GlobalInvocationID.x;
@@ -68,45 +134,7 @@ void main() {
   places[index] = vec4(0.0);
   things[index] = uvec2(pack_thing(NO_THING, 0u, 0u), 0u);
   befores[index] = vec2(NOWHERE);
-  const vec3 ray = normalize(vec3(calibrated_ray(pixel, vec2(0.5)), 1.0));
-  const vec3 direction = transform_vector(frame.world_from_camera, ray);
-  Hit hit;
-  if (!trace_closest(vec3(0.0), direction, 0.0, 3.4e38, WORLD_MIXED, hit)) return;
-  // What shines through, through a hole or through a pane, is not at this surface.
-  if (lets_light_through(instances[hit.instance].material)) {
-    things[index].x = pack_thing(NO_THING, SEE_THROUGH_CLASS, 0u);
-    return;
-  }
-  const uint of_class = hit.presence == WORLD_BOTH ? 0u : 1u;
-  const Surface s =
-      make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), direction, 0.0);
-  const GpuMotion motion = motions[hit.instance];
-  float bent = 0.0;
-  if (motion.is_known != 0u) {
-    const vec3 before = position_before(hit, s, motion, bent);
-    befores[index] = project_before(before);
-    if (motion.points != NO_INDEX) bent_places[index] = before;
-  }
-  vec3 elsewhere;
-  if (shows_elsewhere(s, elsewhere)) {
-    const Mirrored seen = follow_mirrors(s, hit, elsewhere);
-    float most = ANY_NUMBER;
-    if (!seen.is_far && seen.is_clear) {
-      const GpuMotion of_seen = motions[seen.hit.instance];
-      float bent_there;
-      const vec3 before = position_before(seen.hit, seen.surface, of_seen, bent_there);
-      if (of_seen.points != NO_INDEX) bent_places[index] = before;
-      most = of_seen.is_known != 0u ? most_samples(seen.surface, turn_of(seen.position, of_seen)) : 0.0;
-      most = min(most, left_after(change_by_moved(seen.surface, seen.hit.instance, bent_there)));
-    }
-    if (seen.alpha > SHARP_ALPHA) most = min(most, left_after(change_by_moved(s, hit.instance, bent)));
-    places[index] = vec4(seen.position, seen.is_clear && motion.is_known != 0u ? most : 0.0);
-    things[index] = uvec2(pack_thing(seen.is_far ? NO_THING : seen.hit.instance, of_class, mirror_of(hit.instance, seen.way)),
-                          pack_normals(seen.normal, s.normal));
-    return;
-  }
-  float most = motion.is_known != 0u ? most_samples(s, turn_of(s.position, motion)) : 0.0;
-  places[index] = vec4(s.position, min(most, left_after(change_by_moved(s, hit.instance, bent))));
-  things[index] =
-      uvec2(pack_thing(hit.instance, of_class, 0u), pack_normals(s.geometric_normal, s.normal));
+  const vec3 from_lens = normalize(vec3(calibrated_ray(pixel, vec2(0.5)), 1.0));
+  const vec3 direction = transform_vector(frame.world_from_camera, from_lens);
+  find_seen(index, MirroredRay(vec3(0.0), direction, TRACE_FROM_NOWHERE, 0.0, 0u));
 }

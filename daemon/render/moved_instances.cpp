@@ -107,7 +107,9 @@ std::vector<gpu::GpuArrival> arrivals(const LightCells& environment,
   const auto add = [&](const glm::dvec3& direction, const glm::dvec3& light, double width) {
     const double amount = largest_channel(light);
     all += amount;
-    result.push_back({glm::vec3(direction), static_cast<float>(amount), static_cast<float>(width)});
+    const double half = std::min(width, 0.5 * std::numbers::pi);
+    result.push_back({glm::vec3(direction), static_cast<float>(amount), static_cast<float>(half),
+                      static_cast<float>(std::cos(half)), static_cast<float>(std::sin(half))});
   };
   const auto side = static_cast<std::size_t>(std::lround(std::sqrt(environment.size())));
   // Each cell is 4 pi / side^2 of the sphere, and as wide as a cap of that size.

@@ -15,15 +15,12 @@ const uint MOST_MIRRORS = 5u;
 // The environment is taken to be so far away, in metres, where a ray ends in it.
 const float FAR_AWAY = 1e7;
 
-struct Mirrored {
-  Surface surface;  // where the ray ends; the last mirror if it ends nowhere
-  Hit hit;          // of the surface
-  bool is_far;      // it ends in the environment
-  vec3 position;    // from the camera
-  vec3 normal;      // unit
-  float alpha;      // the largest on the way
-  uint way;         // a hash of which instances it has met, and which have reflected and which bent it
-  bool is_clear;    // false: it meets something that lets light through unbent, or too many mirrors
+// A ray on its way over mirrors.
+struct MirroredRay {
+  vec3 origin, direction;
+  uvec2 source;  // the triangle that it leaves, or TRACE_FROM_NOWHERE
+  float alpha;   // the largest on the way
+  uint way;      // a hash of which instances it has met, and which have reflected and which bent it
 };
 
 // Returns whether a smooth surface shows above all what is elsewhere, and in which direction.
@@ -43,28 +40,11 @@ bool shows_elsewhere(Surface s, out vec3 direction) {
   return reflected == (dot(direction, s.geometric_normal) > 0.0);
 }
 
-// Follows a ray that leaves a mirror until it ends at something else.
-Mirrored follow_mirrors(Surface s, Hit hit, vec3 direction) {
-  Mirrored m = Mirrored(s, hit, false, vec3(0.0), vec3(0.0), 0.0, 0u, true);
-  for (uint i = 0u; i < MOST_MIRRORS; ++i) {
-    m.alpha = max(m.alpha, m.surface.alpha);
-    m.way = hash_pair(m.way, 2u * hit.instance + uint(dot(direction, m.surface.geometric_normal) > 0.0));
-    if (!trace_closest(offset_origin(m.surface, direction), direction, 0.0, 3.4e38, WORLD_MIXED,
-                       uvec2(hit.instance, hit.primitive), hit)) {
-      m.is_far = true;
-      m.position = FAR_AWAY * direction;
-      m.normal = -direction;
-      return m;
-    }
-    m.hit = hit;
-    m.surface = make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), direction, 0.0);
-    m.position = m.surface.position;
-    m.normal = m.surface.geometric_normal;
-    if (lets_light_through(instances[hit.instance].material)) break;
-    if (!shows_elsewhere(m.surface, direction)) return m;
-  }
-  m.is_clear = false;
-  return m;
+// Returns the ray that goes on from a mirror in this direction.
+MirroredRay ray_from_mirror(MirroredRay ray, Surface mirror, Hit hit, vec3 direction) {
+  const uint side = uint(dot(direction, mirror.geometric_normal) > 0.0);
+  return MirroredRay(offset_origin(mirror, direction), direction, uvec2(hit.instance, hit.primitive),
+                     max(ray.alpha, mirror.alpha), hash_pair(ray.way, 2u * hit.instance + side));
 }
 
 #endif

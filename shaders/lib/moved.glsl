@@ -19,14 +19,6 @@ const uint MOST_LAMPS = 32u;
 // What moves is lit by what it moves among, and changes by less than it has moved.
 const float OWN_SHARE = 0.2;
 
-// Returns the angle at which a sphere ends, seen from a point, and the direction towards its centre.
-float half_angle(vec4 sphere, vec3 point, out vec3 towards) {
-  const vec3 off = sphere.xyz - point;
-  const float distance = length(off);
-  towards = off / max(distance, 1e-30);
-  return distance > sphere.w ? asin(sphere.w / distance) : 3.2;
-}
-
 // Returns whether a segment meets the sphere.
 bool meets_sphere(vec4 sphere, vec3 point, vec3 direction, float t_max) {
   const vec3 off = sphere.xyz - point;
@@ -37,11 +29,15 @@ bool meets_sphere(vec4 sphere, vec3 point, vec3 direction, float t_max) {
 
 // Returns the share of the light of a surface that what is in the sphere can hide or send.
 float share_of_sphere(vec4 sphere, Surface s) {
-  vec3 towards;
-  const float angle = half_angle(sphere, s.position, towards);
-  if (angle > 3.1) return 1.0;
+  const vec3 off = sphere.xyz - s.position;
+  const float distance_2 = dot(off, off);
+  const float sin_2 = sphere.w * sphere.w / distance_2;  // of the angle at which the sphere ends
+  if (!(sin_2 < 1.0)) return 1.0;
+  const vec3 towards = off * inversesqrt(distance_2);
+  const float sin_end = sqrt(sin_2), cos_end = sqrt(1.0 - sin_2);
   const float up = dot(towards, s.geometric_normal);
-  if (up < -sin(angle)) return 0.0;
+  if (up < -sin_end) return 0.0;
+  const float angle = asin(sin_end);
   if (is_specular(s) && s.alpha < SMOOTH_ALPHA) {
     const vec3 mirrored = reflect(-s.wo, s.normal);
     if (s.transmission > 0.0 || acos(clamp(dot(mirrored, towards), -1.0, 1.0)) < angle + s.alpha)
@@ -50,8 +46,9 @@ float share_of_sphere(vec4 sphere, Surface s) {
   float share = 0.0;
   for (uint i = 0u; i < history.arrival_count; ++i) {
     const GpuArrival a = arrivals[i];
-    const float apart = acos(clamp(dot(a.direction, towards), -1.0, 1.0));
-    if (apart > angle + a.width || dot(a.direction, s.geometric_normal) < -a.width) continue;
+    // Every pixel asks for every direction of light: no angle is computed that its cosine stands for.
+    if (dot(a.direction, towards) < cos_end * a.cos_width - sin_end * a.sin_width) continue;
+    if (dot(a.direction, s.geometric_normal) < -a.width) continue;
     const float part = min(angle / max(a.width, 1e-6), 1.0);
     share += a.share * (a.share > BRIGHT_SHARE ? 1.0 : part * part);
   }
@@ -59,12 +56,12 @@ float share_of_sphere(vec4 sphere, Surface s) {
   for (uint i = 0u; i < lamps; ++i) {
     const uint lamp = i * frame.light_count / lamps;
     if (lights[lamp].type == LIGHT_DIRECTIONAL) continue;
-    const vec3 off = light_positions[lamp] - s.position;
-    const float distance = length(off);
-    if (meets_sphere(sphere, s.position, off / max(distance, 1e-30), distance)) return 1.0;
+    const vec3 to_lamp = light_positions[lamp] - s.position;
+    const float distance = length(to_lamp);
+    if (meets_sphere(sphere, s.position, to_lamp / max(distance, 1e-30), distance)) return 1.0;
   }
   // It hides light that comes from other surfaces, too, and sends what falls on it.
-  return min(share + sin(angle) * sin(angle) * clamp(up + sin(angle), 0.0, 1.0), 1.0);
+  return min(share + sin_2 * clamp(up + sin_end, 0.0, 1.0), 1.0);
 }
 
 // Returns the share by which the light of a surface of the instance may have changed. `bent` is by which angle

@@ -331,7 +331,8 @@ struct GpuMoved {
 struct GpuArrival {
   vec3 direction;  // towards it
   float share;     // of all light
-  float width;     // half the angle that it comes from, radians
+  float width;     // half the angle that it comes from, radians, at most pi / 2
+  float cos_width, sin_width;
 };
 
 // What the history's passes need beside the picture (shaders/README.md, "Accumulation over time").
@@ -473,7 +474,7 @@ PREVIZ_CONST uint DITHER_SIDE = 64u;
 static_assert(sizeof(GpuDenoise) == 28);
 static_assert(sizeof(GpuMotion) == 56);
 static_assert(sizeof(GpuMoved) == 44);
-static_assert(sizeof(GpuArrival) == 20);
+static_assert(sizeof(GpuArrival) == 28);
 static_assert(sizeof(GpuHistory) == 152);
 static_assert(sizeof(GpuShow) == 72);
 static_assert(sizeof(GpuHit) == 20);
