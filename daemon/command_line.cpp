@@ -176,6 +176,23 @@ void add_track(CLI::App& app, exchange::TrackOptions& options) {
   add_any_paths(command, options.any_paths);
 }
 
+void add_model(CLI::App& app, model::ModelOptions& options) {
+  CLI::App& command = *app.add_subcommand(
+      "model", "Make the phantom of the real scene, from tags and points marked in pictures");
+  command.add_option("footage", options.footage, "Session, folder of pictures, or video")
+      ->required();
+  command
+      .add_option("--parts", options.parts_file,
+                  "File of the scene's planes, boxes and cylinders, and of the marked points")
+      ->required();
+  command.add_option("--set", options.set_file,
+                     "Set file with the tags and the film camera's lens (default: the session's)");
+  command.add_option("--out", options.out,
+                     "File of the model, .glb (default: as the file of parts is named)");
+  command.add_flag("--write", options.write,
+                   "Add the model to the set file; keeps the old file beside it");
+}
+
 void add_trade(CLI::App& app, trade::TradeOptions& options) {
   CLI::App& command =
       *app.add_subcommand("trade", "Measure error against render time: a table and a page");
@@ -235,6 +252,7 @@ void add_commands(CLI::App& app, CommandLine& said) {
   add_trade(app, said.trade);
   add_bench(app, said.bench);
   calibrate::add_calibrate(app, said.calibrate);
+  add_model(app, said.model);
   print::add_print(app, said.print);
   add_takes(app, said.takes);
 }

@@ -11,6 +11,7 @@
 #include "daemon/exchange/camera_track.hpp"
 #include "daemon/exchange/import.hpp"
 #include "daemon/exchange/take_track.hpp"
+#include "daemon/model/model.hpp"
 #include "daemon/post/render.hpp"
 #include "daemon/post/render_takes.hpp"
 #include "daemon/print/command_line.hpp"
@@ -33,6 +34,7 @@ struct CommandLine {
   trade::TradeOptions trade;
   bench::BenchOptions bench;
   calibrate::Commands calibrate;
+  model::ModelOptions model;
   print::Commands print;
   TakesCommands takes;
 };

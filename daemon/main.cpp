@@ -140,6 +140,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("check")) return post::check_set(said.check, std::cout);
     if (app.got_subcommand("calibrate"))
       return calibrate::do_calibrate(app, said.calibrate, std::cout);
+    if (app.got_subcommand("model")) return model::make_model(said.model, std::cout), 0;
     if (app.got_subcommand("devices")) return do_devices(said.learn, said.rules, stop);
     if (app.got_subcommand("export")) return do_export(said.export_take, stop);
     if (app.got_subcommand("import")) return do_import(said.import_session);

@@ -55,6 +55,7 @@ previzd calibrate response bracket --camera observer --out response.toml: Measur
 previzd calibrate from camchain.yaml --camera cam0 --out lens.toml: Takes a lens that Kalibr, OpenCV, ROS or COLMAP calibrated.
 previzd calibrate from cameras.txt --as observer: Turns a fisheye lens that COLMAP calibrated into the film camera's lens, and says by how many pixels the two differ at worst.
 previzd calibrate tags walk --set desk.toml --size 80mm --write: Finds the tags' positions, from a walk past all of them with the film camera, and writes them to the set file.
+previzd model walk --set desk.toml --parts real.toml --write: Makes the phantom of the real scene from the walk's tags and the points marked in real.toml, and adds it to the set file.
 previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.
 previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the rest.
 previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Run again, it continues where it stopped.
@@ -117,6 +118,15 @@ Film them with the film camera, at the zoom and focus of its calibration, slowly
 `previzd calibrate tags FOOTAGE --set SET --size 80mm` then lists each tag with the accuracy of its position. It names a tag that moved, and the pictures between which it did; measures one that is not the given size; and says what to film again. A good map is accurate to a millimetre and a tenth of a degree, with an rms below half a pixel.
 If the set has the table `[observer.lens_fit]`, which `previzd calibrate observer` prints behind the lens, the lens is refined as well: boards and tags are adjusted together, and what the boards left open at the edges of the picture is found from tags visible there. The output gives the rms before and after and how far the lens moves in the corner of the picture, or why it stays; `--write` writes lens and tags together.
 The size is that of the black border, from outer edge to outer edge, as measured on the paper. A tape measure across the whole set is more accurate: `--distance 0-7:2.345m`, between the centres of two tags, sets the scale.
+)"};
+
+const Chapter model_chapter{"THE MODEL", R"(
+The phantom is the model of what really stands on the set: it catches the shadows of virtual objects and hides them. `previzd model FOOTAGE --set SET --parts real.toml` makes it of planes, boxes, cylinders and rooms. Flat tags give a plane by themselves; of everything else a few corners are marked by hand in two or more of the pictures, taken from different sides, each of which must show a tag of the set.
+In the file of parts each picture has a table, [[picture]] with its `file` ("0012.png" of a folder, "frame 12" of a session), and under it [picture.points] lists what is marked there: `crate_1 = [312.4, 200.1]`, in pixels from the centre of the top left one. The same name in another picture must mean the same corner. Half a pixel is easily reached in a picture that is enlarged eight times.
+[[plane]] has a `name`, its `tags`, further `points` on it or the corners of its `outline`; without an outline it is a rectangle with `margin_m` around all that is on it. A wall has `upright_on = "floor"` and needs two points.
+[[box]] has a `name`, the plane it stands `on`, and the four corners of its `top` in order around, with "" for one that is not marked; `bottom` lists those below them. Three are enough, with a plane, corners of the other side, or a known `height_m`. A box with `tags` on its sides needs no corners.
+[[cylinder]] has a `name`, the plane it stands `on`, and at least three points on the rim of its `top`; here each picture may have points of its own. [[room]] closes four `walls` and a `floor` with a ceiling at `height_m`.
+All marks, tags and camera poses are adjusted together. The output lists each face with its accuracy (one standard deviation where the face is worst), and says which mark is a mistake and what else to mark. The model's nodes and materials are named as the parts are. `--write` adds it to the set file.
 )"};
 
 const Chapter lenses_chapter{"LENSES OF OTHER PROGRAMS", R"(
@@ -182,10 +192,11 @@ Chapter see_also(const std::string& pages) {
 }  // namespace
 
 std::vector<Page> man_pages() {
-  return {{"previzd.8", man_page(previzd_commands(), 8,
-                                 {service_chapter, examples_chapter, tags_chapter, lenses_chapter,
-                                  glossary_chapter, previzd_cameras, previzd_files, previzd_formats,
-                                  previzd_status, see_also("previzctl(1), previz-set(5)")})},
+  return {{"previzd.8",
+           man_page(previzd_commands(), 8,
+                    {service_chapter, examples_chapter, tags_chapter, model_chapter, lenses_chapter,
+                     glossary_chapter, previzd_cameras, previzd_files, previzd_formats,
+                     previzd_status, see_also("previzctl(1), previz-set(5)")})},
           {"previzctl.1", man_page(previzctl_commands(), 1,
                                    {{"ACTIONS", actions_text()},
                                     previzctl_status,

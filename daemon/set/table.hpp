@@ -129,12 +129,15 @@ struct Key {
 };
 
 // A table of the file, or an array of tables. `open` makes room for one in the draft and returns
-// its keys.
+// its keys. A table whose keys are names that the file makes up has `others`, which reads each.
 struct Section {
   enum class Kind { always, optional, repeated };
+  // Throws Misread.
+  using Others = std::function<void(Position at, const std::string& key, const Value& value)>;
   struct Opened {
     Given* given;
     std::vector<Key> keys;
+    Others others{};
   };
   std::string path;
   Kind kind;

@@ -1,0 +1,419 @@
+#include "daemon/model/fit.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <glm/geometric.hpp>
+#include <glm/gtc/matrix_transform.hpp>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <utility>
+
+#include "daemon/model/solids.hpp"
+#include "daemon/tracking/least_squares.hpp"
+#include "daemon/tracking/pose_starts.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::model {
+namespace {
+
+// A point that lies on a plane may be so far off it: no table is flatter.
+constexpr double flatness_m = 2e-4;
+// Derivatives are central differences over so many metres or radians either way.
+constexpr double step = 1e-6;
+// The share of the information that its least known direction must have to be known at all.
+constexpr double least_information = 1e-12;
+
+// A number that is adjusted, by what it does to the shape.
+struct Unknown {
+  std::string part;  // for messages
+  std::function<void(Shape&, double)> move;
+};
+
+// Residuals, in standard deviations, of a settled shape.
+using Residuals = std::vector<double>;
+struct Observation {
+  std::size_t count = 0;
+  std::function<void(const Shape&, double*)> residuals;
+};
+
+glm::dvec3 turned(const glm::dvec3& v, const glm::dvec3& by) {
+  return tracking::rotation_by(by) * v;
+}
+
+std::vector<Unknown> unknowns_of(const Parts& parts, const Start& start) {
+  std::vector<Unknown> unknowns;
+  const Shape& shape = start.shape;
+  for (std::size_t i = 0; i < shape.planes.size(); ++i) {
+    const std::string& name = parts.planes[i].name;
+    unknowns.push_back(
+        {name, [i](Shape& s, double by) { s.planes[i].at += by * s.planes[i].normal; }});
+    const auto on = start.layout.plane_on[i];
+    // An upright plane turns about the normal of what it stands on.
+    if (on) {
+      unknowns.push_back({name, [i, on = *on](Shape& s, double by) {
+                            s.planes[i].normal =
+                                turned(s.planes[i].normal, by * s.planes[on].normal);
+                          }});
+      continue;
+    }
+    for (const std::size_t k : {0, 1})
+      unknowns.push_back({name, [i, k](Shape& s, double by) {
+                            glm::dvec3& normal = s.planes[i].normal;
+                            normal = turned(normal, by * across(normal)[k]);
+                          }});
+  }
+  for (std::size_t i = 0; i < shape.boxes.size(); ++i) {
+    const std::string& name = parts.boxes[i].name;
+    const bool stands = start.layout.box_on[i].has_value();
+    for (glm::length_t k = 0; k < (stands ? 2 : 3); ++k)
+      unknowns.push_back(
+          {name, [i, k](Shape& s, double by) { s.boxes[i].foot += by * s.boxes[i].axes[k]; }});
+    for (glm::length_t k = stands ? 2 : 0; k < 3; ++k)
+      unknowns.push_back({name, [i, k](Shape& s, double by) {
+                            glm::dmat3& axes = s.boxes[i].axes;
+                            axes =
+                                tracking::orthonormal(tracking::rotation_by(by * axes[k]) * axes);
+                          }});
+    const auto known = known_sizes(parts.boxes[i], start.layout.is_clockwise[i]);
+    for (glm::length_t k = 0; k < 3; ++k)
+      if (!known[std::size_t(k)])
+        unknowns.push_back({name, [i, k](Shape& s, double by) { s.boxes[i].size[k] += by; }});
+  }
+  for (std::size_t i = 0; i < shape.cylinders.size(); ++i) {
+    const CylinderPart& part = parts.cylinders[i];
+    for (const std::size_t k : {0, 1})
+      unknowns.push_back({part.name, [i, k](Shape& s, double by) {
+                            s.cylinders[i].foot += by * across(s.cylinders[i].axis)[k];
+                          }});
+    if (!part.diameter_m)
+      unknowns.push_back({part.name, [i](Shape& s, double by) { s.cylinders[i].radius += by; }});
+    if (!part.height_m)
+      unknowns.push_back({part.name, [i](Shape& s, double by) { s.cylinders[i].height += by; }});
+  }
+  for (std::size_t i = 0; i < shape.points.size(); ++i)
+    for (glm::length_t k = 0; k < 3; ++k)
+      unknowns.push_back(
+          {start.layout.free_points[i], [i, k](Shape& s, double by) { s.points[i][k] += by; }});
+  for (std::size_t i = 0; i < shape.cameras_off.size(); ++i)
+    for (std::size_t k = 0; k < 6; ++k)
+      unknowns.push_back({"camera", [i, k](Shape& s, double by) { s.cameras_off[i][k] += by; }});
+  return unknowns;
+}
+
+// Returns the pose of a view's camera with what it is off: see FittedPose::covariance.
+tracking::CameraFromWorld pose_of(const MarkedView& view, const std::array<double, 6>& off) {
+  const glm::dmat3 turn = glm::transpose(tracking::rotation_by({off[0], off[1], off[2]}));
+  const auto& pose = view.pose.pose;
+  return {turn * pose.rotation, turn * (pose.translation - glm::dvec3(off[3], off[4], off[5]))};
+}
+
+glm::dvec3 place_of(const Shape& s, const Place& place, const Ray& ray) {
+  using enum Place::Kind;
+  switch (place.kind) {
+    case box_corner:
+      return corner(s.boxes[place.part], place.corner);
+    case upper_rim:
+      return rim_point(s.cylinders[place.part], true, ray.origin, ray.direction);
+    case lower_rim:
+      return rim_point(s.cylinders[place.part], false, ray.origin, ray.direction);
+    case free:
+      break;
+  }
+  return s.points[place.part];
+}
+
+// A mark of a point that belongs to a part.
+struct UsedMark {
+  std::size_t view = 0;
+  const Mark* mark = nullptr;
+  Place place;
+  glm::dvec3 direction{0, 0, 1};  // in the camera's axes
+};
+
+std::vector<UsedMark> used_marks(const Views& views, const Layout& layout) {
+  std::vector<UsedMark> used;
+  for (std::size_t v = 0; v < views.views.size(); ++v)
+    for (const Mark& mark : views.views[v].marks)
+      if (const auto place = layout.places.find(mark.point); place != layout.places.end())
+        used.push_back(
+            {v, &mark, place->second,
+             views.views[v].pose.pose.rotation * ray_of(views, views.views[v], mark).direction});
+  return used;
+}
+
+// Returns measured less projected, px.
+glm::dvec2 mark_off(const Views& views, const UsedMark& used, const Shape& s) {
+  const tracking::CameraFromWorld pose = pose_of(views.views[used.view], s.cameras_off[used.view]);
+  const glm::dmat3 turn = glm::transpose(pose.rotation);
+  const Ray ray{-(turn * pose.translation), turn * used.direction};
+  return used.mark->px -
+         projected(views.lens, pose.rotation * place_of(s, used.place, ray) + pose.translation);
+}
+
+void observe_marks(const Parts& parts, const Views& views, const Layout& layout,
+                   std::vector<Observation>& all) {
+  for (const UsedMark& used : used_marks(views, layout))
+    all.push_back({2, [&views, used, sigma = parts.mark_px](const Shape& s, double* out) {
+                     const glm::dvec2 off = mark_off(views, used, s) / sigma;
+                     out[0] = off.x, out[1] = off.y;
+                   }});
+}
+
+// Returns the inverse of a square root of the covariance: W with W^T W = C^-1.
+cv::Matx66d whitening(const std::array<double, 36>& covariance) {
+  cv::Matx66d root = cv::Matx66d::zeros();  // Cholesky's lower factor
+  for (int r = 0; r < 6; ++r)
+    for (int c = 0; c <= r; ++c) {
+      double sum = covariance[std::size_t(6 * r + c)];
+      for (int k = 0; k < c; ++k) sum -= root(r, k) * root(c, k);
+      root(r, c) = r == c ? std::sqrt(std::max(sum, 1e-20)) : sum / root(c, c);
+    }
+  return root.inv();
+}
+
+void observe_cameras(const Views& views, std::vector<Observation>& all) {
+  for (std::size_t v = 0; v < views.views.size(); ++v)
+    all.push_back(
+        {6, [v, white = whitening(views.views[v].pose.covariance)](const Shape& s, double* out) {
+           const cv::Matx61d off = white * cv::Matx61d(s.cameras_off[v].data());
+           std::copy_n(off.val, 6, out);
+         }});
+}
+
+std::array<glm::dvec3, 4> corners_of(const FlatTag& flat) {
+  std::array<glm::dvec3, 4> corners;
+  for (std::size_t i = 0; i < 4; ++i)
+    corners[i] = glm::dvec3(flat.tag->world_from_tag *
+                            glm::dvec4(tracking::tag_corner(flat.tag->size_m, i), 1));
+  return corners;
+}
+
+void observe_tags(const Layout& layout, std::vector<Observation>& all) {
+  for (const FlatTag& flat : layout.plane_tags)
+    all.push_back({4, [flat, at = corners_of(flat)](const Shape& s, double* out) {
+                     const Plane& plane = s.planes[flat.part];
+                     for (std::size_t i = 0; i < 4; ++i)
+                       out[i] = (glm::dot(at[i] - plane.at, plane.normal) - flat.thickness_m) /
+                                tag_sigma_m;
+                   }});
+  for (const FlatTag& flat : layout.box_tags)
+    all.push_back({4, [flat, at = corners_of(flat)](const Shape& s, double* out) {
+                     const Box& box = s.boxes[flat.part];
+                     const auto axis = glm::length_t(flat.axis);
+                     const double half =
+                         axis == 2 ? (flat.is_far ? box.size.z : 0) : 0.5 * box.size[axis];
+                     for (std::size_t i = 0; i < 4; ++i) {
+                       const double out_of =
+                           glm::dot(at[i] - box.foot, box.axes[axis]) * (flat.is_far ? 1 : -1);
+                       out[i] = (out_of - half - flat.thickness_m) / tag_sigma_m;
+                     }
+                   }});
+}
+
+void observe_points(const Parts& parts, const Layout& layout, std::vector<Observation>& all) {
+  for (std::size_t p = 0; p < parts.planes.size(); ++p)
+    for (const auto* names : {&parts.planes[p].points, &parts.planes[p].outline})
+      for (const std::string& name : *names) {
+        const Place place = layout.places.at(name);
+        all.push_back({1, [p, place](const Shape& s, double* out) {
+                         const Plane& plane = s.planes[p];
+                         out[0] =
+                             glm::dot(place_of(s, place, {}) - plane.at, plane.normal) / flatness_m;
+                       }});
+      }
+}
+
+class Problem {
+ public:
+  struct Equations {
+    double cost = 0;
+    Residuals residuals;
+    cv::Mat1d information, gradient;
+  };
+
+  Problem(const Parts& parts, const Views& views, const Start& start)
+      : layout_(start.layout), unknowns_(unknowns_of(parts, start)) {
+    observe_marks(parts, views, layout_, observations_);
+    observe_cameras(views, observations_);
+    observe_tags(layout_, observations_);
+    observe_points(parts, layout_, observations_);
+    for (const Observation& o : observations_) rows_ += o.count;
+  }
+
+  const std::vector<Unknown>& unknowns() const { return unknowns_; }
+  std::size_t rows() const { return rows_; }
+
+  Residuals residuals(Shape shape) const {
+    settle(layout_, shape);
+    Residuals all(rows_);
+    std::size_t row = 0;
+    for (const Observation& o : observations_) {
+      o.residuals(shape, &all[row]);
+      row += o.count;
+    }
+    return all;
+  }
+
+  // Returns d(values)/d(unknown) of values that are computed of a shape.
+  template <class Values>
+  std::vector<double> slope(const Shape& at, std::size_t unknown, const Values& values) const {
+    Shape less = at, more = at;
+    unknowns_[unknown].move(less, -step);
+    unknowns_[unknown].move(more, step);
+    settle(layout_, less);
+    settle(layout_, more);
+    std::vector<double> a = values(less);
+    const std::vector<double> b = values(more);
+    for (std::size_t i = 0; i < a.size(); ++i) a[i] = (b[i] - a[i]) / (2 * step);
+    return a;
+  }
+
+  Equations evaluate(const Shape& shape) const {
+    Equations e;
+    e.residuals = residuals(shape);
+    for (const double r : e.residuals) e.cost += 0.5 * r * r;
+    return e;
+  }
+
+  void linearise(const Shape& shape, Equations& e) const {
+    const int n = int(unknowns_.size());
+    cv::Mat1d jacobian(int(rows_), n);
+    for (int u = 0; u < n; ++u) {
+      // Residuals are measured less predicted.
+      const auto column =
+          slope(shape, std::size_t(u), [&](const Shape& s) { return residuals(s); });
+      for (int r = 0; r < jacobian.rows; ++r) jacobian(r, u) = -column[std::size_t(r)];
+    }
+    e.information = jacobian.t() * jacobian;
+    e.gradient = jacobian.t() * cv::Mat1d(e.residuals, true);
+  }
+
+  std::optional<Shape> stepped(const Shape& from, const Equations& e, double damping) const {
+    const auto by = tracking::damped_step(e.information, e.gradient, damping);
+    if (!by) return {};
+    Shape to = from;
+    for (std::size_t u = 0; u < unknowns_.size(); ++u) unknowns_[u].move(to, (*by)(int(u)));
+    settle(layout_, to);
+    return to;
+  }
+
+ private:
+  const Layout& layout_;
+  std::vector<Unknown> unknowns_;
+  std::vector<Observation> observations_;
+  std::size_t rows_ = 0;
+};
+
+// Throws where a direction of the unknowns changes nothing that was observed.
+void insist_on_information(const Parts& parts, const Problem& problem,
+                           const cv::Mat1d& information) {
+  const auto units = tracking::units_of(information);
+  cv::Mat1d values, vectors;
+  cv::eigen(tracking::in_units(information, units), values, vectors);
+  for (int u = 0; u < information.rows; ++u)
+    if (!(information(u, u) > 0))
+      throw Error(
+          fmt::format("{}: nothing that is marked shows where \"{}\" is; mark more of its points",
+                      parts.file.string(), problem.unknowns()[std::size_t(u)].part));
+  const int last = values.rows - 1;
+  if (values(last) > least_information * values(0)) return;
+  int most = 0;
+  for (int u = 0; u < vectors.cols; ++u)
+    if (std::abs(vectors(last, u)) > std::abs(vectors(last, most))) most = u;
+  throw Error(fmt::format(
+      "{}: what is marked leaves open how \"{}\" lies; mark more of its points, in pictures from "
+      "other sides",
+      parts.file.string(), problem.unknowns()[std::size_t(most)].part));
+}
+
+std::vector<MarkResidual> mark_residuals(const Views& views, const Layout& layout,
+                                         const Shape& shape) {
+  std::vector<MarkResidual> all;
+  for (const UsedMark& used : used_marks(views, layout))
+    all.push_back(
+        {views.views[used.view].name, used.mark->point, glm::length(mark_off(views, used, shape))});
+  return all;
+}
+
+void insist_on_marks(const Parts& parts, const std::vector<MarkResidual>& marks) {
+  const auto worst = std::ranges::max_element(marks, {}, &MarkResidual::off_px);
+  if (worst == marks.end() || worst->off_px <= most_off * parts.mark_px) return;
+  throw Error(fmt::format(
+      "{}: point \"{}\" in {} is {:.1f} px from where the other marks put it; check this mark, "
+      "whether "
+      "the same corner is meant in all pictures, and whether it belongs to the right part",
+      parts.file.string(), worst->point, worst->picture, worst->off_px));
+}
+
+// Returns how far the corners of each face lie along its normal as it is now.
+std::vector<double> heights_of(const std::vector<Solid>& reference,
+                               const std::vector<Solid>& solids) {
+  std::vector<double> heights;
+  for (std::size_t s = 0; s < reference.size(); ++s)
+    for (std::size_t f = 0; f < reference[s].faces.size(); ++f) {
+      const glm::dvec3 normal = normal_of(reference[s].faces[f]);
+      for (const glm::dvec3& p : reference[s].faces[f].outline) {
+        // The distance of the other face's plane from this corner.
+        const Face& other = solids[s].faces[f];
+        const glm::dvec3 its_normal = normal_of(other);
+        heights.push_back(glm::dot(other.outline.front() - p, its_normal) /
+                          glm::dot(normal, its_normal));
+      }
+    }
+  return heights;
+}
+
+std::vector<FaceAccuracy> accuracies(const Parts& parts, const Layout& layout,
+                                     const Problem& problem, const Shape& shape,
+                                     const cv::Mat1d& covariance) {
+  const std::vector<Solid> solids = solids_of(parts, layout, shape);
+  std::vector<std::vector<double>> slopes;
+  for (std::size_t u = 0; u < problem.unknowns().size(); ++u)
+    slopes.push_back(problem.slope(
+        shape, u, [&](const Shape& s) { return heights_of(solids, solids_of(parts, layout, s)); }));
+  std::vector<FaceAccuracy> all;
+  std::size_t row = 0;
+  for (const Solid& solid : solids)
+    for (const Face& face : solid.faces) {
+      double most = 0;
+      for (std::size_t i = 0; i < face.outline.size(); ++i, ++row) {
+        cv::Mat1d by(1, int(slopes.size()));
+        for (int u = 0; u < by.cols; ++u) by(u) = slopes[std::size_t(u)][row];
+        most = std::max(most, cv::Mat1d(by * covariance * by.t())(0));
+      }
+      all.push_back({solid.name, face.name, std::sqrt(most)});
+    }
+  return all;
+}
+
+}  // namespace
+
+Fit adjust(const Parts& parts, const Views& views, const Start& start) {
+  const Problem problem(parts, views, start);
+  const auto found = tracking::least_squares(problem, start.shape, {200, 1e-3, 1e-12});
+  if (found.why == tracking::Stopped::outside)
+    throw Error(parts.file.string() +
+                ": a part lies behind a camera that has it marked; check that the same "
+                "points are meant in all pictures");
+  Problem::Equations at = problem.evaluate(found.at);
+  problem.linearise(found.at, at);
+  Fit fit;
+  fit.shape = found.at;
+  fit.marks = mark_residuals(views, start.layout, fit.shape);
+  insist_on_marks(parts, fit.marks);
+  insist_on_information(parts, problem, at.information);
+  double squares = 0;
+  for (const MarkResidual& mark : fit.marks) squares += mark.off_px * mark.off_px;
+  fit.rms_px = fit.marks.empty() ? 0 : std::sqrt(squares / double(fit.marks.size()));
+  const double freedom = double(problem.rows()) - double(problem.unknowns().size());
+  fit.noise_factor = freedom > 0 ? std::sqrt(std::max(1.0, 2 * at.cost / freedom)) : 1;
+  if (const auto covariance = tracking::inverse_of(at.information))
+    fit.faces = accuracies(parts, start.layout, problem, fit.shape,
+                           fit.noise_factor * fit.noise_factor * *covariance);
+  return fit;
+}
+
+}  // namespace previz::model

@@ -1,0 +1,132 @@
+#include "daemon/model/model.hpp"
+
+#include <fmt/ostream.h>
+
+#include <algorithm>
+#include <map>
+
+#include "daemon/calibrate/known_camera.hpp"
+#include "daemon/calibrate/lens/source.hpp"
+#include "daemon/model/fit.hpp"
+#include "daemon/model/glb.hpp"
+#include "daemon/model/parts.hpp"
+#include "daemon/model/solids.hpp"
+#include "daemon/model/start.hpp"
+#include "daemon/model/views.hpp"
+#include "daemon/pipeline/take.hpp"
+#include "daemon/set/file_edit.hpp"
+#include "daemon/set/load.hpp"
+#include "drivers/error.hpp"
+#include "drivers/keys/value.hpp"
+#include "drivers/session/draft.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::model {
+namespace {
+
+// A face that may be off by more is worth another picture.
+constexpr double accurate_m = 2e-3;
+
+set::Set set_of(const ModelOptions& options) {
+  if (options.set_file) return set::load_set(*options.set_file);
+  if (calibrate::is_session(options.footage)) return pipeline::open_take(options.footage, {}).set;
+  throw Error(options.footage.string() +
+              ": is not a session; name the set with --set, for its tags and lens");
+}
+
+std::filesystem::path file_of(const ModelOptions& options) {
+  return options.out.value_or(std::filesystem::path(options.parts_file).replace_extension(".glb"));
+}
+
+void print_fit(const Parts& parts, const Layout& layout, const Fit& fit, std::ostream& out) {
+  fmt::print(out, "{} marks in {} pictures, rms {:.2f} px\n", fit.marks.size(),
+             parts.pictures.size(), fit.rms_px);
+  if (fit.noise_factor > 1.5)
+    fmt::print(out,
+               "warning: the marks disagree by {:.1f} times their accuracy of {:g} px; check those "
+               "that are farthest "
+               "off, or give the accuracy under [marks]\n",
+               fit.noise_factor, parts.mark_px);
+  for (const std::string& point : layout.unused_points)
+    fmt::print(out, "point \"{}\" belongs to no part and is ignored\n", point);
+  for (std::size_t i = 0; i < parts.boxes.size(); ++i) {
+    const glm::dvec3 mm = 1000.0 * fit.shape.boxes[i].size;
+    fmt::print(out, "box {}: {:.1f} x {:.1f} x {:.1f} mm\n", parts.boxes[i].name, mm.x, mm.y, mm.z);
+  }
+  for (std::size_t i = 0; i < parts.cylinders.size(); ++i)
+    fmt::print(out, "cylinder {}: diameter {:.1f} mm, height {:.1f} mm\n", parts.cylinders[i].name,
+               2000 * fit.shape.cylinders[i].radius, 1000 * fit.shape.cylinders[i].height);
+}
+
+// The faces of a part, each name once, with what to do about those that are uncertain.
+void print_faces(const Fit& fit, std::ostream& out) {
+  std::vector<FaceAccuracy> faces;
+  for (const FaceAccuracy& face : fit.faces) {
+    const auto same = std::ranges::find_if(
+        faces, [&](const FaceAccuracy& f) { return f.part == face.part && f.face == face.face; });
+    if (same == faces.end())
+      faces.push_back(face);
+    else
+      same->sigma_m = std::max(same->sigma_m, face.sigma_m);
+  }
+  for (const FaceAccuracy& face : faces) {
+    fmt::print(out, "  {}, {}: accurate to {:.1f} mm", face.part, face.face, 1000 * face.sigma_m);
+    if (face.sigma_m > accurate_m)
+      out << "; to improve it, mark its corners in pictures from other sides and nearer by, or put "
+             "a tag on it";
+    out << '\n';
+  }
+}
+
+// Adds the model to the set file, unless the file has it.
+void add_to_set(const std::filesystem::path& set_file, const std::filesystem::path& model,
+                std::ostream& out) {
+  const std::string before = set::read_set_file(set_file);
+  set::FileEdit edit(before);
+  const std::string name =
+      std::filesystem::relative(std::filesystem::absolute(model),
+                                std::filesystem::absolute(set_file).parent_path())
+          .string();
+  for (std::size_t i = 0; i < edit.count("object"); ++i)
+    if (edit.written("object", i, "file") == codec::quote(name))
+      return fmt::print(out, "{}: has the model already\n", set_file.string());
+  edit.append(fmt::format("[[object]]\nname = {}\nfile = {}\npresence = \"phantom\"\n",
+                          codec::quote(model.stem().string()), codec::quote(name)));
+  set::parse_set(edit.text(), set_file);
+  const auto old = set::keep_beside(set_file);
+  session::replace_file(set_file, edit.text());
+  fmt::print(out, "written to {}; previous version: {}\n", set_file.string(), old.string());
+}
+
+void warn_of_others(const set::Set& set, const std::filesystem::path& model, std::ostream& out) {
+  for (const set::Object& object : set.objects)
+    if (object.presence == set::Presence::phantom &&
+        std::filesystem::weakly_canonical(object.file) != std::filesystem::weakly_canonical(model))
+      fmt::print(out,
+                 "the set has a phantom \"{}\" beside this model; remove its [[object]] if it is "
+                 "of the same things\n",
+                 object.name);
+}
+
+}  // namespace
+
+void make_model(const ModelOptions& options, std::ostream& out) {
+  if (options.write && !options.set_file)
+    throw Error("--write needs --set: it changes that set file");
+  const Parts parts = parse_parts(session::read_file(options.parts_file), options.parts_file);
+  const set::Set set = set_of(options);
+  const ObserverCalibration camera = calibrate::known_observer(options.set_file, options.footage);
+  const auto source = calibrate::open_source(options.footage, "observer");
+  const Views views = find_views(*source, camera, set.tracking, parts);
+  const Start start = first_guess(parts, views, set.tracking.tags);
+  const Fit fit = adjust(parts, views, start);
+  print_fit(parts, start.layout, fit, out);
+  print_faces(fit, out);
+  const std::filesystem::path file = file_of(options);
+  session::replace_file(file, glb_of(solids_of(parts, start.layout, fit.shape), {}));
+  fmt::print(out, "model: {}\n", file.string());
+  warn_of_others(set, file, out);
+  if (options.write) add_to_set(*options.set_file, file, out);
+}
+
+}  // namespace previz::model

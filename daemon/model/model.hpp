@@ -1,0 +1,23 @@
+// Reconstructs the real scene from tags and from points that a person marks in pictures, as a
+// phantom for the set file: `previzd model`.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <ostream>
+
+namespace previz::model {
+
+struct ModelOptions {
+  std::filesystem::path footage;                  // session, folder of pictures, or video
+  std::filesystem::path parts_file;               // parts.hpp
+  std::optional<std::filesystem::path> set_file;  // default: the session's own
+  std::optional<std::filesystem::path> out;       // default: the parts file's name, ending in .glb
+  bool write = false;                             // add the model to the set file
+};
+
+// Writes the model and reports on `out` what fits how well. Throws previz::Error naming the file,
+// part, point or picture at fault; nothing is written then.
+void make_model(const ModelOptions& options, std::ostream& out);
+
+}  // namespace previz::model

@@ -1,0 +1,339 @@
+#include "daemon/model/parts.hpp"
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <array>
+#include <list>
+#include <map>
+#include <set>
+
+#include "daemon/set/read_tables.hpp"
+
+namespace previz {
+
+template <>
+struct Codec<std::vector<int>> {
+  static std::vector<int> read(const Value& value, const Rule& rule) {
+    std::vector<int> ids;
+    for (const Value& entry : codec::list(value, describe(rule)))
+      ids.push_back(static_cast<int>(codec::whole_number(entry, rule)));
+    return ids;
+  }
+  static std::string describe(const Rule&) { return "list of tag ids, like [0, 3]"; }
+};
+
+namespace model {
+namespace {
+
+using set::Given, set::Key, set::Problems, set::Section;
+using Keys = std::vector<Key>;
+using Texts = std::vector<std::string>;
+
+constexpr Rule ids = units::plain.within(0, 65535);
+constexpr Rule length = units::m.within(1e-4, 1000);
+constexpr Rule thin = units::m.within(0, 0.1);
+
+Need optional(std::string example) {
+  return {Need::Kind::optional, std::move(example)};
+}
+Need required(std::string example) {
+  return {Need::Kind::required, std::move(example)};
+}
+
+// The parts as they are read. A list keeps each where it is, which the keys are bound to.
+template <class Part>
+using Drafts = std::list<std::pair<Given, Part>>;
+
+struct Draft {
+  Parts parts;
+  Given marking;
+  Drafts<MarkedPicture> pictures;
+  std::list<Given> points;  // of each [picture.points]
+  Drafts<PlanePart> planes;
+  Drafts<BoxPart> boxes;
+  Drafts<CylinderPart> cylinders;
+  Drafts<RoomPart> rooms;
+};
+
+// clang-format off
+Keys plane_keys(PlanePart& p) {
+  return {
+      {"name", &p.name, {}, "Name of the plane.", required("\"table\"")},
+      {"tags", &p.tags, ids, "Tags that lie flat on it.", optional("[0, 1, 2]")},
+      {"tag_thickness_m", &p.tag_thickness_m, thin, "Thickness of their paper or board."},
+      {"points", &p.points, {}, "Points that lie on it.", optional("[\"a\", \"b\", \"c\"]")},
+      {"outline", &p.outline, {}, "Points at its corners, in order around. Default: a rectangle around everything on it.", optional("[\"a\", \"b\", \"c\", \"d\"]")},
+      {"margin_m", &p.margin_m, units::m.within(0, 1000), "How far that rectangle extends beyond what is on the plane."},
+      {"upright_on", &p.upright_on, {}, "Plane that it stands on at a right angle.", optional("\"floor\"")},
+  };
+}
+
+Keys box_keys(BoxPart& b) {
+  return {
+      {"name", &b.name, {}, "Name of the box.", required("\"crate\"")},
+      {"on", &b.on, {}, "Plane that it stands on.", optional("\"table\"")},
+      {"top", &b.top, {}, "Points at the four corners of its upper side, in order around; \"\" for one that is not marked.", optional("[\"a\", \"b\", \"c\", \"d\"]")},
+      {"bottom", &b.bottom, {}, "Points at the corners below them.", optional("[\"e\", \"f\", \"\", \"\"]")},
+      {"tags", &b.tags, ids, "Tags that lie flat on its sides.", optional("[7]")},
+      {"tag_thickness_m", &b.tag_thickness_m, thin, "Thickness of their paper or board."},
+      {"length_m", &b.length_m, length, "Distance of the first two corners, if it is known; of a box with tags only, its size along the first tag's right.", optional("0.3")},
+      {"width_m", &b.width_m, length, "Distance of the second and the third corner, or along the first tag's up.", optional("0.2")},
+      {"height_m", &b.height_m, length, "Height, or along the first tag's normal.", optional("0.1")},
+  };
+}
+
+Keys cylinder_keys(CylinderPart& c) {
+  return {
+      {"name", &c.name, {}, "Name of the cylinder.", required("\"can\"")},
+      {"on", &c.on, {}, "Plane that it stands on.", required("\"table\"")},
+      {"top", &c.top, {}, "Points on its upper rim; each may be visible in one picture only.", optional("[\"a\", \"b\", \"c\"]")},
+      {"bottom", &c.bottom, {}, "Points on its lower rim.", optional("[\"d\", \"e\"]")},
+      {"diameter_m", &c.diameter_m, length, "Diameter, if it is known.", optional("0.066")},
+      {"height_m", &c.height_m, length, "Height, if it is known.", optional("0.115")},
+  };
+}
+
+Keys room_keys(RoomPart& r) {
+  return {
+      {"name", &r.name, {}, "Name of the room.", required("\"room\"")},
+      {"floor", &r.floor, {}, "Plane of the floor.", required("\"floor\"")},
+      {"walls", &r.walls, {}, "The four planes of its walls, in order around.", required("[\"north\", \"east\", \"south\", \"west\"]")},
+      {"height_m", &r.height_m, length, "Height of the ceiling.", required("2.6")},
+  };
+}
+// clang-format on
+
+template <class Part>
+Section many(const std::string& path, Drafts<Part>& parts, Keys (*keys)(Part&)) {
+  return {path, Section::Kind::repeated, "", [path, &parts, keys]() -> Section::Opened {
+            auto& [given, part] = parts.emplace_back();
+            given.path = path;
+            return {&given, keys(part)};
+          }};
+}
+
+Section points_section(Draft& d) {
+  return {"picture.points", Section::Kind::optional, "", [&d]() -> Section::Opened {
+            d.points.emplace_back().path = "picture.points";
+            const auto mark = [&d](Position, const std::string& name, const Value& value) {
+              const auto px = codec::numbers(value, 2, units::px.within(-1e5, 1e5));
+              if (!d.pictures.empty())
+                d.pictures.back().second.marks.push_back({name, {px[0], px[1]}});
+            };
+            return {&d.points.back(), {}, mark};
+          }};
+}
+
+std::vector<Section> sections(Draft& d) {
+  const auto picture_keys = +[](MarkedPicture& p) {
+    return Keys{{"file", &p.name, {}, "Name of the picture.", required("\"0000.png\"")}};
+  };
+  return {{"marks", Section::Kind::always, "",
+           [&d]() -> Section::Opened {
+             d.marking.path = "marks";
+             return {&d.marking,
+                     {{"accuracy_px", &d.parts.mark_px, units::px.within(0.01, 100),
+                       "How far off a mark's coordinates are (standard deviation)."}}};
+           }},
+          many("picture", d.pictures, picture_keys),
+          points_section(d),
+          many("plane", d.planes, plane_keys),
+          many("box", d.boxes, box_keys),
+          many("cylinder", d.cylinders, cylinder_keys),
+          many("room", d.rooms, room_keys)};
+}
+
+// Finds what is wrong with the parts beyond each value.
+class Checker {
+ public:
+  Checker(const Draft& draft, Problems& problems) : draft_(draft), problems_(problems) {
+    for (const auto& [given, picture] : draft.pictures)
+      for (const Mark& mark : picture.marks) ++pictures_of_[mark.point];
+  }
+
+  void check() {
+    check_names();
+    for (const auto& [given, plane] : draft_.planes) check(given, plane);
+    for (const auto& [given, box] : draft_.boxes) check(given, box);
+    for (const auto& [given, cylinder] : draft_.cylinders) check(given, cylinder);
+    for (const auto& [given, room] : draft_.rooms) check(given, room);
+  }
+
+ private:
+  void add(const Given& given, const std::string& key, const std::string& what) {
+    problems_.add(given.where(key), given.path + '.' + key, what);
+  }
+
+  void name(const Given& given, const std::string& name) {
+    if (name.empty()) return add(given, "name", "is empty; allowed: a name");
+    if (!names_.insert(name).second)
+      add(given, "name", '"' + name + "\" is used twice; allowed: a name for each part");
+  }
+
+  void check_names() {
+    std::set<std::string> pictures;
+    for (const auto& [given, picture] : draft_.pictures)
+      if (!pictures.insert(picture.name).second)
+        add(given, "file", '"' + picture.name + "\" has a table already; put all its points there");
+    for (const auto& [given, plane] : draft_.planes) name(given, plane.name);
+    for (const auto& [given, box] : draft_.boxes) name(given, box.name);
+    for (const auto& [given, cylinder] : draft_.cylinders) name(given, cylinder.name);
+    for (const auto& [given, room] : draft_.rooms) name(given, room.name);
+    if (names_.empty())
+      problems_.add({}, "", "has no part; add a [[plane]], [[box]], [[cylinder]] or [[room]]");
+  }
+
+  // A point that is given must be marked; how often, says what it is used for.
+  void points(const Given& given, const std::string& key, const Texts& names, int least) {
+    for (const std::string& point : names) {
+      if (point.empty()) continue;
+      const auto found = pictures_of_.find(point);
+      if (found == pictures_of_.end()) {
+        Texts known;
+        for (const auto& [name, count] : pictures_of_) known.push_back(name);
+        const std::string meant = set::nearest(point, known);
+        add(given, key,
+            "no picture has a point \"" + point + "\"; " +
+                (meant.empty() ? "mark it under [picture.points]" : "did you mean " + meant + "?"));
+      } else if (found->second < least) {
+        add(given, key,
+            "point \"" + point +
+                "\" is marked in one picture only; mark it in another one, taken from another "
+                "side");
+      }
+    }
+  }
+
+  // Returns whether the plane exists.
+  bool plane(const Given& given, const std::string& key, const std::string& name) {
+    Texts known;
+    for (const auto& [of, plane] : draft_.planes) known.push_back(plane.name);
+    if (std::ranges::find(known, name) != known.end()) return true;
+    const std::string meant = set::nearest(name, known);
+    add(given, key,
+        "there is no plane \"" + name + "\"; " +
+            (meant.empty() ? "add a [[plane]] of this name" : "did you mean " + meant + "?"));
+    return false;
+  }
+
+  static std::size_t marked(const Texts& names) {
+    return names.size() - static_cast<std::size_t>(std::ranges::count(names, ""));
+  }
+
+  void check(const Given& given, const PlanePart& p) {
+    points(given, "points", p.points, 2);
+    points(given, "outline", p.outline, 2);
+    const std::size_t on_it = marked(p.points) + marked(p.outline);
+    const std::size_t needed = p.upright_on.empty() ? 3 : 2;
+    if (p.tags.empty() && on_it < needed)
+      add(given, "name",
+          fmt::format(
+              "nothing says where plane \"{}\" is: it has no tag and {} points, and needs {}; "
+              "list its tags, or mark more points on it",
+              p.name, on_it, needed));
+    if (!p.outline.empty() && p.outline.size() < 3)
+      add(given, "outline", "has fewer than 3 corners; allowed: 3 or more points, in order around");
+    if (p.upright_on.empty() || !plane(given, "upright_on", p.upright_on)) return;
+    const auto below = std::ranges::find(draft_.planes, p.upright_on,
+                                         [](const auto& draft) { return draft.second.name; });
+    if (p.upright_on == p.name || !below->second.upright_on.empty())
+      add(given, "upright_on",
+          '"' + p.upright_on + "\" stands on a plane itself; allowed: a plane that does not");
+  }
+
+  bool four(const Given& given, const std::string& key, const Texts& names) {
+    if (names.empty() || names.size() == 4) return true;
+    add(given, key,
+        fmt::format(
+            "has {} corners; allowed: 4, in order around, with \"\" for one that is not marked",
+            names.size()));
+    return false;
+  }
+
+  void check(const Given& given, const BoxPart& b) {
+    points(given, "top", b.top, 2);
+    points(given, "bottom", b.bottom, b.on.empty() ? 2 : 1);
+    const bool has_plane = b.on.empty() || plane(given, "on", b.on);
+    if (!four(given, "top", b.top) || !four(given, "bottom", b.bottom) || !has_plane) return;
+    std::size_t corners = 0;  // around the box, marked above or below
+    for (std::size_t i = 0; i < 4; ++i)
+      corners +=
+          (!b.top.empty() && !b.top[i].empty()) || (!b.bottom.empty() && !b.bottom[i].empty());
+    if (corners < 3 && b.tags.empty())
+      add(given, "name",
+          fmt::format(
+              "box \"{}\" has {} of its four upright edges marked and needs 3; mark more of its "
+              "corners, or list the tags on it",
+              b.name, corners));
+    const bool has_height =
+        b.height_m || (marked(b.top) > 0 && (marked(b.bottom) > 0 || !b.on.empty()));
+    if (b.tags.empty() && !has_height)
+      add(given, "name",
+          fmt::format(
+              "box \"{}\" has one side only: nothing says how high it is; name the plane it stands "
+              "on (on), mark corners of the other side, or give height_m",
+              b.name));
+  }
+
+  void check(const Given& given, const CylinderPart& c) {
+    points(given, "top", c.top, 1);
+    points(given, "bottom", c.bottom, 1);
+    if (!plane(given, "on", c.on)) return;
+    if (marked(c.top) + marked(c.bottom) < 3)
+      add(given, "name",
+          fmt::format("cylinder \"{}\" has fewer than 3 points on its rims; mark more of them",
+                      c.name));
+    if (marked(c.top) == 0 && !c.height_m)
+      add(given, "height_m",
+          "is missing, and no point of the upper rim is marked; give one of them");
+  }
+
+  void check(const Given& given, const RoomPart& r) {
+    if (r.walls.size() != 4)
+      add(given, "walls",
+          fmt::format("has {} planes; allowed: 4, in order around", r.walls.size()));
+    plane(given, "floor", r.floor);
+    for (const std::string& wall : r.walls) plane(given, "walls", wall);
+  }
+
+  const Draft& draft_;
+  Problems& problems_;
+  std::map<std::string, int> pictures_of_;  // how many show each point
+  std::set<std::string> names_;
+};
+
+template <class Part>
+std::vector<Part> values_of(const Drafts<Part>& drafts) {
+  std::vector<Part> parts;
+  for (const auto& [given, part] : drafts) parts.push_back(part);
+  return parts;
+}
+
+}  // namespace
+
+Parts parse_parts(const std::string& text, const std::filesystem::path& file) {
+  Problems problems(file.string());
+  Draft draft;
+  const auto home_of = [](const std::string& key) {
+    Draft scratch;
+    return set::home_among(sections(scratch), key);
+  };
+  set::read_tables(set::parse_toml(text, file.string(), problems), sections(draft), home_of,
+                   problems);
+  problems.throw_if_any();
+  Checker(draft, problems).check();
+  problems.throw_if_any();
+  Parts parts = draft.parts;
+  parts.file = file;
+  parts.pictures = values_of(draft.pictures);
+  parts.planes = values_of(draft.planes);
+  parts.boxes = values_of(draft.boxes);
+  parts.cylinders = values_of(draft.cylinders);
+  parts.rooms = values_of(draft.rooms);
+  return parts;
+}
+
+}  // namespace model
+}  // namespace previz

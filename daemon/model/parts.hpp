@@ -1,0 +1,77 @@
+// What a model of the real scene is made of, and where its points are seen: the file of parts that
+// `previzd model` reads. Plain data.
+#pragma once
+
+#include <filesystem>
+#include <glm/vec2.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace previz::model {
+
+// A named point as a person found it in one picture; (0, 0) is the centre of the top left pixel.
+struct Mark {
+  std::string point;
+  glm::dvec2 px{0};
+};
+
+struct MarkedPicture {
+  std::string name;  // the picture's file, or the video and the frame's number
+  std::vector<Mark> marks;
+};
+
+// A flat surface: a table, a floor, a wall. It is where its tags and points lie.
+struct PlanePart {
+  std::string name;
+  std::vector<int> tags;            // that lie flat on it
+  double tag_thickness_m = 1e-4;    // of their paper or board
+  std::vector<std::string> points;  // that lie on it
+  std::vector<std::string>
+      outline;             // points at its corners, in order; empty: a rectangle around all on it
+  double margin_m = 0.3;   // of that rectangle
+  std::string upright_on;  // the plane that it stands on at a right angle; empty: none
+};
+
+// Four corners in order around a box's upper or lower side; "" for one that is not marked.
+struct BoxPart {
+  std::string name;
+  std::string on;                        // the plane that it stands on; empty: none
+  std::vector<std::string> top, bottom;  // empty or four; bottom i is below top i
+  std::vector<int> tags;                 // that lie flat on its sides
+  double tag_thickness_m = 1e-4;
+  // Known sizes: from the first corner to the second, from there to the third, and up.
+  std::optional<double> length_m, width_m, height_m;
+};
+
+struct CylinderPart {
+  std::string name;
+  std::string on;                        // the plane that it stands on
+  std::vector<std::string> top, bottom;  // marks on its rims; each picture may have others
+  std::optional<double> diameter_m, height_m;
+};
+
+// Four walls around a floor, and a ceiling.
+struct RoomPart {
+  std::string name;
+  std::string floor;
+  std::vector<std::string> walls;  // planes, in order around
+  double height_m = 0;
+};
+
+struct Parts {
+  std::filesystem::path file;  // for messages
+  double mark_px = 1;          // standard deviation of a mark's coordinates
+  std::vector<MarkedPicture> pictures;
+  std::vector<PlanePart> planes;
+  std::vector<BoxPart> boxes;
+  std::vector<CylinderPart> cylinders;
+  std::vector<RoomPart> rooms;
+};
+
+// Parses a file of parts; `file` names it in errors. Throws previz::Error with every problem found,
+// one a line: what cannot be read, names that are used twice or not known, points that no picture
+// has, and parts that nothing determines.
+Parts parse_parts(const std::string& text, const std::filesystem::path& file);
+
+}  // namespace previz::model

@@ -1,0 +1,256 @@
+#include "daemon/model/solids.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <limits>
+#include <numbers>
+
+#include "daemon/tracking/pose_starts.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::model {
+namespace {
+
+constexpr int cylinder_sides = 48;
+
+using Points = std::vector<glm::dvec3>;
+
+glm::dvec3 onto(const Plane& plane, const glm::dvec3& p) {
+  return p - glm::dot(p - plane.at, plane.normal) * plane.normal;
+}
+
+// Returns the part of a convex polygon that is in front of the plane (Sutherland and Hodgman 1974).
+Points clipped(const Points& polygon, const Plane& by) {
+  Points kept;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const glm::dvec3 &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    const double da = glm::dot(a - by.at, by.normal), db = glm::dot(b - by.at, by.normal);
+    if (da >= 0) kept.push_back(a);
+    if ((da >= 0) != (db >= 0)) kept.push_back(a + da / (da - db) * (b - a));
+  }
+  return kept;
+}
+
+class Solids {
+ public:
+  Solids(const Parts& parts, const Layout& layout, const Shape& shape)
+      : parts_(parts), layout_(layout), shape_(shape) {}
+
+  std::vector<Solid> all() const {
+    std::vector<Solid> solids;
+    for (std::size_t i = 0; i < parts_.planes.size(); ++i)
+      if (!belongs_to_room(parts_.planes[i].name)) solids.push_back(plane(i));
+    for (std::size_t i = 0; i < parts_.boxes.size(); ++i) solids.push_back(box(i));
+    for (std::size_t i = 0; i < parts_.cylinders.size(); ++i) solids.push_back(cylinder(i));
+    for (const RoomPart& part : parts_.rooms) solids.push_back(room(part));
+    return solids;
+  }
+
+ private:
+  bool belongs_to_room(const std::string& name) const {
+    return std::ranges::any_of(parts_.rooms, [&](const RoomPart& room) {
+      return room.floor == name || std::ranges::find(room.walls, name) != room.walls.end();
+    });
+  }
+
+  const Plane& plane_named(const std::string& name) const {
+    const auto part = std::ranges::find(parts_.planes, name, &PlanePart::name);
+    return shape_.planes[std::size_t(part - parts_.planes.begin())];
+  }
+
+  glm::dvec3 place_of(const std::string& point) const {
+    const Place& place = layout_.places.at(point);
+    if (place.kind == Place::Kind::box_corner)
+      return corner(shape_.boxes[place.part], place.corner);
+    if (place.kind == Place::Kind::free) return shape_.points[place.part];
+    return shape_.cylinders[place.part].foot;
+  }
+
+  // Returns what lies or stands on a plane.
+  Points things_on(std::size_t index) const {
+    Points on_it;
+    for (const FlatTag& flat : layout_.plane_tags)
+      for (std::size_t i = 0; flat.part == index && i < 4; ++i)
+        on_it.emplace_back(flat.tag->world_from_tag *
+                           glm::dvec4(tracking::tag_corner(flat.tag->size_m, i), 1));
+    for (const auto* names : {&parts_.planes[index].points, &parts_.planes[index].outline})
+      for (const std::string& point : *names) on_it.push_back(place_of(point));
+    for (std::size_t i = 0; i < shape_.boxes.size(); ++i)
+      for (std::size_t k = 0; layout_.box_on[i] == index && k < 4; ++k)
+        on_it.push_back(corner(shape_.boxes[i], k));
+    for (std::size_t i = 0; i < shape_.cylinders.size(); ++i)
+      if (layout_.cylinder_on[i] == index)
+        for (const glm::dvec3& way : across(shape_.cylinders[i].axis))
+          for (const double sign : {-1, 1})
+            on_it.push_back(shape_.cylinders[i].foot + sign * shape_.cylinders[i].radius * way);
+    for (std::size_t i = 0; i < shape_.planes.size(); ++i)
+      if (layout_.plane_on[i] == index)
+        for (const glm::dvec3& p : things_on(i)) on_it.push_back(p);
+    return on_it;
+  }
+
+  glm::dvec3 along(std::size_t index) const {
+    const glm::dvec3 normal = shape_.planes[index].normal;
+    if (const auto on = layout_.plane_on[index])
+      return glm::cross(shape_.planes[*on].normal, normal);
+    const auto tag = std::ranges::find(layout_.plane_tags, index, &FlatTag::part);
+    return tag == layout_.plane_tags.end() ? glm::dvec3(1, 0, 0)
+                                           : glm::dvec3(tag->tag->world_from_tag[0]);
+  }
+
+  // A rectangle around all that is on the plane. That of an upright plane begins at what it stands
+  // on.
+  Points rectangle(std::size_t index) const {
+    const Plane& plane = shape_.planes[index];
+    const double margin = parts_.planes[index].margin_m;
+    const glm::dmat3 axes = upright_axes(along(index), plane.normal);
+    glm::dvec2 low(std::numeric_limits<double>::infinity()), high(-low);
+    for (const glm::dvec3& p : things_on(index)) {
+      const glm::dvec2 at(glm::dot(p - plane.at, axes[0]), glm::dot(p - plane.at, axes[1]));
+      low = glm::min(low, at);
+      high = glm::max(high, at);
+    }
+    low -= margin;
+    high += margin;
+    if (const auto on = layout_.plane_on[index]) {
+      const Plane& below = shape_.planes[*on];
+      low.y = glm::dot(below.at - plane.at, below.normal);
+    }
+    Points corners;
+    for (const glm::dvec2 at : {low, glm::dvec2(high.x, low.y), high, glm::dvec2(low.x, high.y)})
+      corners.push_back(plane.at + at.x * axes[0] + at.y * axes[1]);
+    return corners;
+  }
+
+  Points outline(std::size_t index) const {
+    const PlanePart& part = parts_.planes[index];
+    const Plane& plane = shape_.planes[index];
+    Points corners;
+    for (const std::string& point : part.outline) corners.push_back(onto(plane, place_of(point)));
+    int left = 0, right = 0;
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const glm::dvec3 &a = corners[i], &b = corners[(i + 1) % corners.size()],
+                       &c = corners[(i + 2) % corners.size()];
+      (glm::dot(glm::cross(b - a, c - b), plane.normal) > 0 ? left : right) += 1;
+    }
+    if (left > 0 && right > 0)
+      throw Error(
+          fmt::format("{}: the outline of plane \"{}\" is not convex; list its corners in order "
+                      "around, or make "
+                      "two planes of it",
+                      parts_.file.string(), part.name));
+    if (right > 0) std::ranges::reverse(corners);
+    return corners;
+  }
+
+  Solid plane(std::size_t index) const {
+    const PlanePart& part = parts_.planes[index];
+    Points corners = part.outline.empty() ? rectangle(index) : outline(index);
+    for (std::size_t i = 0; i < shape_.planes.size(); ++i) {
+      const bool stands_here = layout_.plane_on[i] == index;
+      const bool stands_beside =
+          i != index && layout_.plane_on[index] && layout_.plane_on[i] == layout_.plane_on[index];
+      if (stands_here || stands_beside) corners = clipped(corners, shape_.planes[i]);
+    }
+    if (corners.size() < 3)
+      throw Error(
+          fmt::format("{}: the planes around \"{}\" leave nothing of it; check the points of each",
+                      parts_.file.string(), part.name));
+    return {part.name, {{"face", corners}}};
+  }
+
+  Solid box(std::size_t index) const {
+    const Box& box = shape_.boxes[index];
+    const auto face = [&](const std::string& name, std::array<std::size_t, 4> corners) {
+      Face result{name, {}};
+      for (const std::size_t k : corners) result.outline.push_back(corner(box, k));
+      return result;
+    };
+    Solid solid{parts_.boxes[index].name,
+                {face("bottom", {3, 2, 1, 0}), face("top", {4, 5, 6, 7})}};
+    // A side is named by the corners as they are marked.
+    const auto marked = [&](std::size_t k) {
+      return 1 + (layout_.is_clockwise[index] ? (4 - k) % 4 : k);
+    };
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::size_t next = (k + 1) % 4;
+      solid.faces.push_back(face(fmt::format("side {}-{}", std::min(marked(k), marked(next)),
+                                             std::max(marked(k), marked(next))),
+                                 {k, next, next + 4, k + 4}));
+    }
+    return solid;
+  }
+
+  Solid cylinder(std::size_t index) const {
+    const Cylinder& c = shape_.cylinders[index];
+    const auto [x, y] = across(c.axis);
+    Face top{"top", {}}, bottom{"bottom", {}};
+    for (int i = 0; i < cylinder_sides; ++i) {
+      const double angle = 2 * std::numbers::pi * i / cylinder_sides;
+      const glm::dvec3 rim = c.foot + c.radius * (std::cos(angle) * x + std::sin(angle) * y);
+      bottom.outline.push_back(rim);
+      top.outline.push_back(rim + c.height * c.axis);
+    }
+    Solid solid{parts_.cylinders[index].name, {}};
+    for (std::size_t i = 0; i < cylinder_sides; ++i) {
+      const std::size_t next = (i + 1) % cylinder_sides;
+      solid.faces.push_back(
+          {"side", {bottom.outline[i], bottom.outline[next], top.outline[next], top.outline[i]}});
+    }
+    std::ranges::reverse(bottom.outline);
+    solid.faces.push_back(top);
+    solid.faces.push_back(bottom);
+    return solid;
+  }
+
+  // Returns where three planes meet.
+  static glm::dvec3 meeting_point(const Plane& a, const Plane& b, const Plane& c) {
+    const glm::dmat3 rows = glm::transpose(glm::dmat3(a.normal, b.normal, c.normal));
+    return glm::inverse(rows) *
+           glm::dvec3(glm::dot(a.at, a.normal), glm::dot(b.at, b.normal), glm::dot(c.at, c.normal));
+  }
+
+  // Its faces are seen from inside.
+  Solid room(const RoomPart& part) const {
+    const Plane& floor = plane_named(part.floor);
+    const Plane ceiling{floor.at + part.height_m * floor.normal, -floor.normal};
+    Points low, high;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Plane &wall = plane_named(part.walls[i]), &next = plane_named(part.walls[(i + 1) % 4]);
+      low.push_back(meeting_point(floor, wall, next));
+      high.push_back(meeting_point(ceiling, wall, next));
+    }
+    const bool is_clockwise =
+        glm::dot(glm::cross(low[2] - low[0], low[3] - low[1]), floor.normal) < 0;
+    Solid solid{part.name, {{"floor", low}, {"ceiling", {high.rbegin(), high.rend()}}}};
+    for (std::size_t i = 0; i < 4; ++i) {
+      const std::size_t before = (i + 3) % 4;
+      solid.faces.push_back({part.walls[i], {low[i], low[before], high[before], high[i]}});
+    }
+    if (is_clockwise)
+      for (Face& face : solid.faces) std::ranges::reverse(face.outline);
+    return solid;
+  }
+
+  const Parts& parts_;
+  const Layout& layout_;
+  const Shape& shape_;
+};
+
+}  // namespace
+
+glm::dvec3 normal_of(const Face& face) {
+  glm::dvec3 sum(0);  // twice the area (Newell)
+  for (std::size_t i = 1; i + 1 < face.outline.size(); ++i)
+    sum += glm::cross(face.outline[i] - face.outline[0], face.outline[i + 1] - face.outline[0]);
+  return glm::normalize(sum);
+}
+
+std::vector<Solid> solids_of(const Parts& parts, const Layout& layout, const Shape& shape) {
+  return Solids(parts, layout, shape).all();
+}
+
+}  // namespace previz::model

@@ -1,0 +1,31 @@
+// Makes closed geometry of a shape: what stands on a plane ends there, and planes end where they
+// meet.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+#include "daemon/model/start.hpp"
+
+namespace previz::model {
+
+// A flat, convex face; its corners are counter-clockwise seen from outside.
+struct Face {
+  std::string name;  // "top", "side 1-2"
+  std::vector<glm::dvec3> outline;
+};
+
+struct Solid {
+  std::string name;
+  std::vector<Face> faces;
+};
+
+glm::dvec3 normal_of(const Face& face);
+
+// Returns a solid for each plane that belongs to no room, each box, cylinder and room, in this
+// order. The shape must be settled. Throws previz::Error naming a plane whose outline is not
+// convex, or of which the planes that stand on it leave nothing.
+std::vector<Solid> solids_of(const Parts& parts, const Layout& layout, const Shape& shape);
+
+}  // namespace previz::model

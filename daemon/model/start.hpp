@@ -1,0 +1,62 @@
+// Finds a first guess at a model, and how its parts, points and tags hang together.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/model/parts.hpp"
+#include "daemon/model/shape.hpp"
+#include "daemon/model/views.hpp"
+#include "daemon/set/set.hpp"
+
+namespace previz::model {
+
+// What a named point is: a free point, a corner of a box, or one of those on a cylinder's rim.
+struct Place {
+  enum class Kind { free, box_corner, upper_rim, lower_rim } kind = Kind::free;
+  std::size_t part = 0;    // index of box, cylinder or free point
+  std::size_t corner = 0;  // of the box, as corner() counts them
+};
+
+// A tag that lies flat on a plane or on a side of a box.
+struct FlatTag {
+  const set::Tag* tag = nullptr;
+  double thickness_m = 0;
+  std::size_t part = 0;  // index of plane or box
+  // Of a box: which of its axes is the side's normal, and whether it is the far side along it.
+  std::size_t axis = 0;
+  bool is_far = false;
+};
+
+struct Layout {
+  std::map<std::string, Place> places;                       // of all points that are used
+  std::vector<std::string> free_points;                      // names, in the order of Shape::points
+  std::vector<std::string> unused_points;                    // are marked and belong to no part
+  std::vector<std::optional<std::size_t>> plane_on, box_on;  // index of a plane, for each part
+  std::vector<std::size_t> cylinder_on;
+  // Whether the box's corners are marked clockwise, seen from above. Its length is then from the
+  // first corner to the fourth.
+  std::vector<bool> is_clockwise;
+  std::vector<FlatTag> plane_tags, box_tags;
+};
+
+struct Start {
+  Layout layout;
+  Shape shape;
+};
+
+// Throws previz::Error naming a tag that the set does not have, a point whose rays do not show
+// where it is, and a part whose points, tags and sizes do not determine it.
+Start first_guess(const Parts& parts, const Views& views, const std::vector<set::Tag>& tags);
+
+// Moves what stands on a plane onto it, upright.
+void settle(const Layout& layout, Shape& shape);
+
+// Returns the known sizes of a box, in the order of Box::size.
+std::array<std::optional<double>, 3> known_sizes(const BoxPart& part, bool is_clockwise);
+
+}  // namespace previz::model

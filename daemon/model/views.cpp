@@ -1,0 +1,102 @@
+#include "daemon/model/views.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <map>
+
+#include "daemon/tracking/tag_detector.hpp"
+#include "drivers/calibration/pinhole.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::model {
+namespace {
+
+// A session's picture is "takes/12A/observer frame 7".
+bool is_named(const std::string& name, const std::string& wanted) {
+  return name == wanted || name.ends_with('/' + wanted) || name.ends_with(' ' + wanted);
+}
+
+void insist_on_size(const Frame& frame, const PinholeIntrinsics& lens,
+                    const MarkedPicture& picture) {
+  if (frame.width != lens.width || frame.height != lens.height)
+    throw Error(fmt::format("{}: has {}x{} pixels, but the lens is calibrated for {}x{}",
+                            picture.name, frame.width, frame.height, lens.width, lens.height));
+  for (const Mark& mark : picture.marks)
+    if (!(mark.px.x >= -0.5 && mark.px.y >= -0.5 && mark.px.x <= lens.width - 0.5 &&
+          mark.px.y <= lens.height - 0.5))
+      throw Error(
+          fmt::format("{}: point \"{}\" at {:.1f}, {:.1f} is outside of the picture's {}x{} pixels",
+                      picture.name, mark.point, mark.px.x, mark.px.y, lens.width, lens.height));
+}
+
+tracking::FittedPose pose_of(const std::vector<tracking::TagDetection>& detections,
+                             const PinholeIntrinsics& lens, const set::Tracking& tracking,
+                             const std::string& picture) {
+  std::vector<tracking::TagObservation> seen;
+  for (const tracking::TagDetection& detection : detections) {
+    const auto tag = std::ranges::find(tracking.tags, detection.id, &set::Tag::id);
+    if (tag != tracking.tags.end() && detection.trouble.empty())
+      seen.push_back(
+          {tag->id, tag->size_m, tag->world_from_tag, detection.corners, detection.covariance});
+  }
+  if (seen.empty())
+    throw Error(picture +
+                ": shows no tag of the set, so where the camera stood is unknown; mark the "
+                "points in another picture");
+  const auto poses = tracking::solve_joint_pose(seen, lens, std::nullopt);
+  if (poses.empty())
+    throw Error(picture +
+                ": no position of the camera fits the tags in it; check their [[tag]] tables");
+  return poses.front();
+}
+
+}  // namespace
+
+Views find_views(calibrate::PictureSource& source, const ObserverCalibration& camera,
+                 const set::Tracking& tracking, const Parts& parts) {
+  Views views{camera.intrinsics, std::vector<MarkedView>(parts.pictures.size())};
+  tracking::TagDetector detector({tracking.family, tracking.min_margin, tracking.max_hamming},
+                                 camera.intrinsics, camera.response);
+  std::size_t found = 0;
+  std::string first, last;
+  for (auto picture = source.next(); picture && found < views.views.size();
+       picture = source.next()) {
+    if (first.empty()) first = picture->name;
+    last = picture->name;
+    for (std::size_t i = 0; i < parts.pictures.size(); ++i) {
+      const MarkedPicture& marked = parts.pictures[i];
+      if (!is_named(picture->name, marked.name) || !views.views[i].name.empty()) continue;
+      insist_on_size(*picture->frame, camera.intrinsics, marked);
+      views.views[i] = {
+          marked.name, marked.marks,
+          pose_of(detector.detect(*picture->frame, 1), camera.intrinsics, tracking, marked.name)};
+      ++found;
+    }
+  }
+  for (std::size_t i = 0; i < parts.pictures.size(); ++i)
+    if (views.views[i].name.empty())
+      throw Error(fmt::format(
+          "{}: there is no picture \"{}\"; the pictures are named like \"{}\" and \"{}\"",
+          parts.file.string(), parts.pictures[i].name, first, last));
+  return views;
+}
+
+Ray ray_of(const Views& views, const MarkedView& view, const Mark& mark) {
+  const auto at = undistort(views.lens, mark.px);
+  if (!at)
+    throw Error(
+        fmt::format("{}: the lens shows nothing at point \"{}\"; check the lens's distortion",
+                    view.name, mark.point));
+  const glm::dmat3 turn = glm::transpose(view.pose.pose.rotation);
+  return {-(turn * view.pose.pose.translation), glm::normalize(turn * glm::dvec3(*at, 1))};
+}
+
+glm::dvec2 projected(const PinholeIntrinsics& lens, const glm::dvec3& in_camera) {
+  if (!(in_camera.z > 0)) return glm::dvec2(std::numeric_limits<double>::quiet_NaN());
+  return distort(lens, glm::dvec2(in_camera) / in_camera.z);
+}
+
+}  // namespace previz::model

@@ -1,0 +1,48 @@
+// The pictures in which points are marked, and where their cameras stood.
+#pragma once
+
+#include <array>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <string>
+#include <vector>
+
+#include "daemon/calibrate/lens/source.hpp"
+#include "daemon/model/parts.hpp"
+#include "daemon/set/set.hpp"
+#include "daemon/tracking/joint_pose.hpp"
+#include "drivers/calibration.hpp"
+
+namespace previz::model {
+
+struct MarkedView {
+  std::string name;
+  std::vector<Mark> marks;
+  tracking::FittedPose pose;  // by the tags it shows
+};
+
+struct Views {
+  PinholeIntrinsics lens;
+  std::vector<MarkedView> views;  // as the parts list them
+};
+
+// A ray from a camera into the world; the direction has length 1.
+struct Ray {
+  glm::dvec3 origin{0}, direction{0, 0, 1};
+};
+
+// Looks for the marked pictures, and for the set's tags in each of them. A picture is named as the
+// source names it, or by the end of that name: "0000.png" of a folder, "frame 7" of a session.
+// Throws previz::Error naming a picture that is not there, that is not of the lens's size, in which
+// a mark lies outside, or that shows no tag of the set.
+Views find_views(calibrate::PictureSource& source, const ObserverCalibration& camera,
+                 const set::Tracking& tracking, const Parts& parts);
+
+// Returns the ray of a pixel, as the tags place the camera. Throws previz::Error naming the mark if
+// the lens shows nothing there.
+Ray ray_of(const Views& views, const MarkedView& view, const Mark& mark);
+
+// Returns where the lens shows a point of the camera's axes; NaN behind the camera.
+glm::dvec2 projected(const PinholeIntrinsics& lens, const glm::dvec3& in_camera);
+
+}  // namespace previz::model

@@ -1,0 +1,161 @@
+// The command on the bundled take: from marks in its pictures to a phantom in the set file.
+#include "daemon/model/model.hpp"
+
+#include <fmt/format.h>
+
+#include "daemon/calibrate/known_camera.hpp"
+#include "daemon/model/views.hpp"
+#include "daemon/scene/load.hpp"
+#include "daemon/set/load.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
+
+namespace previz::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path session = fs::path(PREVIZ_SOURCE_DIR) / "config/demo/session";
+const fs::path demo = fs::path(PREVIZ_SOURCE_DIR) / "config/demo/demo.toml";
+
+// The corners of a thing of the demo's own phantom, in the world.
+std::vector<glm::dvec3> corners_of(const std::string& node) {
+  set::Set set = set::load_set(demo);
+  std::erase_if(set.objects,
+                [](const set::Object& o) { return o.presence != set::Presence::phantom; });
+  set.objects.at(0).nodes = {node};
+  const scene::Scene scene = scene::load_scene(set);
+  std::vector<glm::dvec3> corners;
+  for (const glm::vec3& vertex : scene.meshes.at(0).positions) {
+    const glm::dvec3 p(scene.instances.at(0).world_from_object * glm::dvec4(vertex, 1));
+    if (std::ranges::none_of(corners,
+                             [&](const glm::dvec3& q) { return glm::distance(p, q) < 1e-5; }))
+      corners.push_back(p);
+  }
+  return corners;
+}
+
+// Its upper four, in order around.
+std::vector<glm::dvec3> top_of(const std::string& node) {
+  std::vector<glm::dvec3> corners = corners_of(node);
+  std::ranges::sort(corners, {}, [](const glm::dvec3& p) { return -p.z; });
+  corners.resize(4);
+  glm::dvec3 middle(0);
+  for (const glm::dvec3& p : corners) middle += 0.25 * p;
+  std::ranges::sort(
+      corners, {}, [&](const glm::dvec3& p) { return std::atan2(p.y - middle.y, p.x - middle.x); });
+  return corners;
+}
+
+const std::vector<int> frames = {0, 2, 5};
+
+// What a careful person would mark of the red cube, to a tenth of a pixel.
+std::string marks() {
+  model::Parts parts;
+  for (const int frame : frames) parts.pictures.push_back({fmt::format("frame {}", frame), {}});
+  const ObserverCalibration camera = calibrate::known_observer(demo, session);
+  const auto source = calibrate::open_source(session, "observer");
+  const model::Views views =
+      model::find_views(*source, camera, set::load_set(demo).tracking, parts);
+  std::string text;
+  for (const model::MarkedView& view : views.views) {
+    text += fmt::format("[[picture]]\nfile = \"{}\"\n[picture.points]\n", view.name);
+    int number = 0;
+    for (const glm::dvec3& p : top_of("cube_red")) {
+      const glm::dvec2 px =
+          model::projected(views.lens, view.pose.pose.rotation * p + view.pose.pose.translation);
+      text += fmt::format("t{} = [{:.1f}, {:.1f}]\n", ++number, px.x, px.y);
+    }
+  }
+  return text;
+}
+
+const std::string parts_text = R"(
+[[plane]]
+name = "table"
+tags = [0, 1, 2]
+tag_thickness_m = 0.0003
+[[box]]
+name = "red"
+on = "table"
+top = ["t1", "t2", "t3", "t4"]
+)";
+
+class ModelCommand : public testing::Test {
+ protected:
+  void SetUp() override {
+    fs::copy(demo.parent_path(), folder_ / "demo", fs::copy_options::recursive);
+    options_.footage = session;
+    options_.set_file = folder_ / "demo/demo.toml";
+    options_.parts_file = folder_ / "demo/real.toml";
+    options_.write = true;
+  }
+
+  void write_parts(const std::string& text) { std::ofstream(options_.parts_file) << text; }
+
+  std::string refusal() {
+    try {
+      std::ostringstream out;
+      model::make_model(options_, out);
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  TemporaryDirectory folder_;
+  model::ModelOptions options_;
+};
+
+TEST_F(ModelCommand, MakesAPhantomAndAddsItToTheSet) {
+  write_parts(marks() + parts_text);
+  std::ostringstream out;
+  model::make_model(options_, out);
+  EXPECT_THAT(out.str(), HasSubstr("12 marks in 3 pictures"));
+  EXPECT_THAT(out.str(), HasSubstr("red, top: accurate to"));
+  EXPECT_THAT(out.str(), HasSubstr("the set has a phantom \"table and cubes\" beside this model"));
+  const set::Set set = set::load_set(*options_.set_file);
+  const auto added = std::ranges::find(set.objects, "real", &set::Object::name);
+  ASSERT_NE(added, set.objects.end());
+  EXPECT_EQ(added->presence, set::Presence::phantom);
+  EXPECT_TRUE(fs::exists(folder_ / "demo/real.glb"));
+  // It is where the demo's own is: the marks are rounded to 0.1 px, some 0.2 mm here.
+  set::Set only = set;
+  only.objects = {*added};
+  only.objects[0].nodes = {"red"};
+  const scene::Scene scene = scene::load_scene(only);
+  for (const glm::dvec3& p : corners_of("cube_red")) {
+    double nearest = 1;
+    for (const glm::vec3& vertex : scene.meshes.at(0).positions)
+      nearest =
+          std::min(nearest, glm::distance(p, glm::dvec3(scene.instances.at(0).world_from_object *
+                                                        glm::dvec4(vertex, 1))));
+    EXPECT_LT(nearest, 5e-4);
+  }
+  // Once more, nothing is added twice.
+  std::ostringstream again;
+  model::make_model(options_, again);
+  EXPECT_THAT(again.str(), HasSubstr("has the model already"));
+  EXPECT_EQ(set::load_set(*options_.set_file).objects.size(), set.objects.size());
+}
+
+TEST_F(ModelCommand, NothingIsWrittenWhereSomethingIsWrong) {
+  const auto refused = [&](const std::string& text, const std::string& words) {
+    write_parts(text);
+    EXPECT_THAT(refusal(), HasSubstr(words));
+    EXPECT_FALSE(fs::exists(folder_ / "demo/real.glb"));
+    EXPECT_FALSE(fs::exists(folder_ / "demo/demo.toml.1.old"));
+  };
+  refused("[[picture]]\nfile = \"frame 99\"\n" + parts_text, "no picture has a point \"t1\"");
+  refused("[[picture]]\nfile = \"frame 99\"\n[[plane]]\nname = \"t\"\ntags = [0]\n",
+          "there is no picture \"frame 99\"; the pictures are named like");
+  refused(
+      "[[picture]]\nfile = \"frame 0\"\n[picture.points]\na = [5000, 10]\n[[plane]]\nname = "
+      "\"t\"\ntags = [0]\n",
+      "frame 0: point \"a\" at 5000.0, 10.0 is outside of the picture");
+  options_.set_file.reset();
+  refused(marks() + parts_text, "--write needs --set");
+}
+
+}  // namespace
+}  // namespace previz::test

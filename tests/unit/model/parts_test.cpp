@@ -1,0 +1,103 @@
+// The file of parts: what it holds, and what is said of its mistakes.
+#include "daemon/model/parts.hpp"
+
+#include "tests/support/test.hpp"
+
+namespace previz::test {
+namespace {
+
+const std::string picture_tables = R"(
+[[picture]]
+file = "0000.png"
+[picture.points]
+a = [100, 200.5]
+b = [150, 210]
+c = [160, 260]
+once = [1, 2]
+[[picture]]
+file = "0001.png"
+[picture.points]
+a = [110, 200.5]
+b = [160, 210]
+c = [170, 260]
+)";
+
+// Returns what is said of the marks with these parts behind them.
+std::string refusal_of(const std::string& parts) {
+  try {
+    model::parse_parts(picture_tables + parts, "model.toml");
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ModelParts, AreReadWithTheirMarks) {
+  const model::Parts parts = model::parse_parts(picture_tables + R"(
+[marks]
+accuracy_px = 0.5
+[[plane]]
+name = "table"
+tags = [0, 2]
+points = ["a"]
+[[box]]
+name = "crate"
+on = "table"
+top = ["a", "b", "c", ""]
+height_m = 0.1
+)",
+                                                "model.toml");
+  EXPECT_EQ(parts.mark_px, 0.5);
+  ASSERT_EQ(parts.pictures.size(), 2u);
+  EXPECT_EQ(parts.pictures[1].name, "0001.png");
+  ASSERT_EQ(parts.pictures[0].marks.size(), 4u);
+  EXPECT_EQ(parts.pictures[0].marks[0].point, "a");
+  EXPECT_EQ(parts.pictures[0].marks[0].px, glm::dvec2(100, 200.5));
+  ASSERT_EQ(parts.planes.size(), 1u);
+  EXPECT_THAT(parts.planes[0].tags, ElementsAre(0, 2));
+  ASSERT_EQ(parts.boxes.size(), 1u);
+  EXPECT_THAT(parts.boxes[0].top, ElementsAre("a", "b", "c", ""));
+  EXPECT_EQ(parts.boxes[0].height_m, 0.1);
+}
+
+TEST(ModelParts, MistakesAreNamedWithTheirLine) {
+  const struct {
+    const char* parts;
+    const char* words;
+  } mistakes[] = {
+      {"", "has no part"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\nname_ = 1\n",
+       "model.toml:18:1: plane.name_: unknown key; did you mean name?"},
+      {"[[plane]]\nname = \"t\"\ntags = [0.5]\n", "plane.tags"},
+      {"[[plane]]\nname = \"t\"\npoints = [\"a\", \"b\"]\n",
+       "it has no tag and 2 points, and needs 3"},
+      {"[[plane]]\nname = \"t\"\npoints = [\"a\", \"b\", \"d\"]\n", "no picture has a point \"d\""},
+      {"[[plane]]\nname = \"t\"\npoints = [\"a\", \"b\", \"once\"]\n",
+       "point \"once\" is marked in one picture only"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\n[[plane]]\nname = \"t\"\ntags = [1]\n",
+       "\"t\" is used twice"},
+      {"[[plane]]\nname = \"wall\"\npoints = [\"a\", \"b\"]\nupright_on = "
+       "\"flor\"\n[[plane]]\nname = \"floor\"\ntags = [0]\n",
+       "there is no plane \"flor\"; did you mean floor?"},
+      {"[[box]]\nname = \"b\"\ntop = [\"a\", \"b\", \"c\", \"\"]\n",
+       "box \"b\" has one side only: nothing says how high it is"},
+      {"[[box]]\nname = \"b\"\ntop = [\"a\", \"b\", \"\", \"\"]\nheight_m = 1\n",
+       "2 of its four upright edges marked and needs 3"},
+      {"[[box]]\nname = \"b\"\ntop = [\"a\", \"b\", \"c\"]\nheight_m = 1\n",
+       "has 3 corners; allowed: 4"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\n[[cylinder]]\nname = \"c\"\non = \"t\"\nbottom = "
+       "[\"a\", \"b\", \"c\"]\n",
+       "no point of the upper rim is marked"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\n[[room]]\nname = \"r\"\nfloor = \"t\"\nwalls = "
+       "[\"t\"]\nheight_m = 2\n",
+       "has 1 planes; allowed: 4"},
+      {"[[picture]]\nfile = \"0000.png\"\n[[plane]]\nname = \"t\"\ntags = [0]\n",
+       "has a table already"},
+      {"[[picture]]\nfile = \"2\"\n[picture.points]\na = [1]\n", "picture.points.a"},
+  };
+  for (const auto& mistake : mistakes)
+    EXPECT_THAT(refusal_of(mistake.parts), HasSubstr(mistake.words)) << mistake.parts;
+}
+
+}  // namespace
+}  // namespace previz::test
