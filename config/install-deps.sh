@@ -22,7 +22,7 @@ packages=(
   # files, command line, log, hashes
   libtomlplusplus-dev nlohmann-json3-dev libyaml-cpp-dev libtinyxml2-dev libcli11-dev libspdlog-dev libfmt-dev libssl-dev
   # main loop, service, D-Bus
-  libsystemd-dev dbus-daemon
+  libsystemd-dev dbus
   # tests
   libgtest-dev libgmock-dev libusbredirparser-dev groff-base poppler-utils
   # package, and its test in a bare system

@@ -29,12 +29,15 @@ extern "C" int sd_journal_send(const char* format, ...) {
       value.assign(va_arg(rest, const char*), static_cast<std::size_t>(size));
     } else if (field.ends_with("=%d")) {
       value = std::to_string(va_arg(rest, int));
+    } else if (field.ends_with("=%zu")) {
+      value = std::to_string(va_arg(rest, std::size_t));
     } else {
       ADD_FAILURE() << field;
       break;
     }
   }
   va_end(rest);
+  entry.erase("TID");  // of the thread, which newer versions of spdlog send
   journal.push_back(entry);
   return 0;
 }
