@@ -191,6 +191,8 @@ void add_model(CLI::App& app, model::ModelOptions& options) {
                      "File of the model, .glb (default: as the file of parts is named)");
   command.add_flag("--write", options.write,
                    "Add the model to the set file; keeps the old file beside it");
+  command.add_flag("--grey", options.grey, "Do not measure the colours of its faces");
+  add_device_options(command, options.device);
 }
 
 void add_trade(CLI::App& app, trade::TradeOptions& options) {

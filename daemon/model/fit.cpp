@@ -215,15 +215,14 @@ void observe_tags(const Layout& layout, std::vector<Observation>& all) {
 
 void observe_points(const Parts& parts, const Layout& layout, std::vector<Observation>& all) {
   for (std::size_t p = 0; p < parts.planes.size(); ++p)
-    for (const auto* names : {&parts.planes[p].points, &parts.planes[p].outline})
-      for (const std::string& name : *names) {
-        const Place place = layout.places.at(name);
-        all.push_back({1, [p, place](const Shape& s, double* out) {
-                         const Plane& plane = s.planes[p];
-                         out[0] =
-                             glm::dot(place_of(s, place, {}) - plane.at, plane.normal) / flatness_m;
-                       }});
-      }
+    for (const std::string& name : points_on(parts.planes[p])) {
+      const Place place = layout.places.at(name);
+      all.push_back({1, [p, place](const Shape& s, double* out) {
+                       const Plane& plane = s.planes[p];
+                       out[0] =
+                           glm::dot(place_of(s, place, {}) - plane.at, plane.normal) / flatness_m;
+                     }});
+    }
 }
 
 class Problem {

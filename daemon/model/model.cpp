@@ -7,11 +7,13 @@
 
 #include "daemon/calibrate/known_camera.hpp"
 #include "daemon/calibrate/lens/source.hpp"
+#include "daemon/model/colours.hpp"
 #include "daemon/model/fit.hpp"
 #include "daemon/model/glb.hpp"
 #include "daemon/model/parts.hpp"
 #include "daemon/model/solids.hpp"
 #include "daemon/model/start.hpp"
+#include "daemon/model/tag_papers.hpp"
 #include "daemon/model/views.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/set/file_edit.hpp"
@@ -78,6 +80,45 @@ void print_faces(const Fit& fit, std::ostream& out) {
   }
 }
 
+// Returns the colours that the plates show; nothing without a take and its light.
+std::map<std::string, Colour> measured(const ModelOptions& options,
+                                       const std::vector<Solid>& solids, std::ostream& out) {
+  if (options.grey) return {};
+  if (!calibrate::is_session(options.footage)) {
+    out << "colours: all faces are grey, because pictures alone do not show the light; name a "
+           "session in their place to measure the colours\n";
+    return {};
+  }
+  const pipeline::Take take = pipeline::open_take(options.footage, options.set_file);
+  return measure_colours(
+      take, solids,
+      render::open_device(render::options_for(options.device, take.set.quality.hardware_rays)));
+}
+
+// Reports the colours, and returns those that are possible.
+Colours reported(const std::map<std::string, Colour>& colours, const std::vector<Solid>& solids,
+                 std::ostream& out) {
+  Colours albedos;
+  for (const Solid& solid : solids) {
+    const auto found = colours.find(solid.name);
+    if (found == colours.end()) {
+      fmt::print(out, "  {}: no plate shows enough of it; it stays grey\n", solid.name);
+      continue;
+    }
+    const Colour& colour = found->second;
+    fmt::print(out, "  {}: albedo {:.3f} {:.3f} {:.3f} (accurate to {:.4f} {:.4f} {:.4f})\n",
+               solid.name, colour.albedo.r, colour.albedo.g, colour.albedo.b, colour.sigma.r,
+               colour.sigma.g, colour.sigma.b);
+    if (std::max({colour.albedo.r, colour.albedo.g, colour.albedo.b}) > 1)
+      fmt::print(out,
+                 "warning: {} reflects more light than falls on it: the light and the film camera "
+                 "disagree; run previzd calibrate balance with a surface of known colour first\n",
+                 solid.name);
+    albedos[solid.name] = glm::clamp(colour.albedo, 0.0, 1.0);
+  }
+  return albedos;
+}
+
 // Adds the model to the set file, unless the file has it.
 void add_to_set(const std::filesystem::path& set_file, const std::filesystem::path& model,
                 std::ostream& out) {
@@ -123,7 +164,14 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   print_fit(parts, start.layout, fit, out);
   print_faces(fit, out);
   const std::filesystem::path file = file_of(options);
-  session::replace_file(file, glb_of(solids_of(parts, start.layout, fit.shape), {}));
+  std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
+  std::map<std::string, Colour> colours = measured(options, solids, out);
+  colours.merge(
+      tag_colours(set.tracking.family, start.layout, parts, views, camera.response, colours));
+  for (Solid& tag : tag_solids(set.tracking.family, start.layout, fit.shape))
+    solids.push_back(std::move(tag));
+  const Colours albedos = colours.empty() ? Colours{} : reported(colours, solids, out);
+  session::replace_file(file, glb_of(solids, albedos));
   fmt::print(out, "model: {}\n", file.string());
   warn_of_others(set, file, out);
   if (options.write) add_to_set(*options.set_file, file, out);

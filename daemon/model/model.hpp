@@ -6,6 +6,8 @@
 #include <optional>
 #include <ostream>
 
+#include "daemon/render/gpu.hpp"
+
 namespace previz::model {
 
 struct ModelOptions {
@@ -14,6 +16,8 @@ struct ModelOptions {
   std::optional<std::filesystem::path> set_file;  // default: the session's own
   std::optional<std::filesystem::path> out;       // default: the parts file's name, ending in .glb
   bool write = false;                             // add the model to the set file
+  bool grey = false;                              // do not measure colours
+  render::DeviceOptions device;                   // that colours are measured on
 };
 
 // Writes the model and reports on `out` what fits how well. Throws previz::Error naming the file,

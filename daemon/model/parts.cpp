@@ -16,12 +16,31 @@ namespace previz {
 template <>
 struct Codec<std::vector<int>> {
   static std::vector<int> read(const Value& value, const Rule& rule) {
+    const std::string allowed = describe(rule);
     std::vector<int> ids;
-    for (const Value& entry : codec::list(value, describe(rule)))
+    for (const Value& entry : codec::list(value, allowed))
       ids.push_back(static_cast<int>(codec::whole_number(entry, rule)));
     return ids;
   }
   static std::string describe(const Rule&) { return "list of tag ids, like [0, 3]"; }
+};
+
+template <>
+struct Codec<std::vector<std::array<std::string, 2>>> {
+  using Pairs = std::vector<std::array<std::string, 2>>;
+  static Pairs read(const Value& value, const Rule& rule) {
+    const std::string allowed = describe(rule);
+    Pairs pairs;
+    for (const Value& entry : codec::list(value, allowed)) {
+      const std::vector<Value>& points = codec::list(entry, allowed);
+      if (points.size() != 2) codec::misread(entry, allowed);
+      pairs.push_back({codec::text(points[0]), codec::text(points[1])});
+    }
+    return pairs;
+  }
+  static std::string describe(const Rule&) {
+    return "list of pairs of points, like [[\"a\", \"b\"], [\"b\", \"c\"]]";
+  }
 };
 
 namespace model {
@@ -66,6 +85,7 @@ Keys plane_keys(PlanePart& p) {
       {"points", &p.points, {}, "Points that lie on it.", optional("[\"a\", \"b\", \"c\"]")},
       {"outline", &p.outline, {}, "Points at its corners, in order around. Default: a rectangle around everything on it.", optional("[\"a\", \"b\", \"c\", \"d\"]")},
       {"margin_m", &p.margin_m, units::m.within(0, 1000), "How far that rectangle extends beyond what is on the plane."},
+      {"edges", &p.edges, {}, "Pairs of points on its borders, where the rectangle ends.", optional("[[\"a\", \"b\"]]")},
       {"upright_on", &p.upright_on, {}, "Plane that it stands on at a right angle.", optional("\"floor\"")},
   };
 }
@@ -225,6 +245,7 @@ class Checker {
   void check(const Given& given, const PlanePart& p) {
     points(given, "points", p.points, 2);
     points(given, "outline", p.outline, 2);
+    for (const auto& [a, b] : p.edges) points(given, "edges", {a, b}, 1);
     const std::size_t on_it = marked(p.points) + marked(p.outline);
     const std::size_t needed = p.upright_on.empty() ? 3 : 2;
     if (p.tags.empty() && on_it < needed)

@@ -2,6 +2,7 @@
 // `previzd model` reads. Plain data.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <glm/vec2.hpp>
 #include <optional>
@@ -23,14 +24,17 @@ struct MarkedPicture {
 
 // A flat surface: a table, a floor, a wall. It is where its tags and points lie.
 struct PlanePart {
-  std::string name;
-  std::vector<int> tags;            // that lie flat on it
-  double tag_thickness_m = 1e-4;    // of their paper or board
-  std::vector<std::string> points;  // that lie on it
-  std::vector<std::string>
-      outline;             // points at its corners, in order; empty: a rectangle around all on it
-  double margin_m = 0.3;   // of that rectangle
-  std::string upright_on;  // the plane that it stands on at a right angle; empty: none
+  std::string name = {};
+  std::vector<int> tags = {};            // that lie flat on it
+  double tag_thickness_m = 1e-4;         // of their paper or board
+  std::vector<std::string> points = {};  // that lie on it
+  // Points at its corners, in order around; empty: a rectangle around all that is on it.
+  std::vector<std::string> outline = {};
+  double margin_m = 0.3;  // of that rectangle
+  // Pairs of points on its borders; the rectangle ends at the line through each. Points on a
+  // border lie on the plane, and one picture of each is enough.
+  std::vector<std::array<std::string, 2>> edges = {};
+  std::string upright_on = {};  // the plane that it stands on at a right angle; empty: none
 };
 
 // Four corners in order around a box's upper or lower side; "" for one that is not marked.

@@ -76,8 +76,8 @@ class Solids {
       for (std::size_t i = 0; flat.part == index && i < 4; ++i)
         on_it.emplace_back(flat.tag->world_from_tag *
                            glm::dvec4(tracking::tag_corner(flat.tag->size_m, i), 1));
-    for (const auto* names : {&parts_.planes[index].points, &parts_.planes[index].outline})
-      for (const std::string& point : *names) on_it.push_back(place_of(point));
+    for (const std::string& point : points_on(parts_.planes[index]))
+      on_it.push_back(place_of(point));
     for (std::size_t i = 0; i < shape_.boxes.size(); ++i)
       for (std::size_t k = 0; layout_.box_on[i] == index && k < 4; ++k)
         on_it.push_back(corner(shape_.boxes[i], k));
@@ -125,6 +125,27 @@ class Solids {
     return corners;
   }
 
+  // A border is the line through two points; what is on the plane tells its inner side.
+  Points ended_at_edges(std::size_t index, Points corners) const {
+    const Plane& plane = shape_.planes[index];
+    glm::dvec3 middle(0);
+    const Points on_it = things_on(index);
+    for (const glm::dvec3& p : on_it) middle += p / double(on_it.size());
+    for (const auto& [a, b] : parts_.planes[index].edges) {
+      const glm::dvec3 from = place_of(a), to = place_of(b);
+      glm::dvec3 inwards = glm::cross(plane.normal, to - from);
+      if (glm::length(inwards) < 1e-6)
+        throw Error(fmt::format(
+            "{}: the points \"{}\" and \"{}\" of an edge of plane \"{}\" are the same place; mark "
+            "two that are apart",
+            parts_.file.string(), a, b, parts_.planes[index].name));
+      inwards = glm::normalize(inwards);
+      if (glm::dot(middle - from, inwards) < 0) inwards = -inwards;
+      corners = clipped(corners, {from, inwards});
+    }
+    return corners;
+  }
+
   Points outline(std::size_t index) const {
     const PlanePart& part = parts_.planes[index];
     const Plane& plane = shape_.planes[index];
@@ -148,7 +169,8 @@ class Solids {
 
   Solid plane(std::size_t index) const {
     const PlanePart& part = parts_.planes[index];
-    Points corners = part.outline.empty() ? rectangle(index) : outline(index);
+    Points corners =
+        part.outline.empty() ? ended_at_edges(index, rectangle(index)) : outline(index);
     for (std::size_t i = 0; i < shape_.planes.size(); ++i) {
       const bool stands_here = layout_.plane_on[i] == index;
       const bool stands_beside =

@@ -429,8 +429,7 @@ class Starter {
   void start_points() {
     std::set<std::string> used;
     for (const PlanePart& part : parts_.planes)
-      for (const auto* names : {&part.points, &part.outline})
-        used.insert(names->begin(), names->end());
+      for (const std::string& point : points_on(part)) used.insert(point);
     for (const auto& [point, rays] : rays_) {
       if (layout_.places.contains(point)) continue;
       if (!used.contains(point)) {
@@ -447,10 +446,14 @@ class Starter {
   glm::dvec3 free_place_of(const std::string& point) const {
     if (const auto place = place_of(point)) return *place;
     for (std::size_t i = 0; i < parts_.planes.size(); ++i)
-      for (const auto* names : {&parts_.planes[i].points, &parts_.planes[i].outline})
-        if (std::ranges::find(*names, point) != names->end())
-          if (const auto met = meet(rays_.at(point).front(), shape_.planes[i])) return *met;
+      if (lies_on(parts_.planes[i], point))
+        if (const auto met = meet(rays_.at(point).front(), shape_.planes[i])) return *met;
     return needed_place_of(point);
+  }
+
+  static bool lies_on(const PlanePart& part, const std::string& point) {
+    const std::vector<std::string> names = points_on(part);
+    return std::ranges::find(names, point) != names.end();
   }
 
   void check_rooms() const {
@@ -482,6 +485,15 @@ class Starter {
 
 Start first_guess(const Parts& parts, const Views& views, const std::vector<set::Tag>& tags) {
   return Starter(parts, views, tags).start();
+}
+
+std::vector<std::string> points_on(const PlanePart& part) {
+  std::vector<std::string> names = part.points;
+  names.insert(names.end(), part.outline.begin(), part.outline.end());
+  for (const auto& pair : part.edges) names.insert(names.end(), pair.begin(), pair.end());
+  std::ranges::sort(names);
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
 }
 
 void settle(const Layout& layout, Shape& shape) {

@@ -72,7 +72,8 @@ Views find_views(calibrate::PictureSource& source, const ObserverCalibration& ca
       insist_on_size(*picture->frame, camera.intrinsics, marked);
       views.views[i] = {
           marked.name, marked.marks,
-          pose_of(detector.detect(*picture->frame, 1), camera.intrinsics, tracking, marked.name)};
+          pose_of(detector.detect(*picture->frame, 1), camera.intrinsics, tracking, marked.name),
+          picture->frame};
       ++found;
     }
   }

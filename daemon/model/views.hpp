@@ -19,6 +19,7 @@ struct MarkedView {
   std::string name;
   std::vector<Mark> marks;
   tracking::FittedPose pose;  // by the tags it shows
+  FramePtr frame = nullptr;   // the picture; null in tests that make marks without one
 };
 
 struct Views {

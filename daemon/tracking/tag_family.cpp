@@ -11,6 +11,8 @@
 #include <apriltag/tagStandard41h12.h>
 #include <apriltag/tagStandard52h13.h>
 
+#include <cstdlib>
+
 #include "drivers/error.hpp"
 
 namespace previz::tracking {
@@ -43,6 +45,22 @@ TagFamily make_tag_family(const std::string& name, const std::string& where) {
     add_to_list(known, family.name);
   }
   throw Error(where + "\"" + name + "\" is not a tag family; known: " + known);
+}
+
+TagCells tag_cells(const std::string& family, int id) {
+  const TagFamily made = make_tag_family(family);
+  const int count = static_cast<int>(made->ncodes);
+  if (id < 0 || id >= count)
+    throw Error(family + " has no id " + std::to_string(id) + "; it has 0 to " +
+                std::to_string(count - 1));
+  TagCells cells{made->total_width, made->width_at_border, {}};
+  image_u8_t* image = apriltag_to_image(made.get(), static_cast<std::uint32_t>(id));
+  for (int row = 0; row < cells.total; ++row)
+    for (int column = 0; column < cells.total; ++column)
+      cells.is_black.push_back(image->buf[row * image->stride + column] == 0);
+  std::free(image->buf);  // the packaged library does not export image_u8_destroy
+  std::free(image);
+  return cells;
 }
 
 }  // namespace previz::tracking

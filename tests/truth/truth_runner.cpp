@@ -16,6 +16,7 @@
 #include "tests/truth/compare.hpp"
 #include "tests/truth/comparison_sheet.hpp"
 #include "tests/truth/live_play.hpp"
+#include "tests/truth/made_phantom.hpp"
 #include "tests/truth/truth_render.hpp"
 #include "tests/truth/truth_set.hpp"
 #include "tests/truth/truth_take.hpp"
@@ -37,6 +38,7 @@ struct Arguments {
   bool live = false, history = true;
   int still = 0;  // frames with the camera at rest; 0: it moves as the set says
   std::optional<int> samples;
+  bool made = false;  // the phantom is made of the set's own pictures
 };
 
 struct JudgedFrame {
@@ -202,9 +204,15 @@ bool run_set(const fs::path& path, const Arguments& arguments) {
   fs::create_directories(directory);
   if (arguments.expose != 1) expose_longer(set, arguments.expose, directory / "plates");
   write_take(set, arguments.take, directory / "session");
+  if (arguments.made) {
+    set.phantom = make_phantom(set, directory, arguments.render.device, std::cout);
+    fs::remove_all(directory / "session");
+    write_take(set, arguments.take, directory / "session");
+  }
 
   const auto add_take = [&](ordered_json& metrics) {
     metrics["light"] = arguments.take.light == LightFrom::truth ? "truth" : "captured";
+    metrics["phantom"] = arguments.made ? "made" : "truth";
     metrics["pose"] = arguments.take.pose == PoseFrom::truth ? "truth" : "tracked";
   };
   if (arguments.live) {
@@ -252,6 +260,10 @@ int main(int argc, char** argv) {
   app.add_option("--pose", arguments.take.pose, "truth: the set's poses; tracked: by its tags")
       ->transform(CLI::Transformer(poses, CLI::ignore_case))
       ->type_name("truth|tracked");
+  app.add_option_function<std::string>(
+         "--phantom", [&](const std::string& from) { arguments.made = from == "made"; },
+         "truth: the set's own; made: by previzd model from marks in its pictures")
+      ->check(CLI::IsMember({"truth", "made"}));
   app.add_option("--spp", arguments.samples, "samples per pixel [256; with --live 1]")
       ->check(CLI::Range(1, 1000000));
   CLI::Option* const live =

@@ -12,12 +12,7 @@ namespace {
 model::Parts table() {
   model::Parts parts;
   parts.file = "model.toml";
-  parts.planes.push_back({.name = "table",
-                          .tags = {0, 1, 2},
-                          .tag_thickness_m = 0,
-                          .points = {},
-                          .outline = {},
-                          .upright_on = {}});
+  parts.planes.push_back({.name = "table", .tags = {0, 1, 2}, .tag_thickness_m = 0});
   return parts;
 }
 
@@ -178,13 +173,33 @@ TEST(ModelFit, AWallStandsUprightOnTheFloor) {
   MarkedScene scene = scene_of_a_table();
   scene.points = {{"a", {-0.4, 0.6, 0.1}}, {"b", {0.4, 0.5, 0.3}}};
   model::Parts parts = table();
-  parts.planes.push_back(
-      {.name = "wall", .tags = {}, .points = {"a", "b"}, .outline = {}, .upright_on = "table"});
+  parts.planes.push_back({.name = "wall", .points = {"a", "b"}, .upright_on = "table"});
   const model::Plane wall = fit_of(scene, parts).shape.planes[1];
   EXPECT_NEAR(wall.normal.z, 0, 1e-7);
   for (const auto& [name, point] : scene.points)
     EXPECT_NEAR(glm::dot(point - wall.at, wall.normal), 0, 1e-6);
   EXPECT_LT(wall.normal.y, 0);  // towards the cameras
+}
+
+TEST(ModelFit, ATableEndsAtItsEdges) {
+  MarkedScene scene = scene_of_a_table();
+  scene.points = {{"far a", {-0.3, 0.7, 0}}, {"far b", {0.5, 0.6, 0}}};
+  model::Parts parts = table();
+  parts.planes[0].edges = {{"far a", "far b"}};
+  std::mt19937 random(1);
+  parts.pictures = scene.pictures(random);
+  // On the plane one picture of a point is enough.
+  for (std::size_t i = 1; i < parts.pictures.size(); ++i) parts.pictures[i].marks.clear();
+  const model::Views views = scene.views(parts, random);
+  const model::Start start = model::first_guess(parts, views, scene.tags);
+  const auto face =
+      model::solids_of(parts, start.layout, model::adjust(parts, views, start).shape)[0].faces[0];
+  const glm::dvec3 along = glm::normalize(glm::dvec3(0.8, -0.1, 0));
+  double farthest = -1;
+  for (const glm::dvec3& p : face.outline)
+    farthest = std::max(farthest, glm::cross(along, p - glm::dvec3(-0.3, 0.7, 0)).z);
+  EXPECT_NEAR(farthest, 0, 1e-6);
+  EXPECT_GE(face.outline.size(), 4u);
 }
 
 // Returns what adjusting is refused with.
@@ -225,11 +240,8 @@ TEST(ModelFit, WhatCannotBeIsRefusedByName) {
   {
     model::Parts parts = table();
     for (const char* name : {"n", "e", "s", "w"})
-      parts.planes.push_back({.name = name,
-                              .tags = {},
-                              .points = {"crate t1", "crate t2"},
-                              .outline = {},
-                              .upright_on = "table"});
+      parts.planes.push_back(
+          {.name = name, .points = {"crate t1", "crate t2"}, .upright_on = "table"});
     parts.rooms.push_back({"room", "table", {"n", "e", "s", "w"}, 2});
     EXPECT_THAT(fit_refusal(scene, parts),
                 HasSubstr("its walls \"n\" and \"e\" follow each other but are parallel"));

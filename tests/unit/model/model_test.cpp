@@ -89,6 +89,7 @@ class ModelCommand : public testing::Test {
     options_.set_file = folder_ / "demo/demo.toml";
     options_.parts_file = folder_ / "demo/real.toml";
     options_.write = true;
+    options_.grey = true;  // colours take seconds
   }
 
   void write_parts(const std::string& text) { std::ofstream(options_.parts_file) << text; }
@@ -137,6 +138,30 @@ TEST_F(ModelCommand, MakesAPhantomAndAddsItToTheSet) {
   model::make_model(options_, again);
   EXPECT_THAT(again.str(), HasSubstr("has the model already"));
   EXPECT_EQ(set::load_set(*options_.set_file).objects.size(), set.objects.size());
+}
+
+// The red cube is matt. What the comparison does not know, of which the light that the fisheye
+// cannot see and the grain of the table are most, is below a tenth.
+TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
+  options_.grey = false;
+  write_parts(marks() + parts_text);
+  std::ostringstream out;
+  model::make_model(options_, out);
+  set::Set made = set::load_set(*options_.set_file), own = made;
+  std::erase_if(made.objects, [](const set::Object& o) { return o.name != "real"; });
+  std::erase_if(own.objects, [](const set::Object& o) { return o.name != "table and cubes"; });
+  const scene::Scene found = scene::load_scene(made), truth = scene::load_scene(own);
+  const auto colour_in = [](const scene::Scene& scene, const std::string& material) {
+    const auto at = std::ranges::find(scene.materials, material, &scene::Material::name);
+    return at == scene.materials.end() ? glm::vec3(-1) : at->base_color;
+  };
+  for (glm::length_t c = 0; c < 3; ++c)
+    EXPECT_NEAR(colour_in(found, "red")[c] / colour_in(truth, "red")[c], 1, 0.1) << c;
+  // White paper and black print, as printers have them.
+  for (glm::length_t c = 0; c < 3; ++c) {
+    EXPECT_NEAR(colour_in(found, "tag 0 paper")[c], 0.79, 0.08);
+    EXPECT_NEAR(colour_in(found, "tag 0 print")[c], 0.04, 0.01);
+  }
 }
 
 TEST_F(ModelCommand, NothingIsWrittenWhereSomethingIsWrong) {

@@ -41,8 +41,7 @@ struct Model {
 
   std::size_t add_plane(const std::string& name, model::Plane plane,
                         std::optional<std::size_t> on = {}) {
-    parts.planes.push_back(
-        {.name = name, .tags = {}, .points = {}, .outline = {}, .margin_m = 1, .upright_on = {}});
+    parts.planes.push_back({.name = name, .margin_m = 1});
     layout.plane_on.push_back(on);
     shape.planes.push_back(plane);
     return shape.planes.size() - 1;

@@ -1,0 +1,77 @@
+#include "daemon/model/colours.hpp"
+
+#include <algorithm>
+#include <glm/common.hpp>
+
+#include "daemon/calibrate/sensor/balance_fit.hpp"
+#include "daemon/calibrate/sensor/surface_pixels.hpp"
+#include "daemon/scene/load.hpp"
+
+namespace previz::model {
+namespace {
+
+constexpr int most_rounds = 6;
+// An albedo that changes by less, over itself, is the last.
+constexpr double settled_change = 2e-3;
+// What reflects less or more is not paint, and its light would be taken from a model that is wrong.
+constexpr double least_albedo = 0.005, most_albedo = 0.98;
+
+// The set's lamps and the solids, each with a matt material of its name.
+scene::Scene scene_of(const pipeline::Take& take, const std::vector<Solid>& solids) {
+  set::Set lamps_only = take.set;
+  lamps_only.objects.clear();
+  lamps_only.surfaces.clear();
+  scene::Scene scene = scene::load_scene(lamps_only);
+  for (const Solid& solid : solids) {
+    scene::Mesh mesh;
+    mesh.name = solid.name;
+    for (const Face& face : solid.faces) {
+      const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+      for (const glm::dvec3& p : face.outline) {
+        mesh.positions.emplace_back(p);
+        mesh.normals.emplace_back(normal_of(face));
+      }
+      for (std::uint32_t i = 1; i + 1 < face.outline.size(); ++i)
+        mesh.triangles.emplace_back(first, first + i, first + i + 1);
+    }
+    scene::Material matt;
+    matt.name = solid.name;
+    matt.base_color = glm::vec3(0.5f);
+    matt.specular = 0;
+    const auto index = static_cast<std::uint32_t>(scene.meshes.size());
+    scene.instances.push_back({.name = solid.name, .mesh = index, .material = index});
+    scene.meshes.push_back(std::move(mesh));
+    scene.materials.push_back(std::move(matt));
+  }
+  return scene;
+}
+
+}  // namespace
+
+std::map<std::string, Colour> measure_colours(const pipeline::Take& take,
+                                              const std::vector<Solid>& solids,
+                                              const std::shared_ptr<render::Device>& device) {
+  scene::Scene scene = scene_of(take, solids);
+  std::map<std::string, Colour> colours;
+  for (int round = 0; round < most_rounds; ++round) {
+    const calibrate::SurfacePixels seen = calibrate::probe_surfaces(take, scene, device, {});
+    const calibrate::Balance balance = calibrate::fit_balance(seen, {});
+    double most_change = 0;
+    for (const calibrate::SurfaceRatio& ratio : balance.surfaces) {
+      const calibrate::KnownSurface& known = seen.surfaces[ratio.surface];
+      const auto material =
+          std::ranges::find(scene.materials, known.material, &scene::Material::name);
+      // The balance is that of the set, and not the one in which these guesses would be right.
+      const auto estimate = calibrate::albedo_of(ratio, known, calibrate::Balance{});
+      const glm::dvec3 albedo = glm::clamp(estimate.albedo, least_albedo, most_albedo);
+      for (glm::length_t c = 0; c < 3; ++c)
+        most_change = std::max(most_change, std::abs(albedo[c] / known.albedo[c] - 1));
+      material->base_color = glm::vec3(albedo);
+      colours[known.material] = {estimate.albedo, estimate.sigma, ratio.pixels};
+    }
+    if (most_change < settled_change) break;
+  }
+  return colours;
+}
+
+}  // namespace previz::model

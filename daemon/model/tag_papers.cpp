@@ -1,0 +1,215 @@
+#include "daemon/model/tag_papers.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <optional>
+
+#include "daemon/lighting/response.hpp"
+#include "daemon/tracking/tag_family.hpp"
+#include "drivers/plate.hpp"
+
+namespace previz::model {
+namespace {
+
+// Light between a tag and what it lies on would be a fault of the model: it is at most so far
+// above.
+constexpr double least_above_m = 5e-5;
+constexpr double least_cell_px = 3;
+// What lies beside the paper is looked at from here to here, over half of the paper's width.
+constexpr double beside_from = 1.12, beside_to = 1.3;
+constexpr int beside_a_side = 8;
+
+std::string paper_of(const FlatTag& flat) {
+  return fmt::format("tag {} paper", flat.tag->id);
+}
+std::string print_of(const FlatTag& flat) {
+  return fmt::format("tag {} print", flat.tag->id);
+}
+
+// Returns a point of the tag's frame in the world.
+glm::dvec3 in_world(const FlatTag& flat, double x, double y) {
+  return glm::dvec3(flat.tag->world_from_tag * glm::dvec4(x, y, 0, 1));
+}
+
+// The cell at `row` and `column` of the printed tag; fractions are within cells.
+glm::dvec2 in_tag(const FlatTag& flat, const tracking::TagCells& cells, double row, double column) {
+  const double cell = flat.tag->size_m / cells.border;
+  return {cell * (column - 0.5 * cells.total), cell * (0.5 * cells.total - row)};
+}
+
+// What a tag lies on.
+Plane ground_of(const FlatTag& flat, bool is_on_box, const Shape& shape) {
+  if (!is_on_box) return shape.planes[flat.part];
+  const Box& box = shape.boxes[flat.part];
+  const auto axis = glm::length_t(flat.axis);
+  const double half = axis == 2 ? (flat.is_far ? box.size.z : 0) : 0.5 * box.size[axis];
+  const glm::dvec3 normal = (flat.is_far ? 1.0 : -1.0) * box.axes[axis];
+  return {box.foot + half * normal, normal};
+}
+
+void add_tag(const FlatTag& flat, const tracking::TagCells& cells, const Plane& ground,
+             std::vector<Solid>& solids) {
+  const auto above = [&](double row, double column) {
+    const glm::dvec2 at = in_tag(flat, cells, row, column);
+    const glm::dvec3 p = in_world(flat, at.x, at.y);
+    const double height = std::max(flat.thickness_m, least_above_m);
+    return p + (height - glm::dot(p - ground.at, ground.normal)) * ground.normal;
+  };
+  Solid paper{paper_of(flat), {}}, print{print_of(flat), {}};
+  for (int row = 0; row < cells.total; ++row)
+    for (int column = 0; column < cells.total;) {
+      const bool black = cells.black(row, column);
+      int end = column;  // neighbours in a row are one face
+      while (end < cells.total && cells.black(row, end) == black) ++end;
+      (black ? print : paper)
+          .faces.push_back(
+              {"face",
+               {above(row + 1, column), above(row + 1, end), above(row, end), above(row, column)}});
+      column = end;
+    }
+  solids.push_back(std::move(paper));
+  solids.push_back(std::move(print));
+}
+
+// Linear signals of a picture.
+class Signals {
+ public:
+  Signals(const Frame& frame, const ResponseCurve& response)
+      : plate_(to_plate(frame)), response_(response, plate_.bits), clipped_(response_.clipping()) {}
+
+  // Returns the nearest pixel's; nothing outside of the picture, and where a channel is clipped.
+  std::optional<glm::dvec3> at(const glm::dvec2& px) const {
+    const double x = std::round(px.x), y = std::round(px.y);
+    if (!(x >= 0 && y >= 0 && x < plate_.width && y < plate_.height)) return {};
+    const std::uint16_t* codes =
+        &plate_.samples[3 * (std::size_t(y) * std::size_t(plate_.width) + std::size_t(x))];
+    glm::dvec3 signal;
+    for (glm::length_t c = 0; c < 3; ++c) {
+      if (codes[c] >= clipped_.from) return {};
+      signal[c] = response_.inverse()[codes[c]];
+    }
+    return signal;
+  }
+
+ private:
+  Plate plate_;
+  lighting::Response response_;
+  lighting::Clipping clipped_;
+};
+
+using Values = std::vector<glm::dvec3>;
+
+// Each channel's.
+glm::dvec3 median_of(Values values) {
+  glm::dvec3 median;
+  for (glm::length_t c = 0; c < 3; ++c) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::ranges::nth_element(values, middle, {}, [c](const glm::dvec3& v) { return v[c]; });
+    median[c] = (*middle)[c];
+  }
+  return median;
+}
+
+// What the cells of a tag have in one picture, over what lies beside the tag.
+struct Ratios {
+  Values paper, print;
+};
+
+class TagColours {
+ public:
+  TagColours(const std::string& family, const Views& views, const ResponseCurve& response)
+      : family_(family), views_(views), response_(response) {
+    for (const MarkedView& view : views.views) signals_.emplace_back(*view.frame, response);
+  }
+
+  Ratios of(const FlatTag& flat) const {
+    const tracking::TagCells cells = tracking::tag_cells(family_, flat.tag->id);
+    Ratios ratios;
+    for (std::size_t v = 0; v < signals_.size(); ++v) add_view(v, flat, cells, ratios);
+    return ratios;
+  }
+
+ private:
+  glm::dvec2 pixel(std::size_t view, const FlatTag& flat, const glm::dvec2& at) const {
+    const auto& pose = views_.views[view].pose.pose;
+    return projected(views_.lens, pose.rotation * in_world(flat, at.x, at.y) + pose.translation);
+  }
+
+  void add_view(std::size_t v, const FlatTag& flat, const tracking::TagCells& cells,
+                Ratios& ratios) const {
+    const auto px = [&](double row, double column) {
+      return pixel(v, flat, in_tag(flat, cells, row, column));
+    };
+    const double middle = 0.5 * cells.total;
+    const glm::dvec2 down = px(middle + 0.5, middle) - px(middle - 0.5, middle);
+    const glm::dvec2 right = px(middle, middle + 0.5) - px(middle, middle - 0.5);
+    const double narrowest = std::abs(down.x * right.y - down.y * right.x) /
+                             std::max(glm::length(down), glm::length(right));
+    if (!(narrowest >= least_cell_px)) return;
+    Values beside, paper, print;
+    const auto add = [&](const glm::dvec2& at, Values& values) {
+      if (const auto signal = signals_[v].at(at)) values.push_back(*signal);
+    };
+    for (int row = 0; row < cells.total; ++row)
+      for (int column = 0; column < cells.total; ++column)
+        add(px(row + 0.5, column + 0.5), cells.black(row, column) ? print : paper);
+    for (const double out : {beside_from, beside_to})
+      for (int i = 0; i < beside_a_side; ++i) {
+        const double along = middle * out * (2.0 * i / beside_a_side - 1), off = middle * out;
+        for (const glm::dvec2 at : {glm::dvec2(along, -off), glm::dvec2(off, along),
+                                    glm::dvec2(-along, off), glm::dvec2(-off, -along)})
+          add(px(middle + at.x, middle + at.y), beside);
+      }
+    if (beside.empty()) return;
+    const glm::dvec3 ground = median_of(beside);
+    if (!(ground.r > 0 && ground.g > 0 && ground.b > 0)) return;
+    if (!paper.empty()) ratios.paper.push_back(median_of(paper) / ground);
+    if (!print.empty()) ratios.print.push_back(median_of(print) / ground);
+  }
+
+  std::string family_;
+  const Views& views_;
+  ResponseCurve response_;
+  std::vector<Signals> signals_;
+};
+
+}  // namespace
+
+std::vector<Solid> tag_solids(const std::string& family, const Layout& layout, const Shape& shape) {
+  std::vector<Solid> solids;
+  for (const FlatTag& flat : layout.plane_tags)
+    add_tag(flat, tracking::tag_cells(family, flat.tag->id), ground_of(flat, false, shape), solids);
+  for (const FlatTag& flat : layout.box_tags)
+    add_tag(flat, tracking::tag_cells(family, flat.tag->id), ground_of(flat, true, shape), solids);
+  return solids;
+}
+
+std::map<std::string, Colour> tag_colours(const std::string& family, const Layout& layout,
+                                          const Parts& parts, const Views& views,
+                                          const ResponseCurve& response,
+                                          const std::map<std::string, Colour>& surfaces) {
+  const TagColours all(family, views, response);
+  std::map<std::string, Colour> colours;
+  const auto add = [&](const FlatTag& flat, const std::string& ground) {
+    const auto surface = surfaces.find(ground);
+    if (surface == surfaces.end()) return;
+    const Ratios ratios = all.of(flat);
+    const auto put = [&](const std::string& name, const Values& values) {
+      if (values.empty()) return;
+      const glm::dvec3 ratio = median_of(values);
+      glm::dvec3 off(0);  // what one picture has, beside the median
+      for (const glm::dvec3& value : values) off = glm::max(off, glm::abs(value - ratio));
+      colours[name] = {surface->second.albedo * ratio, surface->second.albedo * off, values.size()};
+    };
+    put(paper_of(flat), ratios.paper);
+    put(print_of(flat), ratios.print);
+  };
+  for (const FlatTag& flat : layout.plane_tags) add(flat, parts.planes[flat.part].name);
+  for (const FlatTag& flat : layout.box_tags) add(flat, parts.boxes[flat.part].name);
+  return colours;
+}
+
+}  // namespace previz::model

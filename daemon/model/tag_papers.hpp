@@ -1,0 +1,30 @@
+// The printed tags that lie on a model: their paper and print, and what colour these have.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "daemon/model/colours.hpp"
+#include "daemon/model/solids.hpp"
+#include "daemon/model/views.hpp"
+#include "drivers/calibration.hpp"
+
+namespace previz::model {
+
+// Returns two solids for each tag that lies on a plane or a box, "tag 3 paper" and "tag 3 print":
+// what the family has in white and in black, as thin as paper, so that nothing lies between it and
+// what it lies on.
+std::vector<Solid> tag_solids(const std::string& family, const Layout& layout, const Shape& shape);
+
+// Returns the colours of papers and prints, from what the plates have in their cells over what they
+// have beside the tag, where the light is the same, times the albedo of what the tag lies on.
+// Cells that are less than 3 px wide are too blurred to show it; tags without others are not
+// listed.
+std::map<std::string, Colour> tag_colours(const std::string& family, const Layout& layout,
+                                          const Parts& parts, const Views& views,
+                                          const ResponseCurve& response,
+                                          const std::map<std::string, Colour>& surfaces);
+
+}  // namespace previz::model
