@@ -103,13 +103,6 @@ std::vector<Unknown> unknowns_of(const Parts& parts, const Start& start) {
   return unknowns;
 }
 
-// Returns the pose of a view's camera with what it is off: see FittedPose::covariance.
-tracking::CameraFromWorld pose_of(const MarkedView& view, const std::array<double, 6>& off) {
-  const glm::dmat3 turn = glm::transpose(tracking::rotation_by({off[0], off[1], off[2]}));
-  const auto& pose = view.pose.pose;
-  return {turn * pose.rotation, turn * (pose.translation - glm::dvec3(off[3], off[4], off[5]))};
-}
-
 glm::dvec3 place_of(const Shape& s, const Place& place, const Ray& ray) {
   using enum Place::Kind;
   switch (place.kind) {
@@ -146,7 +139,8 @@ std::vector<UsedMark> used_marks(const Views& views, const Layout& layout) {
 
 // Returns measured less projected, px.
 glm::dvec2 mark_off(const Views& views, const UsedMark& used, const Shape& s) {
-  const tracking::CameraFromWorld pose = pose_of(views.views[used.view], s.cameras_off[used.view]);
+  const tracking::CameraFromWorld pose =
+      adjusted_pose(views.views[used.view], s.cameras_off[used.view]);
   const glm::dmat3 turn = glm::transpose(pose.rotation);
   const Ray ray{-(turn * pose.translation), turn * used.direction};
   return used.mark->px -
@@ -225,6 +219,22 @@ void observe_points(const Parts& parts, const Layout& layout, std::vector<Observ
     }
 }
 
+// All pieces are one observation, so that the solids are made once.
+void observe_edges(const Parts& parts, const Views& views, const Layout& layout,
+                   const std::vector<EdgePiece>& pieces, std::vector<Observation>& all) {
+  if (pieces.empty()) return;
+  all.push_back({2 * pieces.size(), [&](const Shape& s, double* out) {
+                   const std::vector<Solid> solids = solids_of(parts, layout, s);
+                   for (const EdgePiece& piece : pieces) {
+                     const double sigma =
+                         std::sqrt(piece.variance_px2 + edge_sigma_px * edge_sigma_px);
+                     const glm::dvec2 off = edge_off(piece, views, s, solids) / sigma;
+                     *out++ = off.x;
+                     *out++ = off.y;
+                   }
+                 }});
+}
+
 class Problem {
  public:
   struct Equations {
@@ -233,12 +243,14 @@ class Problem {
     cv::Mat1d information, gradient;
   };
 
-  Problem(const Parts& parts, const Views& views, const Start& start)
+  Problem(const Parts& parts, const Views& views, const Start& start,
+          const std::vector<EdgePiece>& edges)
       : layout_(start.layout), unknowns_(unknowns_of(parts, start)) {
     observe_marks(parts, views, layout_, observations_);
     observe_cameras(views, observations_);
     observe_tags(layout_, observations_);
     observe_points(parts, layout_, observations_);
+    observe_edges(parts, views, layout_, edges, observations_);
     for (const Observation& o : observations_) rows_ += o.count;
   }
 
@@ -390,8 +402,9 @@ std::vector<FaceAccuracy> accuracies(const Parts& parts, const Layout& layout,
 
 }  // namespace
 
-Fit adjust(const Parts& parts, const Views& views, const Start& start) {
-  const Problem problem(parts, views, start);
+Fit adjust(const Parts& parts, const Views& views, const Start& start,
+           const std::vector<EdgePiece>& edges) {
+  const Problem problem(parts, views, start, edges);
   const auto found = tracking::least_squares(problem, start.shape, {200, 1e-3, 1e-12});
   if (found.why == tracking::Stopped::outside)
     throw Error(parts.file.string() +
@@ -404,6 +417,11 @@ Fit adjust(const Parts& parts, const Views& views, const Start& start) {
   fit.marks = mark_residuals(views, start.layout, fit.shape);
   insist_on_marks(parts, fit.marks);
   insist_on_information(parts, problem, at.information);
+  const std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
+  for (const EdgePiece& piece : edges) {
+    const glm::dvec2 off = edge_off(piece, views, fit.shape, solids);
+    fit.edges_off_px.push_back(0.5 * (std::abs(off.x) + std::abs(off.y)));
+  }
   double squares = 0;
   for (const MarkResidual& mark : fit.marks) squares += mark.off_px * mark.off_px;
   fit.rms_px = fit.marks.empty() ? 0 : std::sqrt(squares / double(fit.marks.size()));
@@ -412,6 +430,26 @@ Fit adjust(const Parts& parts, const Views& views, const Start& start) {
   if (const auto covariance = tracking::inverse_of(at.information))
     fit.faces = accuracies(parts, start.layout, problem, fit.shape,
                            fit.noise_factor * fit.noise_factor * *covariance);
+  return fit;
+}
+
+Fit adjust_to_edges(const Parts& parts, const Views& views, const Start& start,
+                    const ResponseCurve& response) {
+  constexpr int rounds = 3;
+  Fit fit = adjust(parts, views, start);
+  for (int round = 0; round < rounds; ++round) {
+    std::vector<EdgePiece> edges = find_edges(parts, start.layout, views, fit.shape, response);
+    if (edges.empty()) return fit;
+    Fit next = adjust(parts, views, {start.layout, fit.shape}, edges);
+    std::vector<double> sorted = next.edges_off_px;
+    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::ranges::nth_element(sorted, middle);
+    const double most = std::max(4 * edge_sigma_px, 4 * *middle);
+    std::vector<EdgePiece> kept;
+    for (std::size_t i = 0; i < edges.size(); ++i)
+      if (next.edges_off_px[i] <= most) kept.push_back(edges[i]);
+    fit = adjust(parts, views, {start.layout, next.shape}, kept);
+  }
   return fit;
 }
 

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/model/edges.hpp"
 #include "daemon/model/start.hpp"
 
 namespace previz::model {
@@ -27,15 +28,27 @@ struct Fit {
   double rms_px = 0;        // of the marks' distances
   double noise_factor = 1;  // by which deviations are larger than expected; at least 1
   std::vector<FaceAccuracy> faces;
+  std::vector<double> edges_off_px;  // of each piece, the mean of both ends
 };
 
 // Least squares by Levenberg-Marquardt (daemon/tracking/least_squares.hpp). Unknown are the
 // planes, boxes, cylinders and free points, and how far each camera is off what its tags say, with
-// the covariance of that pose. Marks count by parts.mark_px, tags by tag_sigma_m. What stands on a
+// the covariance of that pose. Marks count by parts.mark_px, tags by tag_sigma_m, edges of light by
+// their variance and edge_sigma_px. What stands on a
 // plane stays on it. The accuracy of a face is propagated from the unknowns' covariance, which is
 // larger by the square of noise_factor. Throws previz::Error naming the point and picture where
 // marks contradict each other by more than most_off, and the part that nothing determines.
-Fit adjust(const Parts& parts, const Views& views, const Start& start);
+Fit adjust(const Parts& parts, const Views& views, const Start& start,
+           const std::vector<EdgePiece>& edges = {});
+
+// Adjusts to the marks, then to the edges that the pictures have where the model has them
+// (find_edges), until they are the same: what is off by more than the others is no edge of the
+// model. Without edges the marks decide.
+Fit adjust_to_edges(const Parts& parts, const Views& views, const Start& start,
+                    const ResponseCurve& response);
+
+// An edge of light is where the edge of the thing is to so much: paint and paper are not sharp.
+inline constexpr double edge_sigma_px = 0.15;
 
 // A tag lies flat, and is where the map of tags has it, to so much (standard deviation of a
 // corner).

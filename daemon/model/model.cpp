@@ -43,6 +43,14 @@ std::filesystem::path file_of(const ModelOptions& options) {
 void print_fit(const Parts& parts, const Layout& layout, const Fit& fit, std::ostream& out) {
   fmt::print(out, "{} marks in {} pictures, rms {:.2f} px\n", fit.marks.size(),
              parts.pictures.size(), fit.rms_px);
+  if (!fit.edges_off_px.empty()) {
+    std::vector<double> off = fit.edges_off_px;
+    std::ranges::sort(off);
+    fmt::print(out,
+               "{} pieces of edges found in the pictures: the model is {:.2f} px off in the "
+               "median, {:.2f} px in 90 %\n",
+               off.size(), off[off.size() / 2], off[off.size() * 9 / 10]);
+  }
   if (fit.noise_factor > 1.5)
     fmt::print(out,
                "warning: the marks disagree by {:.1f} times their accuracy of {:g} px; check those "
@@ -160,7 +168,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   const auto source = calibrate::open_source(options.footage, "observer");
   const Views views = find_views(*source, camera, set.tracking, parts);
   const Start start = first_guess(parts, views, set.tracking.tags);
-  const Fit fit = adjust(parts, views, start);
+  const Fit fit = adjust_to_edges(parts, views, start, camera.response);
   print_fit(parts, start.layout, fit, out);
   print_faces(fit, out);
   const std::filesystem::path file = file_of(options);

@@ -95,6 +95,12 @@ Ray ray_of(const Views& views, const MarkedView& view, const Mark& mark) {
   return {-(turn * view.pose.pose.translation), glm::normalize(turn * glm::dvec3(*at, 1))};
 }
 
+tracking::CameraFromWorld adjusted_pose(const MarkedView& view, const std::array<double, 6>& off) {
+  const glm::dmat3 turn = glm::transpose(tracking::rotation_by({off[0], off[1], off[2]}));
+  const auto& pose = view.pose.pose;
+  return {turn * pose.rotation, turn * (pose.translation - glm::dvec3(off[3], off[4], off[5]))};
+}
+
 glm::dvec2 projected(const PinholeIntrinsics& lens, const glm::dvec3& in_camera) {
   if (!(in_camera.z > 0)) return glm::dvec2(std::numeric_limits<double>::quiet_NaN());
   return distort(lens, glm::dvec2(in_camera) / in_camera.z);

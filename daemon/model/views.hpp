@@ -43,6 +43,10 @@ Views find_views(calibrate::PictureSource& source, const ObserverCalibration& ca
 // the lens shows nothing there.
 Ray ray_of(const Views& views, const MarkedView& view, const Mark& mark);
 
+// Returns the pose of a view's camera where it is off by rotation and shift along its own axes: see
+// FittedPose::covariance.
+tracking::CameraFromWorld adjusted_pose(const MarkedView& view, const std::array<double, 6>& off);
+
 // Returns where the lens shows a point of the camera's axes; NaN behind the camera.
 glm::dvec2 projected(const PinholeIntrinsics& lens, const glm::dvec3& in_camera);
 
