@@ -207,16 +207,20 @@ void observe_tags(const Layout& layout, std::vector<Observation>& all) {
                    }});
 }
 
+void observe_on_plane(std::size_t plane, const Place& place, std::vector<Observation>& all) {
+  all.push_back({1, [plane, place](const Shape& s, double* out) {
+                   const Plane& on = s.planes[plane];
+                   out[0] = glm::dot(place_of(s, place, {}) - on.at, on.normal) / flatness_m;
+                 }});
+}
+
 void observe_points(const Parts& parts, const Layout& layout, std::vector<Observation>& all) {
-  for (std::size_t p = 0; p < parts.planes.size(); ++p)
-    for (const std::string& name : points_on(parts.planes[p])) {
-      const Place place = layout.places.at(name);
-      all.push_back({1, [p, place](const Shape& s, double* out) {
-                       const Plane& plane = s.planes[p];
-                       out[0] =
-                           glm::dot(place_of(s, place, {}) - plane.at, plane.normal) / flatness_m;
-                     }});
-    }
+  for (std::size_t p = 0; p < parts.planes.size(); ++p) {
+    for (const std::string& name : points_on(parts.planes[p]))
+      observe_on_plane(p, layout.places.at(name), all);
+    for (const std::string& name : parts.planes[p].foot)
+      observe_on_plane(*layout.plane_on[p], layout.places.at(name), all);
+  }
 }
 
 // All pieces are one observation, so that the solids are made once.

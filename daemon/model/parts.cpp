@@ -87,6 +87,7 @@ Keys plane_keys(PlanePart& p) {
       {"margin_m", &p.margin_m, units::m.within(0, 1000), "How far that rectangle extends beyond what is on the plane."},
       {"edges", &p.edges, {}, "Pairs of points on its borders, where the rectangle ends.", optional("[[\"a\", \"b\"]]")},
       {"upright_on", &p.upright_on, {}, "Plane that it stands on at a right angle.", optional("\"floor\"")},
+      {"foot", &p.foot, {}, "Points where it meets that plane.", optional("[\"a\", \"b\"]")},
   };
 }
 
@@ -246,7 +247,10 @@ class Checker {
     points(given, "points", p.points, 2);
     points(given, "outline", p.outline, 2);
     for (const auto& [a, b] : p.edges) points(given, "edges", {a, b}, 1);
-    const std::size_t on_it = marked(p.points) + marked(p.outline);
+    points(given, "foot", p.foot, 1);
+    if (!p.foot.empty() && p.upright_on.empty())
+      add(given, "foot", "needs upright_on, the plane that the foot is on");
+    const std::size_t on_it = marked(p.points) + marked(p.outline) + marked(p.foot);
     const std::size_t needed = p.upright_on.empty() ? 3 : 2;
     if (p.tags.empty() && on_it < needed)
       add(given, "name",

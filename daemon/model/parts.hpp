@@ -35,6 +35,8 @@ struct PlanePart {
   // border lie on the plane, and one picture of each is enough.
   std::vector<std::array<std::string, 2>> edges = {};
   std::string upright_on = {};  // the plane that it stands on at a right angle; empty: none
+  // Points where it meets the plane that it stands on; one picture of each is enough.
+  std::vector<std::string> foot = {};
 };
 
 // Four corners in order around a box's upper or lower side; "" for one that is not marked.

@@ -137,6 +137,12 @@ class Starter {
         point, least_parallax / degree));
   }
 
+  glm::dvec3 foot_of(const std::string& point, std::size_t plane) const {
+    if (const auto place = place_of(point)) return *place;
+    const auto met = meet(rays_.at(point).front(), shape_.planes[plane]);
+    return met ? *met : needed_place_of(point);
+  }
+
   Points corners_of(const set::Tag& tag, double thickness_m) const {
     Points corners;
     for (std::size_t i = 0; i < 4; ++i)
@@ -159,6 +165,8 @@ class Starter {
     for (const auto* names : {&part.points, &part.outline})
       for (const std::string& point : *names)
         if (part.tags.empty() || place_of(point)) on_it.push_back(needed_place_of(point));
+    for (const std::string& point : part.foot)
+      on_it.push_back(foot_of(point, *layout_.plane_on[index]));
     Plane& plane = shape_.planes[index];
     plane.at = mean_of(on_it);
     plane.normal = normal_of(part, layout_.plane_on[index], on_it);
@@ -489,7 +497,8 @@ Start first_guess(const Parts& parts, const Views& views, const std::vector<set:
 
 std::vector<std::string> points_on(const PlanePart& part) {
   std::vector<std::string> names = part.points;
-  names.insert(names.end(), part.outline.begin(), part.outline.end());
+  for (const auto* more : {&part.outline, &part.foot})
+    names.insert(names.end(), more->begin(), more->end());
   for (const auto& pair : part.edges) names.insert(names.end(), pair.begin(), pair.end());
   std::ranges::sort(names);
   names.erase(std::unique(names.begin(), names.end()), names.end());

@@ -181,6 +181,22 @@ TEST(ModelFit, AWallStandsUprightOnTheFloor) {
   EXPECT_LT(wall.normal.y, 0);  // towards the cameras
 }
 
+TEST(ModelFit, OnePictureOfAWallsFootIsEnough) {
+  MarkedScene scene = scene_of_a_table();
+  scene.points = {{"a", {-0.4, 0.6, 0}}, {"b", {0.4, 0.5, 0}}};
+  model::Parts parts = table();
+  parts.planes.push_back({.name = "wall", .upright_on = "table", .foot = {"a", "b"}});
+  std::mt19937 random(1);
+  parts.pictures = scene.pictures(random);
+  for (std::size_t i = 1; i < parts.pictures.size(); ++i) parts.pictures[i].marks.clear();
+  const model::Views views = scene.views(parts, random);
+  const model::Plane wall =
+      model::adjust(parts, views, model::first_guess(parts, views, scene.tags)).shape.planes[1];
+  for (const auto& [name, point] : scene.points)
+    EXPECT_NEAR(glm::dot(point - wall.at, wall.normal), 0, 1e-6);
+  EXPECT_NEAR(wall.normal.z, 0, 1e-7);
+}
+
 TEST(ModelFit, ATableEndsAtItsEdges) {
   MarkedScene scene = scene_of_a_table();
   scene.points = {{"far a", {-0.3, 0.7, 0}}, {"far b", {0.5, 0.6, 0}}};
