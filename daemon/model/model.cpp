@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <map>
+#include <vector>
 
 #include "daemon/calibrate/known_camera.hpp"
 #include "daemon/calibrate/lens/source.hpp"
 #include "daemon/model/fit.hpp"
 #include "daemon/model/glb.hpp"
 #include "daemon/model/parts.hpp"
+#include "daemon/model/scans.hpp"
 #include "daemon/model/solids.hpp"
 #include "daemon/model/start.hpp"
 #include "daemon/model/views.hpp"
@@ -114,6 +116,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   if (options.write && !options.set_file)
     throw Error("--write needs --set: it changes that set file");
   const Parts parts = parse_parts(session::read_file(options.parts_file), options.parts_file);
+  const std::vector<ScanFile> scan_files = read_scans(parts);
   const set::Set set = set_of(options);
   const ObserverCalibration camera = calibrate::known_observer(options.set_file, options.footage);
   const auto source = calibrate::open_source(options.footage, "observer");
@@ -122,8 +125,10 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   const Fit fit = adjust(parts, views, start);
   print_fit(parts, start.layout, fit, out);
   print_faces(fit, out);
+  const std::vector<PlacedScan> scans =
+      place_scans(parts, start.layout, fit.shape, scan_files, out);
   const std::filesystem::path file = file_of(options);
-  session::replace_file(file, glb_of(solids_of(parts, start.layout, fit.shape), {}));
+  session::replace_file(file, glb_of(solids_of(parts, start.layout, fit.shape), {}, scans));
   fmt::print(out, "model: {}\n", file.string());
   warn_of_others(set, file, out);
   if (options.write) add_to_set(*options.set_file, file, out);

@@ -431,6 +431,8 @@ class Starter {
     for (const PlanePart& part : parts_.planes)
       for (const auto* names : {&part.points, &part.outline})
         used.insert(names->begin(), names->end());
+    for (const ScanPart& part : parts_.scans)
+      for (const ScanPoint& point : part.points) used.insert(point.name);
     for (const auto& [point, rays] : rays_) {
       if (layout_.places.contains(point)) continue;
       if (!used.contains(point)) {
