@@ -10,6 +10,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 
 #include "drivers/error.hpp"
@@ -18,6 +19,7 @@
 namespace previz::model {
 namespace {
 
+constexpr unsigned out_of_range = std::numeric_limits<unsigned>::max();
 constexpr std::array formats{".obj", ".ply", ".stl", ".fbx", ".gltf", ".glb"};
 
 std::string extension_of(const std::filesystem::path& file) {
@@ -40,8 +42,10 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
     }
     for (unsigned f = 0; f < from.mNumFaces; ++f) {
       const aiFace& face = from.mFaces[f];
+      // Indices are as the file has them; one that is out of range stays so.
       for (unsigned k = 0; face.mNumIndices == 3 && k < 3; ++k)
-        mesh.indices.push_back(first + face.mIndices[k]);
+        mesh.indices.push_back(face.mIndices[k] < from.mNumVertices ? first + face.mIndices[k]
+                                                                    : out_of_range);
     }
   }
   for (unsigned c = 0; c < node.mNumChildren; ++c) append(scene, *node.mChildren[c], to_file, mesh);
@@ -70,6 +74,9 @@ void insist_on_triangles(const std::filesystem::path& path, const TriangleMesh& 
   if (mesh.indices.empty())
     throw Error(path.string() +
                 ": has no triangles; export the scan as a mesh, not as points or lines");
+  if (std::ranges::find(mesh.indices, out_of_range) != mesh.indices.end())
+    throw Error(path.string() +
+                ": has a face with a vertex that the file lacks; export the scan again");
   for (const glm::vec3& p : mesh.positions)
     if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
       throw Error(path.string() +

@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <limits>
 #include <numbers>
 #include <utility>
 
+#include "daemon/model/scan_distance.hpp"
 #include "daemon/model/scan_place.hpp"
 #include "daemon/model/scan_simplify.hpp"
 #include "drivers/error.hpp"
@@ -17,6 +20,14 @@ namespace {
 
 // A scan whose up axis is farther from the vertical is probably upside down, or turned.
 constexpr double most_tilt = 60 * std::numbers::pi / 180;
+
+// A marked point that is farther from its scan's surface, as a fraction of the scan's diagonal, has
+// other coordinates than the file: another program's unit or axes.
+constexpr double most_off_surface = 0.03;
+
+std::string subject_of(const Parts& parts, const ScanPart& part) {
+  return fmt::format("{}: scan \"{}\"", parts.file.string(), part.name);
+}
 
 glm::dvec3 world_place_of(const std::string& point, const Layout& layout, const Shape& shape) {
   const Place& place = layout.places.at(point);
@@ -85,6 +96,28 @@ void print_faults(const std::string& name, const MeshFaults& faults, std::ostrea
                name, faults.crowded_edges);
 }
 
+// The mesh must have triangles; both are in the file's unit.
+void insist_on_surface(const std::string& subject, const ScanPart& part, const ScanFile& file) {
+  glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
+  for (const glm::vec3& p : file.mesh.positions) {
+    low = glm::min(low, glm::dvec3(p));
+    high = glm::max(high, glm::dvec3(p));
+  }
+  const double diagonal = glm::distance(low, high);
+  const SurfaceDistance surface(file.mesh.positions, file.mesh.indices);
+  for (const ScanPoint& point : part.points) {
+    const double off = surface.from(glm::vec3(point.at), std::numeric_limits<double>::infinity());
+    if (off <= most_off_surface * diagonal) continue;
+    throw Error(fmt::format(
+        "{}: point \"{}\" is {:.4g} units from the surface, whose diagonal has {:.4g}; give its "
+        "coordinates as the file has them, {} to {} along each axis: programs that show a scan may "
+        "change its unit and swap its axes",
+        subject, point.name, off, diagonal,
+        fmt::format("({:.4g}, {:.4g}, {:.4g})", low.x, low.y, low.z),
+        fmt::format("({:.4g}, {:.4g}, {:.4g})", high.x, high.y, high.z)));
+  }
+}
+
 PlacedScan placed_scan(const ScanPart& part, const ScanFile& file, const ScanUnits& units,
                        const Placement& placed, std::ostream& out) {
   TriangleMesh mesh = file.mesh;
@@ -96,8 +129,11 @@ PlacedScan placed_scan(const ScanPart& part, const ScanFile& file, const ScanUni
                 ": all its triangles are without area; check the program that exported it");
   const std::size_t before = mesh.triangles();
   const Simplified simple = simplified(std::move(mesh), part.error_m);
-  fmt::print(out, "scan {}: {} triangles, simplified to {}; largest deviation {:.3f} mm\n",
-             part.name, before, simple.mesh.triangles(), 1000 * simple.error);
+  if (simple.mesh.triangles() < before)
+    fmt::print(out, "scan {}: {} triangles, simplified to {}; largest deviation {:.3f} mm\n",
+               part.name, before, simple.mesh.triangles(), 1000 * simple.error);
+  else
+    fmt::print(out, "scan {}: {} triangles, none removed\n", part.name, before);
   PlacedScan scan{part.name, shaded(simple.mesh)};
   for (glm::vec3& p : scan.mesh.positions)
     p = glm::vec3(placed.rotation * glm::dvec3(p) + placed.translation);
@@ -109,7 +145,10 @@ PlacedScan placed_scan(const ScanPart& part, const ScanFile& file, const ScanUni
 
 std::vector<ScanFile> read_scans(const Parts& parts) {
   std::vector<ScanFile> files;
-  for (const ScanPart& part : parts.scans) files.push_back(read_scan(part.file));
+  for (const ScanPart& part : parts.scans) {
+    files.push_back(read_scan(part.file));
+    insist_on_surface(subject_of(parts, part), part, files.back());
+  }
   return files;
 }
 
@@ -118,7 +157,7 @@ std::vector<PlacedScan> place_scans(const Parts& parts, const Layout& layout, co
   std::vector<PlacedScan> scans;
   for (std::size_t i = 0; i < parts.scans.size(); ++i) {
     const ScanPart& part = parts.scans[i];
-    const std::string subject = fmt::format("{}: scan \"{}\"", parts.file.string(), part.name);
+    const std::string subject = subject_of(parts, part);
     std::vector<PointPair> points;
     for (const ScanPoint& point : part.points)
       points.push_back({point.name, point.at, world_place_of(point.name, layout, shape)});

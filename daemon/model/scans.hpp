@@ -17,7 +17,8 @@ struct PlacedScan {
   ShadedMesh mesh;
 };
 
-// Reads the scans' files, in the order of the parts.
+// Reads the scans' files, in the order of the parts. Throws previz::Error naming the file that is
+// not a mesh, or the point whose coordinates are not on the scan's surface.
 std::vector<ScanFile> read_scans(const Parts& parts);
 
 // Places the scans on the adjusted points of the shape, and reports on `out` how well each fits and

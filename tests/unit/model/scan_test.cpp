@@ -130,6 +130,12 @@ TEST_F(ScanRead, WhatIsNotAMeshIsRefused) {
               HasSubstr("nan.obj: has a vertex whose coordinates are not finite numbers"));
   EXPECT_THAT(refusal("far.obj", points + "v 0 0 inf\nf 1 2 4\n"), HasSubstr("not finite"));
   EXPECT_THAT(refusal("points.obj", points), HasSubstr("points.obj: has no triangles"));
+  EXPECT_THAT(
+      refusal("lacking.ply",
+              "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+              "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+              "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"),
+      HasSubstr("lacking.ply: has a face with a vertex that the file lacks"));
   EXPECT_THAT(refusal("junk.ply", "junk"), HasSubstr("junk.ply: cannot be read"));
   EXPECT_THAT(refusal("scan.e57", "junk"), HasSubstr("allowed: .obj, .ply"));
   EXPECT_THAT(error_of([&] { model::read_scan(folder_ / "none.obj"); }),
@@ -197,6 +203,7 @@ TEST_F(Scans, ArePlacedByTheirMarkedPoints) {
               1e-6);
   EXPECT_THAT(report_,
               HasSubstr("scan lump: 4 points, rms 0.00 mm; they would fit best at 1.0000"));
+  EXPECT_THAT(report_, HasSubstr("scan lump: 224 triangles, none removed"));
   EXPECT_THAT(report_, Not(HasSubstr("warning")));
 }
 
@@ -247,6 +254,7 @@ TEST_F(Scans, UnitAndUpMustBeGivenSomewhere) {
 
 TEST_F(Scans, AMirroredOneIsRefused) {
   for (model::ScanPoint& point : parts_.scans[0].points) point.at.x *= -1;
+  for (glm::vec3& p : mesh_.positions) p.x *= -1;
   write_obj(folder_ / "lump.obj", mesh_, 1e-3);
   EXPECT_THAT(refusal(), HasSubstr("mm if the scan is mirrored"));
 }
@@ -254,18 +262,55 @@ TEST_F(Scans, AMirroredOneIsRefused) {
 TEST_F(Scans, APointThatContradictsTheOthersIsNamed) {
   write_obj(folder_ / "lump.obj", mesh_, 1e-3);
   add_spot("spot 4", 77);
-  parts_.scans[0].points[2].at += glm::dvec3(0, 12, 9);
+  scene_.points["spot 2"] += glm::dvec3(0, 0.012, 0.009);
   EXPECT_THAT(refusal(), HasSubstr("point \"spot 2\" is 15.0 mm from where the other points"));
 }
 
-TEST_F(Scans, PointsOnOneLineAreRefused) {
+TEST(ScanPlace, PointsOnOneLineAreRefused) {
+  std::vector<model::PointPair> points{
+      {"a", {0, 0, 0}, {1, 0, 0}}, {"b", {1, 2, 0.5}, {2, 2, 0.5}}, {"c", {2, 4, 1.01}, {3, 4, 1}}};
+  EXPECT_THAT(error_of([&] { model::place_scan("statue", points, 1); }),
+              HasSubstr("statue: its points \"a\", \"b\", \"c\" lie on one line in the scan"));
+  points[2].in_scan = {2, 3, 4};
+  EXPECT_THAT(error_of([&] { model::place_scan("statue", points, 1); }),
+              HasSubstr("lie on one line in the pictures"));
+  for (model::PointPair& pair : points) pair.in_scan = pair.in_world = {1, 1, 1};
+  EXPECT_THAT(error_of([&] { model::place_scan("statue", points, 1); }), HasSubstr("on one line"));
+}
+
+// By noise of 1 mm in each coordinate, 4 points leave 12 - 6 of 12 degrees of freedom, so the root
+// mean square of their distances is sqrt(3 * 6 / 12) mm on average over trials; its standard error
+// over 400 trials, of a quantity that spreads by 1 / sqrt(2 * 6) of itself, is 1.5 %.
+TEST(ScanPlace, TheDeviationIsThatOfTheNoise) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0, 1e-3);
+  const glm::dmat3 turn = tracking::rotation_by({0.3, 2, -1});
+  double squares = 0;
+  constexpr int trials = 400;
+  for (int trial = 0; trial < trials; ++trial) {
+    std::vector<model::PointPair> points;
+    for (const glm::dvec3 p : {glm::dvec3(0, 0, 0), {400, 0, 0}, {0, 300, 0}, {100, 50, 350}}) {
+      glm::dvec3 off;
+      for (glm::length_t k = 0; k < 3; ++k) off[k] = noise(random);
+      points.push_back({"p", p, turn * (1e-3 * p) + glm::dvec3(1, 2, 3) + off});
+    }
+    const model::Placement placed = model::place_scan("scan", points, 1e-3);
+    EXPECT_NEAR(glm::determinant(placed.rotation), 1, 1e-12);
+    squares += placed.rms_m * placed.rms_m / trials;
+  }
+  EXPECT_NEAR(std::sqrt(squares), std::sqrt(1.5) * 1e-3, 4 * 0.015 * std::sqrt(1.5) * 1e-3);
+}
+
+// As a program shows them that has Y up turned to Z up, and another that shows metres.
+TEST_F(Scans, PointsMustLieOnTheSurface) {
   write_obj(folder_ / "lump.obj", mesh_, 1e-3);
   std::vector<model::ScanPoint>& points = parts_.scans[0].points;
-  points.resize(3);
-  scene_.points.erase("spot 3");
-  points[2].at = 0.5 * (points[0].at + points[1].at);
-  scene_.points["spot 2"] = 0.5 * (scene_.points["spot 0"] + scene_.points["spot 1"]);
-  EXPECT_THAT(refusal(), HasSubstr("\"spot 0\", \"spot 1\", \"spot 2\" lie on one line"));
+  const auto right = points;
+  for (model::ScanPoint& point : points) point.at = {point.at.x, -point.at.z, point.at.y};
+  EXPECT_THAT(refusal(), HasSubstr("give its coordinates as the file has them"));
+  points = right;
+  for (model::ScanPoint& point : points) point.at *= 1e-3;
+  EXPECT_THAT(refusal(), HasSubstr("units from the surface, whose diagonal has"));
 }
 
 // Three points fit the mirrored axes as well; that its up is not up shows it.
