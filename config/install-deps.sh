@@ -18,7 +18,7 @@ packages=(
   # cameras, buttons
   libaravis-dev libcamera-dev libudev-dev libusb-1.0-0-dev libgpiod-dev libhidapi-dev
   # markers, geometry, scenes
-  libapriltag-dev libembree-dev libtinygltf-dev libdraco-dev libmeshoptimizer-dev libstb-dev libglm-dev
+  libapriltag-dev libembree-dev libtinygltf-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libstb-dev libglm-dev
   # files, command line, log, hashes
   libtomlplusplus-dev nlohmann-json3-dev libyaml-cpp-dev libtinyxml2-dev libcli11-dev libspdlog-dev libfmt-dev libssl-dev
   # main loop, service, D-Bus

@@ -182,8 +182,9 @@ void add_model(CLI::App& app, model::ModelOptions& options) {
   command.add_option("footage", options.footage, "Session, folder of pictures, or video")
       ->required();
   command
-      .add_option("--parts", options.parts_file,
-                  "File of the scene's planes, boxes and cylinders, and of the marked points")
+      .add_option(
+          "--parts", options.parts_file,
+          "File of the scene's planes, boxes, cylinders and scans, and of the marked points")
       ->required();
   command.add_option("--set", options.set_file,
                      "Set file with the tags and the film camera's lens (default: the session's)");

@@ -17,9 +17,10 @@ glm::vec3 y_up(const glm::dvec3& v) {
   return {v.x, v.z, -v.y};
 }
 
-// A triangle's corners are its own, so that its normal is that of its face.
+// A solid's triangles share no corners, so that their normals are those of their faces.
 struct Mesh {
   std::vector<glm::vec3> positions, normals;
+  std::vector<unsigned> indices;  // empty: three vertices after the other make a triangle
 };
 
 Mesh mesh_of(const Solid& solid) {
@@ -35,18 +36,43 @@ Mesh mesh_of(const Solid& solid) {
   return mesh;
 }
 
-// Appends vectors to the buffer and returns the accessor for them.
-int add_vectors(const std::vector<glm::vec3>& vectors, bool with_bounds, tinygltf::Model& model) {
+Mesh mesh_of(const PlacedScan& scan) {
+  Mesh mesh{scan.mesh.positions, scan.mesh.normals, scan.mesh.indices};
+  for (glm::vec3& p : mesh.positions) p = y_up(p);
+  for (glm::vec3& n : mesh.normals) n = y_up(n);
+  return mesh;
+}
+
+// Appends values to the buffer and returns the view of them.
+template <class T>
+int add_view(const std::vector<T>& values, int target, tinygltf::Model& model) {
   std::vector<unsigned char>& bytes = model.buffers.front().data;
   tinygltf::BufferView view;
   view.buffer = 0;
   view.byteOffset = bytes.size();
-  view.byteLength = vectors.size() * sizeof(glm::vec3);
-  view.target = TINYGLTF_TARGET_ARRAY_BUFFER;
+  view.byteLength = values.size() * sizeof(T);
+  view.target = target;
   bytes.resize(bytes.size() + view.byteLength);
-  std::memcpy(bytes.data() + view.byteOffset, vectors.data(), view.byteLength);
+  std::memcpy(bytes.data() + view.byteOffset, values.data(), view.byteLength);
+  model.bufferViews.push_back(view);
+  return static_cast<int>(model.bufferViews.size()) - 1;
+}
+
+// Returns the accessor.
+int add_indices(const std::vector<unsigned>& indices, tinygltf::Model& model) {
   tinygltf::Accessor accessor;
-  accessor.bufferView = static_cast<int>(model.bufferViews.size());
+  accessor.bufferView = add_view(indices, TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER, model);
+  accessor.componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+  accessor.type = TINYGLTF_TYPE_SCALAR;
+  accessor.count = indices.size();
+  model.accessors.push_back(accessor);
+  return static_cast<int>(model.accessors.size()) - 1;
+}
+
+// Returns the accessor.
+int add_vectors(const std::vector<glm::vec3>& vectors, bool with_bounds, tinygltf::Model& model) {
+  tinygltf::Accessor accessor;
+  accessor.bufferView = add_view(vectors, TINYGLTF_TARGET_ARRAY_BUFFER, model);
   accessor.componentType = TINYGLTF_COMPONENT_TYPE_FLOAT;
   accessor.type = TINYGLTF_TYPE_VEC3;
   accessor.count = vectors.size();
@@ -56,7 +82,6 @@ int add_vectors(const std::vector<glm::vec3>& vectors, bool with_bounds, tinyglt
     accessor.minValues = {low.x, low.y, low.z};
     accessor.maxValues = {high.x, high.y, high.z};
   }
-  model.bufferViews.push_back(view);
   model.accessors.push_back(accessor);
   return static_cast<int>(model.accessors.size()) - 1;
 }
@@ -74,33 +99,36 @@ tinygltf::Material matt(const std::string& name, const glm::dvec3& albedo) {
 
 }  // namespace
 
-std::string glb_of(const std::vector<Solid>& solids, const Colours& colours) {
+std::string glb_of(const std::vector<Solid>& solids, const Colours& colours,
+                   const std::vector<PlacedScan>& scans) {
   tinygltf::Model model;
   model.asset.version = "2.0";
   model.asset.generator = "previzd model";
   model.extensionsUsed = {"KHR_materials_specular"};
   model.buffers.emplace_back();
   tinygltf::Scene scene;
-  for (const Solid& solid : solids) {
-    const Mesh mesh = mesh_of(solid);
-    const auto colour = colours.find(solid.name);
+  const auto add = [&](const std::string& name, const Mesh& mesh) {
+    const auto colour = colours.find(name);
     model.materials.push_back(
-        matt(solid.name, colour == colours.end() ? glm::dvec3(0.5) : colour->second));
+        matt(name, colour == colours.end() ? glm::dvec3(0.5) : colour->second));
     tinygltf::Primitive primitive;
     primitive.attributes["POSITION"] = add_vectors(mesh.positions, true, model);
     primitive.attributes["NORMAL"] = add_vectors(mesh.normals, false, model);
+    if (!mesh.indices.empty()) primitive.indices = add_indices(mesh.indices, model);
     primitive.material = static_cast<int>(model.materials.size()) - 1;
     primitive.mode = TINYGLTF_MODE_TRIANGLES;
     tinygltf::Mesh its_mesh;
-    its_mesh.name = solid.name;
+    its_mesh.name = name;
     its_mesh.primitives.push_back(primitive);
     tinygltf::Node node;
-    node.name = solid.name;
+    node.name = name;
     node.mesh = static_cast<int>(model.meshes.size());
     scene.nodes.push_back(static_cast<int>(model.nodes.size()));
     model.meshes.push_back(its_mesh);
     model.nodes.push_back(node);
-  }
+  };
+  for (const Solid& solid : solids) add(solid.name, mesh_of(solid));
+  for (const PlacedScan& scan : scans) add(scan.name, mesh_of(scan));
   model.scenes.push_back(scene);
   model.defaultScene = 0;
   std::ostringstream bytes;

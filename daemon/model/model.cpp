@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <vector>
 
 #include "daemon/calibrate/known_camera.hpp"
 #include "daemon/calibrate/lens/source.hpp"
@@ -11,6 +12,7 @@
 #include "daemon/model/fit.hpp"
 #include "daemon/model/glb.hpp"
 #include "daemon/model/parts.hpp"
+#include "daemon/model/scans.hpp"
 #include "daemon/model/solids.hpp"
 #include "daemon/model/start.hpp"
 #include "daemon/model/tag_papers.hpp"
@@ -163,6 +165,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   if (options.write && !options.set_file)
     throw Error("--write needs --set: it changes that set file");
   const Parts parts = parse_parts(session::read_file(options.parts_file), options.parts_file);
+  const std::vector<ScanFile> scan_files = read_scans(parts);
   const set::Set set = set_of(options);
   const ObserverCalibration camera = calibrate::known_observer(options.set_file, options.footage);
   const auto source = calibrate::open_source(options.footage, "observer");
@@ -171,6 +174,8 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   const Fit fit = adjust_to_edges(parts, views, start, camera.response);
   print_fit(parts, start.layout, fit, out);
   print_faces(fit, out);
+  const std::vector<PlacedScan> scans =
+      place_scans(parts, start.layout, fit.shape, scan_files, out);
   const std::filesystem::path file = file_of(options);
   std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
   std::map<std::string, Colour> colours = measured(options, solids, out);
@@ -179,7 +184,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   for (Solid& tag : tag_solids(set.tracking.family, start.layout, fit.shape))
     solids.push_back(std::move(tag));
   const Colours albedos = colours.empty() ? Colours{} : reported(colours, solids, out);
-  session::replace_file(file, glb_of(solids, albedos));
+  session::replace_file(file, glb_of(solids, albedos, scans));
   fmt::print(out, "model: {}\n", file.string());
   warn_of_others(set, file, out);
   if (options.write) add_to_set(*options.set_file, file, out);

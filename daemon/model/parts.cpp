@@ -74,6 +74,8 @@ struct Draft {
   Drafts<BoxPart> boxes;
   Drafts<CylinderPart> cylinders;
   Drafts<RoomPart> rooms;
+  Drafts<ScanPart> scans;
+  std::list<Given> scan_points;  // of each scan
 };
 
 // clang-format off
@@ -124,6 +126,16 @@ Keys room_keys(RoomPart& r) {
       {"height_m", &r.height_m, length, "Height of the ceiling.", required("2.6")},
   };
 }
+
+Keys scan_keys(ScanPart& s) {
+  return {
+      {"name", &s.name, {}, "Name of the scan.", required("\"statue\"")},
+      {"file", &s.file, {}, "Its mesh: OBJ, PLY, STL, FBX or glTF.", required("\"statue.ply\"")},
+      {"unit", &s.unit, {}, "Unit of the file's coordinates, unless the file gives it.", optional("\"mm\"")},
+      {"up", &s.up, {}, "Axis of the file that points up, unless the file gives it.", optional("\"y\"")},
+      {"error_m", &s.error_m, thin, "Largest deviation of the simplified surface; 0: it is not simplified."},
+  };
+}
 // clang-format on
 
 template <class Part>
@@ -147,6 +159,28 @@ Section points_section(Draft& d) {
           }};
 }
 
+Section scan_section(Draft& d) {
+  return {"scan", Section::Kind::repeated, "", [&d]() -> Section::Opened {
+            auto& [given, scan] = d.scans.emplace_back();
+            given.path = "scan";
+            d.scan_points.emplace_back().path = "scan.points";
+            return {&given, scan_keys(scan)};
+          }};
+}
+
+Section scan_points_section(Draft& d) {
+  return {"scan.points", Section::Kind::optional, "", [&d]() -> Section::Opened {
+            if (d.scans.empty()) scan_section(d).open();
+            const auto add = [given = &d.scan_points.back(), scan = &d.scans.back().second](
+                                 Position at, const std::string& name, const Value& value) {
+              const auto xyz = codec::numbers(value, 3, units::plain);
+              given->keys[name] = {at, true};
+              scan->points.push_back({name, {xyz[0], xyz[1], xyz[2]}});
+            };
+            return {&d.scan_points.back(), {}, add};
+          }};
+}
+
 std::vector<Section> sections(Draft& d) {
   const auto picture_keys = +[](MarkedPicture& p) {
     return Keys{{"file", &p.name, {}, "Name of the picture.", required("\"0000.png\"")}};
@@ -163,7 +197,9 @@ std::vector<Section> sections(Draft& d) {
           many("plane", d.planes, plane_keys),
           many("box", d.boxes, box_keys),
           many("cylinder", d.cylinders, cylinder_keys),
-          many("room", d.rooms, room_keys)};
+          many("room", d.rooms, room_keys),
+          scan_section(d),
+          scan_points_section(d)};
 }
 
 // Finds what is wrong with the parts beyond each value.
@@ -180,6 +216,8 @@ class Checker {
     for (const auto& [given, box] : draft_.boxes) check(given, box);
     for (const auto& [given, cylinder] : draft_.cylinders) check(given, cylinder);
     for (const auto& [given, room] : draft_.rooms) check(given, room);
+    auto points = draft_.scan_points.begin();
+    for (const auto& [given, scan] : draft_.scans) check(given, *points++, scan);
   }
 
  private:
@@ -202,8 +240,10 @@ class Checker {
     for (const auto& [given, box] : draft_.boxes) name(given, box.name);
     for (const auto& [given, cylinder] : draft_.cylinders) name(given, cylinder.name);
     for (const auto& [given, room] : draft_.rooms) name(given, room.name);
+    for (const auto& [given, scan] : draft_.scans) name(given, scan.name);
     if (names_.empty())
-      problems_.add({}, "", "has no part; add a [[plane]], [[box]], [[cylinder]] or [[room]]");
+      problems_.add({}, "",
+                    "has no part; add a [[plane]], [[box]], [[cylinder]], [[room]] or [[scan]]");
   }
 
   // A point that is given must be marked; how often, says what it is used for.
@@ -323,6 +363,24 @@ class Checker {
     for (const std::string& wall : r.walls) plane(given, "walls", wall);
   }
 
+  void check(const Given& given, const Given& points_given, const ScanPart& s) {
+    if (s.points.size() < 3)
+      add(given, "points",
+          fmt::format("scan \"{}\" has {} points, and needs 3 that are marked in pictures; give "
+                      "the scan's own coordinates of them under [scan.points]",
+                      s.name, s.points.size()));
+    for (const ScanPoint& point : s.points) {
+      points(points_given, point.name, {point.name}, 2);
+      for (const auto& [of, c] : draft_.cylinders)
+        for (const auto* rim : {&c.top, &c.bottom})
+          if (std::ranges::find(*rim, point.name) != rim->end())
+            add(points_given, point.name,
+                "is on a rim of cylinder \"" + c.name +
+                    "\", where each picture may show another point; allowed: a corner or spot that "
+                    "is the same in all pictures");
+    }
+  }
+
   const Draft& draft_;
   Problems& problems_;
   std::map<std::string, int> pictures_of_;  // how many show each point
@@ -357,6 +415,8 @@ Parts parse_parts(const std::string& text, const std::filesystem::path& file) {
   parts.boxes = values_of(draft.boxes);
   parts.cylinders = values_of(draft.cylinders);
   parts.rooms = values_of(draft.rooms);
+  parts.scans = values_of(draft.scans);
+  for (ScanPart& scan : parts.scans) scan.file = file.parent_path() / scan.file;
   return parts;
 }
 

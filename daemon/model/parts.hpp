@@ -5,9 +5,12 @@
 #include <array>
 #include <filesystem>
 #include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "drivers/keys/value.hpp"
 
 namespace previz::model {
 
@@ -65,6 +68,34 @@ struct RoomPart {
   double height_m = 0;
 };
 
+enum class LengthUnit { m, cm, mm, in };
+constexpr auto names(LengthUnit) {
+  return std::to_array<Name<LengthUnit>>({{"m", LengthUnit::m},
+                                          {"cm", LengthUnit::cm},
+                                          {"mm", LengthUnit::mm},
+                                          {"in", LengthUnit::in}});
+}
+
+enum class UpAxis { x, y, z };
+constexpr auto names(UpAxis) {
+  return std::to_array<Name<UpAxis>>({{"x", UpAxis::x}, {"y", UpAxis::y}, {"z", UpAxis::z}});
+}
+
+struct ScanPoint {
+  std::string name;
+  glm::dvec3 at{0};  // in the scan's own coordinates and unit
+};
+
+// A mesh of a real thing, from a scanner or from photogrammetry, placed by points that are marked.
+struct ScanPart {
+  std::string name;
+  std::filesystem::path file;
+  std::optional<LengthUnit> unit;  // none: as the file gives it
+  std::optional<UpAxis> up;        // likewise
+  double error_m = 5e-4;           // by which simplifying may move its surface; 0: all is kept
+  std::vector<ScanPoint> points;
+};
+
 struct Parts {
   std::filesystem::path file;  // for messages
   double mark_px = 1;          // standard deviation of a mark's coordinates
@@ -73,11 +104,12 @@ struct Parts {
   std::vector<BoxPart> boxes;
   std::vector<CylinderPart> cylinders;
   std::vector<RoomPart> rooms;
+  std::vector<ScanPart> scans;
 };
 
 // Parses a file of parts; `file` names it in errors. Throws previz::Error with every problem found,
 // one a line: what cannot be read, names that are used twice or not known, points that no picture
-// has, and parts that nothing determines.
+// has, and parts that nothing determines. Paths are relative to the folder of `file`.
 Parts parse_parts(const std::string& text, const std::filesystem::path& file);
 
 }  // namespace previz::model

@@ -438,6 +438,8 @@ class Starter {
     std::set<std::string> used;
     for (const PlanePart& part : parts_.planes)
       for (const std::string& point : points_on(part)) used.insert(point);
+    for (const ScanPart& part : parts_.scans)
+      for (const ScanPoint& point : part.points) used.insert(point.name);
     for (const auto& [point, rays] : rays_) {
       if (layout_.places.contains(point)) continue;
       if (!used.contains(point)) {

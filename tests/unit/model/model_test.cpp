@@ -164,6 +164,31 @@ TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
   }
 }
 
+TEST_F(ModelCommand, PlacesAScanByItsPoints) {
+  const std::vector<glm::dvec3> top = top_of("cube_red");
+  std::ofstream obj(folder_ / "demo/cube.obj");
+  std::string parts = "[[scan]]\nname = \"cube\"\nfile = \"cube.obj\"\n[scan.points]\n";
+  for (std::size_t i = 0; i < 4; ++i) {
+    const glm::dvec3 cm = 100.0 * glm::dvec3(top[i].y, top[i].z, top[i].x);
+    obj << fmt::format("v {} {} {}\n", cm.x, cm.y, cm.z);
+    parts += fmt::format("t{} = [{}, {}, {}]\n", i + 1, cm.x, cm.y, cm.z);
+  }
+  obj << "f 1 2 3\nf 1 3 4\n";
+  obj.close();
+  write_parts(marks() + parts);
+  const std::string missing = refusal();
+  EXPECT_THAT(missing, HasSubstr("its points fit best with unit = \"cm\""));
+  EXPECT_THAT(missing, HasSubstr("its points fit best with up = \"y\""));
+  parts.insert(parts.find("[scan.points]"), "unit = \"cm\"\nup = \"y\"\n");
+  write_parts(marks() + parts);
+  std::ostringstream out;
+  model::make_model(options_, out);
+  EXPECT_THAT(out.str(), HasSubstr("scan cube: 4 points, rms 0."));
+  EXPECT_THAT(out.str(), HasSubstr("scan cube: 1 open borders"));
+  EXPECT_THAT(out.str(), Not(HasSubstr("ignored")));
+  EXPECT_TRUE(fs::exists(folder_ / "demo/real.glb"));
+}
+
 TEST_F(ModelCommand, NothingIsWrittenWhereSomethingIsWrong) {
   const auto refused = [&](const std::string& text, const std::string& words) {
     write_parts(text);

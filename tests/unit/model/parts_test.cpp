@@ -45,8 +45,16 @@ name = "crate"
 on = "table"
 top = ["a", "b", "c", ""]
 height_m = 0.1
+[[scan]]
+name = "statue"
+file = "scans/statue.ply"
+unit = "in"
+[scan.points]
+a = [1, 2, 3]
+b = [0.5, 0, 0]
+c = [0, 1, 0]
 )",
-                                                "model.toml");
+                                                "folder/model.toml");
   EXPECT_EQ(parts.mark_px, 0.5);
   ASSERT_EQ(parts.pictures.size(), 2u);
   EXPECT_EQ(parts.pictures[1].name, "0001.png");
@@ -58,6 +66,14 @@ height_m = 0.1
   ASSERT_EQ(parts.boxes.size(), 1u);
   EXPECT_THAT(parts.boxes[0].top, ElementsAre("a", "b", "c", ""));
   EXPECT_EQ(parts.boxes[0].height_m, 0.1);
+  ASSERT_EQ(parts.scans.size(), 1u);
+  EXPECT_EQ(parts.scans[0].file, "folder/scans/statue.ply");
+  EXPECT_EQ(parts.scans[0].unit, model::LengthUnit::in);
+  EXPECT_EQ(parts.scans[0].up, std::nullopt);
+  EXPECT_EQ(parts.scans[0].error_m, 0.0005);
+  ASSERT_EQ(parts.scans[0].points.size(), 3u);
+  EXPECT_EQ(parts.scans[0].points[1].name, "b");
+  EXPECT_EQ(parts.scans[0].points[1].at, glm::dvec3(0.5, 0, 0));
 }
 
 TEST(ModelParts, MistakesAreNamedWithTheirLine) {
@@ -91,6 +107,24 @@ TEST(ModelParts, MistakesAreNamedWithTheirLine) {
       {"[[plane]]\nname = \"t\"\ntags = [0]\n[[room]]\nname = \"r\"\nfloor = \"t\"\nwalls = "
        "[\"t\"]\nheight_m = 2\n",
        "has 1 planes; allowed: 4"},
+      {"[[scan]]\nname = \"s\"\n", "scan.file: is missing"},
+      {"[[scan]]\nname = \"s\"\nfile = \"s.obj\"\nunit = \"ft\"\n",
+       "is not allowed; allowed: \"m\" | \"cm\" | \"mm\" | \"in\""},
+      {"[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n",
+       "scan \"s\" has 0 points, and needs 3 that are marked in pictures"},
+      {"[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n[scan.points]\na = [0, 0, 0]\nb = [1, 0, 0]\n",
+       "scan \"s\" has 2 points"},
+      {"[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n[scan.points]\na = [0, 0, 0]\nb = [1, 0, "
+       "0]\nonce = "
+       "[0, 1, 0]\n",
+       "model.toml:21:1: scan.points.once: point \"once\" is marked in one picture only"},
+      {"[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n[scan.points]\na = [0, 0]\n", "scan.points.a"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\n[[cylinder]]\nname = \"can\"\non = \"t\"\ntop = "
+       "[\"a\", "
+       "\"b\", \"c\"]\n[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n[scan.points]\na = [0, 0, 0]\nb = "
+       "[1, "
+       "0, 0]\nc = [0, 1, 0]\n",
+       "scan.points.a: is on a rim of cylinder \"can\""},
       {"[[picture]]\nfile = \"0000.png\"\n[[plane]]\nname = \"t\"\ntags = [0]\n",
        "has a table already"},
       {"[[picture]]\nfile = \"2\"\n[picture.points]\na = [1]\n", "picture.points.a"},

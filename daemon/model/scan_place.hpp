@@ -1,0 +1,43 @@
+// Places a scan rigidly in the world, by points that are known in both.
+#pragma once
+
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/model/parts.hpp"
+
+namespace previz::model {
+
+struct PointPair {
+  std::string name;
+  glm::dvec3 in_scan{0};   // in the scan's unit
+  glm::dvec3 in_world{0};  // metres
+};
+
+struct Placement {
+  glm::dmat3 rotation{1.0};  // world_from_scan, of a scan in metres
+  glm::dvec3 translation{0};
+  double rms_m = 0;       // of the points' distances
+  double best_scale = 1;  // the size at which its points would fit best
+};
+
+double metres(LengthUnit unit);
+
+// Least squares by a rotation and a translation (Kabsch 1976; Umeyama 1991, eq. 34-43). Throws
+// previz::Error, "SUBJECT: ...", naming the points at fault: they lie on one line, the scan has
+// another size (with the likely unit), a mirrored scan would fit, or a point is off by more than
+// most_off_fraction of the largest distance between two of them. At least three points.
+Placement place_scan(const std::string& subject, const std::vector<PointPair>& points,
+                     double unit_m);
+inline constexpr double most_off_fraction = 0.03;
+
+// Returns the unit in which the points fit best.
+LengthUnit likely_unit(const std::vector<PointPair>& points);
+
+// Returns the axis of the scan that would be nearest to the world's Z.
+UpAxis likely_up(const std::vector<PointPair>& points);
+
+}  // namespace previz::model

@@ -1,0 +1,172 @@
+#include "daemon/model/scans.hpp"
+
+#include <fmt/ostream.h>
+
+#include <algorithm>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "daemon/model/scan_distance.hpp"
+#include "daemon/model/scan_place.hpp"
+#include "daemon/model/scan_simplify.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::model {
+namespace {
+
+// A scan whose up axis is farther from the vertical is probably upside down, or turned.
+constexpr double most_tilt = 60 * std::numbers::pi / 180;
+
+// A marked point that is farther from its scan's surface, as a fraction of the scan's diagonal, has
+// other coordinates than the file: another program's unit or axes.
+constexpr double most_off_surface = 0.03;
+
+std::string subject_of(const Parts& parts, const ScanPart& part) {
+  return fmt::format("{}: scan \"{}\"", parts.file.string(), part.name);
+}
+
+glm::dvec3 world_place_of(const std::string& point, const Layout& layout, const Shape& shape) {
+  const Place& place = layout.places.at(point);
+  if (place.kind == Place::Kind::box_corner) return corner(shape.boxes[place.part], place.corner);
+  return shape.points.at(place.part);
+}
+
+glm::dvec3 direction_of(UpAxis up) {
+  return {up == UpAxis::x, up == UpAxis::y, up == UpAxis::z};
+}
+
+// The table's values come first: programs write a unit that they do not use.
+struct ScanUnits {
+  double unit_m = 1;
+  glm::dvec3 up{0};
+};
+
+ScanUnits units_of(const std::string& subject, const ScanPart& part, const ScanFile& file,
+                   const std::vector<PointPair>& points) {
+  std::string missing;
+  const auto add = [&](const char* key, const std::string& likely) {
+    missing += fmt::format(
+        "{}{}: {} is missing, and {} does not give it; its points fit best with {} = \"{}\"",
+        missing.empty() ? "" : "\n", subject, key, part.file.filename().string(), key, likely);
+  };
+  if (!part.unit && !file.unit_m) add("unit", name_of(likely_unit(points)));
+  if (!part.up && !file.up) add("up", name_of(likely_up(points)));
+  if (!missing.empty()) throw Error(missing);
+  return {part.unit ? metres(*part.unit) : *file.unit_m,
+          part.up ? direction_of(*part.up) : *file.up};
+}
+
+void print_placement(const ScanPart& part, const ScanUnits& units, const Placement& placed,
+                     std::ostream& out) {
+  fmt::print(out,
+             "scan {}: {} points, rms {:.2f} mm; they would fit best at {:.4f} times its size\n",
+             part.name, part.points.size(), 1000 * placed.rms_m, placed.best_scale);
+  const double tilt = std::acos(std::clamp((placed.rotation * units.up).z, -1.0, 1.0));
+  if (tilt > most_tilt)
+    fmt::print(out,
+               "warning: scan {}: its up axis is {:.0f} degrees from the vertical; check up, and "
+               "that no two of its points are swapped\n",
+               part.name, tilt * 180 / std::numbers::pi);
+}
+
+void print_faults(const std::string& name, const MeshFaults& faults, std::ostream& out) {
+  if (faults.open_borders > 0)
+    fmt::print(
+        out,
+        "warning: scan {}: {} open borders, the longest {:.1f} mm around; close those that a "
+        "camera or a shadow shows\n",
+        name, faults.open_borders, 1000 * faults.longest_border);
+  if (faults.opposite_edges > 0)
+    fmt::print(out,
+               "warning: scan {}: faces on both sides of {} edges disagree about what is outside; "
+               "{} faces turned{}\n",
+               name, faults.opposite_edges, faults.turned,
+               faults.opposite_left == 0
+                   ? std::string()
+                   : fmt::format("; {} edges unchanged, because their surface has one side only",
+                                 faults.opposite_left));
+  if (faults.crowded_edges > 0)
+    fmt::print(out,
+               "warning: scan {}: {} edges belong to more than two faces; faces across them are "
+               "not compared\n",
+               name, faults.crowded_edges);
+}
+
+// The mesh must have triangles; both are in the file's unit.
+void insist_on_surface(const std::string& subject, const ScanPart& part, const ScanFile& file) {
+  glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
+  for (const glm::vec3& p : file.mesh.positions) {
+    low = glm::min(low, glm::dvec3(p));
+    high = glm::max(high, glm::dvec3(p));
+  }
+  const double diagonal = glm::distance(low, high);
+  const SurfaceDistance surface(file.mesh.positions, file.mesh.indices);
+  for (const ScanPoint& point : part.points) {
+    const double off = surface.from(glm::vec3(point.at), std::numeric_limits<double>::infinity());
+    if (off <= most_off_surface * diagonal) continue;
+    throw Error(fmt::format(
+        "{}: point \"{}\" is {:.4g} units from the surface, whose diagonal has {:.4g}; give its "
+        "coordinates as the file has them, {} to {} along each axis: programs that show a scan may "
+        "change its unit and swap its axes",
+        subject, point.name, off, diagonal,
+        fmt::format("({:.4g}, {:.4g}, {:.4g})", low.x, low.y, low.z),
+        fmt::format("({:.4g}, {:.4g}, {:.4g})", high.x, high.y, high.z)));
+  }
+}
+
+PlacedScan placed_scan(const ScanPart& part, const ScanFile& file, const ScanUnits& units,
+                       const Placement& placed, std::ostream& out) {
+  TriangleMesh mesh = file.mesh;
+  for (glm::vec3& p : mesh.positions) p = glm::vec3(units.unit_m * glm::dvec3(p));
+  weld(mesh);
+  print_faults(part.name, mend(mesh), out);
+  if (mesh.indices.empty())
+    throw Error(part.file.string() +
+                ": all its triangles are without area; check the program that exported it");
+  const std::size_t before = mesh.triangles();
+  const Simplified simple = simplified(std::move(mesh), part.error_m);
+  if (simple.mesh.triangles() < before)
+    fmt::print(out, "scan {}: {} triangles, simplified to {}; largest deviation {:.3f} mm\n",
+               part.name, before, simple.mesh.triangles(), 1000 * simple.error);
+  else
+    fmt::print(out, "scan {}: {} triangles, none removed\n", part.name, before);
+  PlacedScan scan{part.name, shaded(simple.mesh)};
+  for (glm::vec3& p : scan.mesh.positions)
+    p = glm::vec3(placed.rotation * glm::dvec3(p) + placed.translation);
+  for (glm::vec3& n : scan.mesh.normals) n = glm::vec3(placed.rotation * glm::dvec3(n));
+  return scan;
+}
+
+}  // namespace
+
+std::vector<ScanFile> read_scans(const Parts& parts) {
+  std::vector<ScanFile> files;
+  for (const ScanPart& part : parts.scans) {
+    files.push_back(read_scan(part.file));
+    insist_on_surface(subject_of(parts, part), part, files.back());
+  }
+  return files;
+}
+
+std::vector<PlacedScan> place_scans(const Parts& parts, const Layout& layout, const Shape& shape,
+                                    const std::vector<ScanFile>& files, std::ostream& out) {
+  std::vector<PlacedScan> scans;
+  for (std::size_t i = 0; i < parts.scans.size(); ++i) {
+    const ScanPart& part = parts.scans[i];
+    const std::string subject = subject_of(parts, part);
+    std::vector<PointPair> points;
+    for (const ScanPoint& point : part.points)
+      points.push_back({point.name, point.at, world_place_of(point.name, layout, shape)});
+    const ScanUnits units = units_of(subject, part, files[i], points);
+    const Placement placed = place_scan(subject, points, units.unit_m);
+    print_placement(part, units, placed, out);
+    scans.push_back(placed_scan(part, files[i], units, placed, out));
+  }
+  return scans;
+}
+
+}  // namespace previz::model

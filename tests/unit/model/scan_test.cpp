@@ -1,0 +1,334 @@
+// Scans: read from each kind of file, and placed by points that are marked in pictures.
+#include "daemon/model/scans.hpp"
+
+#include <fmt/format.h>
+
+#include "daemon/model/glb.hpp"
+#include "daemon/model/scan_place.hpp"
+#include "daemon/scene/load.hpp"
+#include "daemon/set/load.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/tracking_synthetic.hpp"
+#include "tests/unit/model/marked_scene.hpp"
+#include "tests/unit/model/scan_files.hpp"
+
+namespace previz::test {
+namespace {
+
+template <class Call>
+std::string error_of(const Call& call) {
+  try {
+    call();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// In inches, Z up, moved by a node.
+constexpr const char* fbx_text = R"(; FBX 7.4.0 project file
+FBXHeaderExtension:  {
+  FBXHeaderVersion: 1003
+  FBXVersion: 7400
+}
+GlobalSettings:  {
+  Version: 1000
+  Properties70:  {
+    P: "UpAxis", "int", "Integer", "",2
+    P: "UpAxisSign", "int", "Integer", "",1
+    P: "FrontAxis", "int", "Integer", "",1
+    P: "FrontAxisSign", "int", "Integer", "",-1
+    P: "CoordAxis", "int", "Integer", "",0
+    P: "CoordAxisSign", "int", "Integer", "",1
+    P: "UnitScaleFactor", "double", "Number", "",2.54
+  }
+}
+Definitions:  {
+  Version: 100
+  Count: 3
+  ObjectType: "GlobalSettings" {
+    Count: 1
+  }
+  ObjectType: "Model" {
+    Count: 1
+  }
+  ObjectType: "Geometry" {
+    Count: 1
+  }
+}
+Objects:  {
+  Geometry: 1000, "Geometry::", "Mesh" {
+    Vertices: *12 {
+      a: 0,0,0,1,0,0,1,2,0,0,2,3
+    }
+    PolygonVertexIndex: *4 {
+      a: 0,1,2,-4
+    }
+    GeometryVersion: 124
+  }
+  Model: 2000, "Model::sheet", "Mesh" {
+    Version: 232
+    Properties70:  {
+      P: "Lcl Translation", "Lcl Translation", "", "A",10,0,0
+    }
+  }
+}
+Connections:  {
+  C: "OO",2000,0
+  C: "OO",1000,2000
+}
+)";
+
+class ScanRead : public testing::Test {
+ protected:
+  std::string refusal(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return error_of([&] { model::read_scan(folder_ / name); });
+  }
+
+  TemporaryDirectory folder_;
+};
+
+TEST_F(ScanRead, EachFormatGivesTheSameMesh) {
+  const model::TriangleMesh mesh = lump(6);
+  write_obj(folder_ / "scan.obj", mesh);
+  write_ply(folder_ / "scan.ply", mesh);
+  write_stl(folder_ / "scan.STL", mesh);
+  for (const char* name : {"scan.obj", "scan.ply", "scan.STL"}) {
+    const model::ScanFile file = model::read_scan(folder_ / name);
+    EXPECT_FALSE(file.unit_m) << name;
+    EXPECT_FALSE(file.up) << name;
+    ASSERT_EQ(file.mesh.indices.size(), mesh.indices.size()) << name;
+    for (std::size_t i = 0; i < mesh.indices.size(); ++i)
+      EXPECT_LT(
+          glm::distance(file.mesh.positions[file.mesh.indices[i]], mesh.positions[mesh.indices[i]]),
+          1e-7f)
+          << name;
+  }
+}
+
+TEST_F(ScanRead, GltfAndFbxGiveTheirUnitAndAxis) {
+  std::ofstream(folder_ / "scan.glb", std::ios::binary)
+      << model::glb_of({}, {}, {{"lump", model::shaded(lump(6))}});
+  const model::ScanFile glb = model::read_scan(folder_ / "scan.glb");
+  EXPECT_EQ(glb.unit_m, 1.0);
+  EXPECT_EQ(glb.up, glm::dvec3(0, 1, 0));
+  EXPECT_EQ(glb.mesh.triangles(), lump(6).triangles());
+
+  std::ofstream(folder_ / "scan.fbx") << fbx_text;
+  const model::ScanFile fbx = model::read_scan(folder_ / "scan.fbx");
+  ASSERT_TRUE(fbx.unit_m);
+  EXPECT_NEAR(*fbx.unit_m, 0.0254, 1e-8);
+  EXPECT_EQ(fbx.up, glm::dvec3(0, 0, 1));
+  EXPECT_EQ(fbx.mesh.triangles(), 2u);
+  for (const glm::vec3& p : fbx.mesh.positions) EXPECT_GE(p.x, 10);
+}
+
+TEST_F(ScanRead, WhatIsNotAMeshIsRefused) {
+  const std::string points = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  EXPECT_THAT(refusal("nan.obj", points + "v 0 0 nan\nf 1 2 4\n"),
+              HasSubstr("nan.obj: has a vertex whose coordinates are not finite numbers"));
+  EXPECT_THAT(refusal("far.obj", points + "v 0 0 inf\nf 1 2 4\n"), HasSubstr("not finite"));
+  EXPECT_THAT(refusal("points.obj", points), HasSubstr("points.obj: has no triangles"));
+  EXPECT_THAT(
+      refusal("lacking.ply",
+              "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+              "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
+              "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"),
+      HasSubstr("lacking.ply: has a face with a vertex that the file lacks"));
+  EXPECT_THAT(refusal("junk.ply", "junk"), HasSubstr("junk.ply: cannot be read"));
+  EXPECT_THAT(refusal("scan.e57", "junk"), HasSubstr("allowed: .obj, .ply"));
+  EXPECT_THAT(error_of([&] { model::read_scan(folder_ / "none.obj"); }),
+              HasSubstr("none.obj: file not found"));
+}
+
+// A lump above the table, with four marked spots.
+class Scans : public testing::Test {
+ protected:
+  Scans() {
+    scene_ = scene_of_a_table();
+    parts_.file = folder_ / "model.toml";
+    parts_.scans.push_back(
+        {"lump", folder_ / "lump.obj", model::LengthUnit::mm, model::UpAxis::z, 0, {}});
+    const std::array spots{0, 20, 60, 110};
+    for (std::size_t i = 0; i < spots.size(); ++i) add_spot(fmt::format("spot {}", i), spots[i]);
+  }
+
+  glm::dvec3 in_world(const glm::vec3& p) const { return turn_ * glm::dvec3(p) + shift_; }
+
+  void add_spot(const std::string& name, std::size_t vertex) {
+    const glm::vec3 p = mesh_.positions[vertex];
+    scene_.points[name] = in_world(p);
+    parts_.scans[0].points.push_back({name, 1000.0 * glm::dvec3(p)});
+  }
+
+  // Marks, adjusts and places; what is reported is in report_.
+  std::vector<model::PlacedScan> placed() {
+    std::mt19937 random(1);
+    parts_.pictures = scene_.pictures(random);
+    const model::Views views = scene_.views(parts_, random);
+    const model::Start start = model::first_guess(parts_, views, scene_.tags);
+    EXPECT_THAT(start.layout.unused_points, testing::IsEmpty());
+    const model::Fit fit = model::adjust(parts_, views, start);
+    std::ostringstream out;
+    auto scans =
+        model::place_scans(parts_, start.layout, fit.shape, model::read_scans(parts_), out);
+    report_ = out.str();
+    return scans;
+  }
+
+  std::string refusal() {
+    return error_of([&] { placed(); });
+  }
+
+  TemporaryDirectory folder_;
+  MarkedScene scene_;
+  model::Parts parts_;
+  model::TriangleMesh mesh_ = lump(8);
+  glm::dmat3 turn_ = tracking::rotation_by({0.2, -0.1, 1.1});
+  glm::dvec3 shift_{0.1, 0.2, 0.15};
+  std::string report_;
+};
+
+TEST_F(Scans, ArePlacedByTheirMarkedPoints) {
+  write_obj(folder_ / "lump.obj", mesh_, 1e-3);
+  const auto scans = placed();
+  ASSERT_EQ(scans.size(), 1u);
+  EXPECT_EQ(scans[0].name, "lump");
+  const model::ShadedMesh& mesh = scans[0].mesh;
+  ASSERT_EQ(mesh.indices.size(), mesh_.indices.size());
+  for (std::size_t i = 0; i < mesh.indices.size(); ++i)
+    EXPECT_LT(glm::distance(glm::dvec3(mesh.positions[mesh.indices[i]]),
+                            in_world(mesh_.positions[mesh_.indices[i]])),
+              1e-6);
+  EXPECT_THAT(report_,
+              HasSubstr("scan lump: 4 points, rms 0.00 mm; they would fit best at 1.0000"));
+  EXPECT_THAT(report_, HasSubstr("scan lump: 224 triangles, none removed"));
+  EXPECT_THAT(report_, Not(HasSubstr("warning")));
+}
+
+TEST_F(Scans, BecomeNodesOfTheModel) {
+  write_ply(folder_ / "lump.ply", mesh_);
+  parts_.scans[0].file = folder_ / "lump.ply";
+  parts_.scans[0].unit = model::LengthUnit::m;
+  parts_.scans[0].error_m = 1e-3;
+  for (model::ScanPoint& point : parts_.scans[0].points) point.at /= 1000.0;
+  std::ofstream(folder_ / "model.glb", std::ios::binary) << model::glb_of({}, {}, placed());
+  const scene::Scene scene = scene::load_scene(set::parse_set(
+      "[set]\nname = \"x\"\n[[object]]\nname = \"o\"\nfile = \"model.glb\"\npresence = "
+      "\"phantom\"\nnodes = [\"lump\"]\n",
+      folder_ / "set.toml"));
+  ASSERT_EQ(scene.materials.size(), 1u);
+  EXPECT_EQ(scene.materials[0].name, "lump");
+  EXPECT_EQ(scene.materials[0].base_color, glm::vec3(0.5));
+  ASSERT_EQ(scene.meshes.size(), 1u);
+  // Every vertex is one of the scan.
+  for (const glm::vec3& vertex : scene.meshes[0].positions) {
+    const glm::dvec3 p(scene.instances.at(0).world_from_object * glm::dvec4(vertex, 1));
+    double nearest = 1;
+    for (const glm::vec3& truth : mesh_.positions)
+      nearest = std::min(nearest, glm::distance(p, in_world(truth)));
+    EXPECT_LT(nearest, 1e-6);
+  }
+}
+
+TEST_F(Scans, AnotherUnitIsNamed) {
+  write_obj(folder_ / "lump.obj", mesh_, 0.0254);
+  for (model::ScanPoint& point : parts_.scans[0].points) point.at /= 25.4;
+  EXPECT_THAT(refusal(), HasSubstr("scan \"lump\": the scan would have to be 25.4 times larger: is "
+                                   "its unit \"in\"?"));
+  parts_.scans[0].unit = model::LengthUnit::in;
+  EXPECT_EQ(placed().size(), 1u);
+}
+
+TEST_F(Scans, UnitAndUpMustBeGivenSomewhere) {
+  write_obj(folder_ / "lump.obj", mesh_, 1e-3);
+  parts_.scans[0].unit.reset();
+  EXPECT_THAT(refusal(), HasSubstr("model.toml: scan \"lump\": unit is missing, and lump.obj does "
+                                   "not give it; its points fit best with unit = \"mm\""));
+  parts_.scans[0].up.reset();
+  const std::string both = refusal();
+  EXPECT_THAT(both, HasSubstr("unit = \"mm\""));
+  EXPECT_THAT(both, HasSubstr("up = \"z\""));
+}
+
+TEST_F(Scans, AMirroredOneIsRefused) {
+  for (model::ScanPoint& point : parts_.scans[0].points) point.at.x *= -1;
+  for (glm::vec3& p : mesh_.positions) p.x *= -1;
+  write_obj(folder_ / "lump.obj", mesh_, 1e-3);
+  EXPECT_THAT(refusal(), HasSubstr("mm if the scan is mirrored"));
+}
+
+TEST_F(Scans, APointThatContradictsTheOthersIsNamed) {
+  write_obj(folder_ / "lump.obj", mesh_, 1e-3);
+  add_spot("spot 4", 77);
+  scene_.points["spot 2"] += glm::dvec3(0, 0.012, 0.009);
+  EXPECT_THAT(refusal(), HasSubstr("point \"spot 2\" is 15.0 mm from where the other points"));
+}
+
+TEST(ScanPlace, PointsOnOneLineAreRefused) {
+  std::vector<model::PointPair> points{
+      {"a", {0, 0, 0}, {1, 0, 0}}, {"b", {1, 2, 0.5}, {2, 2, 0.5}}, {"c", {2, 4, 1.01}, {3, 4, 1}}};
+  EXPECT_THAT(error_of([&] { model::place_scan("statue", points, 1); }),
+              HasSubstr("statue: its points \"a\", \"b\", \"c\" lie on one line in the scan"));
+  points[2].in_scan = {2, 3, 4};
+  EXPECT_THAT(error_of([&] { model::place_scan("statue", points, 1); }),
+              HasSubstr("lie on one line in the pictures"));
+  for (model::PointPair& pair : points) pair.in_scan = pair.in_world = {1, 1, 1};
+  EXPECT_THAT(error_of([&] { model::place_scan("statue", points, 1); }), HasSubstr("on one line"));
+}
+
+// By noise of 1 mm in each coordinate, 4 points leave 12 - 6 of 12 degrees of freedom, so the root
+// mean square of their distances is sqrt(3 * 6 / 12) mm on average over trials; its standard error
+// over 400 trials, of a quantity that spreads by 1 / sqrt(2 * 6) of itself, is 1.5 %.
+TEST(ScanPlace, TheDeviationIsThatOfTheNoise) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0, 1e-3);
+  const glm::dmat3 turn = tracking::rotation_by({0.3, 2, -1});
+  double squares = 0;
+  constexpr int trials = 400;
+  for (int trial = 0; trial < trials; ++trial) {
+    std::vector<model::PointPair> points;
+    for (const glm::dvec3 p : {glm::dvec3(0, 0, 0), {400, 0, 0}, {0, 300, 0}, {100, 50, 350}}) {
+      glm::dvec3 off;
+      for (glm::length_t k = 0; k < 3; ++k) off[k] = noise(random);
+      points.push_back({"p", p, turn * (1e-3 * p) + glm::dvec3(1, 2, 3) + off});
+    }
+    const model::Placement placed = model::place_scan("scan", points, 1e-3);
+    EXPECT_NEAR(glm::determinant(placed.rotation), 1, 1e-12);
+    squares += placed.rms_m * placed.rms_m / trials;
+  }
+  EXPECT_NEAR(std::sqrt(squares), std::sqrt(1.5) * 1e-3, 4 * 0.015 * std::sqrt(1.5) * 1e-3);
+}
+
+// As a program shows them that has Y up turned to Z up, and another that shows metres.
+TEST_F(Scans, PointsMustLieOnTheSurface) {
+  write_obj(folder_ / "lump.obj", mesh_, 1e-3);
+  std::vector<model::ScanPoint>& points = parts_.scans[0].points;
+  const auto right = points;
+  for (model::ScanPoint& point : points) point.at = {point.at.x, -point.at.z, point.at.y};
+  EXPECT_THAT(refusal(), HasSubstr("give its coordinates as the file has them"));
+  points = right;
+  for (model::ScanPoint& point : points) point.at *= 1e-3;
+  EXPECT_THAT(refusal(), HasSubstr("units from the surface, whose diagonal has"));
+}
+
+// Three points fit the mirrored axes as well; that its up is not up shows it.
+TEST_F(Scans, OneThatLiesOnItsSideIsWarnedOf) {
+  write_obj(folder_ / "lump.obj", mesh_, 1e-3);
+  parts_.scans[0].up = model::UpAxis::x;
+  placed();
+  EXPECT_THAT(report_, HasSubstr("degrees from the vertical; check up"));
+}
+
+TEST_F(Scans, FaultsOfTheSurfaceAreReported) {
+  mesh_.indices.resize(mesh_.indices.size() - 3);
+  std::swap(mesh_.indices[0], mesh_.indices[1]);
+  write_obj(folder_ / "lump.obj", mesh_, 1e-3);
+  placed();
+  EXPECT_THAT(report_, HasSubstr("warning: scan lump: 1 open borders, the longest"));
+  EXPECT_THAT(report_, HasSubstr("1 faces turned"));
+}
+
+}  // namespace
+}  // namespace previz::test
