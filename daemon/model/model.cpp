@@ -92,7 +92,8 @@ void print_faces(const Fit& fit, std::ostream& out) {
 
 // Returns the colours that the plates show; nothing without a take and its light.
 std::map<std::string, Colour> measured(const ModelOptions& options,
-                                       const std::vector<Solid>& solids, std::ostream& out) {
+                                       const std::vector<Solid>& solids,
+                                       const std::vector<PlacedScan>& scans, std::ostream& out) {
   if (options.grey) return {};
   if (!calibrate::is_session(options.footage)) {
     out << "colours: all faces are grey, because pictures alone do not show the light; name a "
@@ -101,30 +102,30 @@ std::map<std::string, Colour> measured(const ModelOptions& options,
   }
   const pipeline::Take take = pipeline::open_take(options.footage, options.set_file);
   return measure_colours(
-      take, solids,
+      take, solids, scans,
       render::open_device(render::options_for(options.device, take.set.quality.hardware_rays)));
 }
 
 // Reports the colours, and returns those that are possible.
-Colours reported(const std::map<std::string, Colour>& colours, const std::vector<Solid>& solids,
-                 std::ostream& out) {
+Colours reported(const std::map<std::string, Colour>& colours,
+                 const std::vector<std::string>& names, std::ostream& out) {
   Colours albedos;
-  for (const Solid& solid : solids) {
-    const auto found = colours.find(solid.name);
+  for (const std::string& name : names) {
+    const auto found = colours.find(name);
     if (found == colours.end()) {
-      fmt::print(out, "  {}: no plate shows enough of it; it stays grey\n", solid.name);
+      fmt::print(out, "  {}: no plate shows enough of it; it stays grey\n", name);
       continue;
     }
     const Colour& colour = found->second;
-    fmt::print(out, "  {}: albedo {:.3f} {:.3f} {:.3f} (accurate to {:.4f} {:.4f} {:.4f})\n",
-               solid.name, colour.albedo.r, colour.albedo.g, colour.albedo.b, colour.sigma.r,
-               colour.sigma.g, colour.sigma.b);
+    fmt::print(out, "  {}: albedo {:.3f} {:.3f} {:.3f} (accurate to {:.4f} {:.4f} {:.4f})\n", name,
+               colour.albedo.r, colour.albedo.g, colour.albedo.b, colour.sigma.r, colour.sigma.g,
+               colour.sigma.b);
     if (std::max({colour.albedo.r, colour.albedo.g, colour.albedo.b}) > 1)
       fmt::print(out,
                  "warning: {} reflects more light than falls on it: the light and the film camera "
                  "disagree; run previzd calibrate balance with a surface of known colour first\n",
-                 solid.name);
-    albedos[solid.name] = glm::clamp(colour.albedo, 0.0, 1.0);
+                 name);
+    albedos[name] = glm::clamp(colour.albedo, 0.0, 1.0);
   }
   return albedos;
 }
@@ -178,12 +179,15 @@ void make_model(const ModelOptions& options, std::ostream& out) {
       place_scans(parts, start.layout, fit.shape, scan_files, out);
   const std::filesystem::path file = file_of(options);
   std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
-  std::map<std::string, Colour> colours = measured(options, solids, out);
+  std::map<std::string, Colour> colours = measured(options, solids, scans, out);
   colours.merge(
       tag_colours(set.tracking.family, start.layout, parts, views, camera.response, colours));
   for (Solid& tag : tag_solids(set.tracking.family, start.layout, fit.shape))
     solids.push_back(std::move(tag));
-  const Colours albedos = colours.empty() ? Colours{} : reported(colours, solids, out);
+  std::vector<std::string> names;
+  for (const Solid& solid : solids) names.push_back(solid.name);
+  for (const PlacedScan& scan : scans) names.push_back(scan.name);
+  const Colours albedos = colours.empty() ? Colours{} : reported(colours, names, out);
   session::replace_file(file, glb_of(solids, albedos, scans));
   fmt::print(out, "model: {}\n", file.string());
   warn_of_others(set, file, out);

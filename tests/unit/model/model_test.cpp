@@ -120,7 +120,8 @@ TEST_F(ModelCommand, MakesAPhantomAndAddsItToTheSet) {
   ASSERT_NE(added, set.objects.end());
   EXPECT_EQ(added->presence, set::Presence::phantom);
   EXPECT_TRUE(fs::exists(folder_ / "demo/real.glb"));
-  // It is where the demo's own is: the marks are rounded to 0.1 px, some 0.2 mm here.
+  // It is where the demo's own is, within three of the deviations that are stated of its worst
+  // face: half a millimetre, by three pictures that are taken from nearly one side.
   set::Set only = set;
   only.objects = {*added};
   only.objects[0].nodes = {"red"};
@@ -131,7 +132,7 @@ TEST_F(ModelCommand, MakesAPhantomAndAddsItToTheSet) {
       nearest =
           std::min(nearest, glm::distance(p, glm::dvec3(scene.instances.at(0).world_from_object *
                                                         glm::dvec4(vertex, 1))));
-    EXPECT_LT(nearest, 5e-4);
+    EXPECT_LT(nearest, 1.5e-3);
   }
   // Once more, nothing is added twice.
   std::ostringstream again;
