@@ -16,9 +16,6 @@ constexpr double longest_px = 40, shortest_px = 12;
 constexpr double corner_px = 4;
 // How far the areas beside an edge must be plain.
 constexpr double depth_px = 4;
-// What is nearer by less than this share of the distance hides nothing.
-constexpr double hidden_share = 2e-3;
-
 // Returns where a pinhole shows a point of the camera's axes; nothing behind it.
 std::optional<glm::dvec2> on_pinhole(const PinholeIntrinsics& lens, const glm::dvec3& p) {
   if (!(p.z > 0)) return {};
@@ -28,22 +25,6 @@ std::optional<glm::dvec2> on_pinhole(const PinholeIntrinsics& lens, const glm::d
 bool is_in_picture(const PinholeIntrinsics& lens, const glm::dvec2& px) {
   return px.x > depth_px && px.y > depth_px && px.x < lens.width - 1 - depth_px &&
          px.y < lens.height - 1 - depth_px;
-}
-
-// Returns whether the segment from an eye to a point passes through the face, before its end.
-bool hides(const Face& face, const glm::dvec3& eye, const glm::dvec3& point) {
-  const glm::dvec3 normal = normal_of(face);
-  const double from = glm::dot(eye - face.outline[0], normal);
-  const double to = glm::dot(point - face.outline[0], normal);
-  if (from == to) return false;
-  const double t = from / (from - to);
-  if (!(t > 0 && t < 1 - hidden_share)) return false;
-  const glm::dvec3 at = eye + t * (point - eye);
-  for (std::size_t i = 0; i < face.outline.size(); ++i) {
-    const glm::dvec3 &a = face.outline[i], &b = face.outline[(i + 1) % face.outline.size()];
-    if (glm::dot(glm::cross(b - a, at - a), normal) < 0) return false;
-  }
-  return true;
 }
 
 // Returns whether light changes where this face ends. The rectangle of a plane ends anywhere, and a
@@ -95,13 +76,6 @@ class Finder {
     return true;
   }
 
-  bool is_visible(const glm::dvec3& point) const {
-    for (const Solid& solid : solids_)
-      for (const Face& face : solid.faces)
-        if (hides(face, eye_, point)) return false;
-    return true;
-  }
-
   void find_pieces(std::size_t s, std::size_t f, std::size_t e,
                    std::vector<EdgePiece>& pieces) const {
     const auto [a, b] = ends(solids_[s].faces[f], e);
@@ -127,7 +101,7 @@ class Finder {
       return false;
     if (glm::distance(*pa, *pb) < shortest_px) return false;
     for (const double share : {0.02, 0.5, 0.98})
-      if (!is_visible(a + share * (b - a))) return false;
+      if (is_hidden(solids_, eye_, a + share * (b - a))) return false;
     const glm::dvec2 along = glm::normalize(*pb - *pa), across(-along.y, along.x);
     const Frame& frame = *views_.views[view_].frame;
     const auto luminance = [&](int x, int y) { return photometry_.luminance(frame, x, y); };

@@ -11,7 +11,9 @@
 #include "daemon/model/colours.hpp"
 #include "daemon/model/fit.hpp"
 #include "daemon/model/glb.hpp"
+#include "daemon/model/overlay.hpp"
 #include "daemon/model/parts.hpp"
+#include "daemon/model/pictures.hpp"
 #include "daemon/model/scans.hpp"
 #include "daemon/model/solids.hpp"
 #include "daemon/model/start.hpp"
@@ -163,6 +165,14 @@ void warn_of_others(const set::Set& set, const std::filesystem::path& model, std
 }  // namespace
 
 void make_model(const ModelOptions& options, std::ostream& out) {
+  if (options.pictures)
+    return write_pictures(options.footage,
+                          calibrate::known_observer(options.set_file, options.footage),
+                          set_of(options).tracking, *options.pictures, out);
+  if (options.parts_file.empty())
+    throw Error(
+        "model needs --parts, the file that lists the scene's parts; --pictures FOLDER writes one "
+        "to fill in");
   if (options.write && !options.set_file)
     throw Error("--write needs --set: it changes that set file");
   const Parts parts = parse_parts(session::read_file(options.parts_file), options.parts_file);
@@ -179,6 +189,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
       place_scans(parts, start.layout, fit.shape, scan_files, out);
   const std::filesystem::path file = file_of(options);
   std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
+  if (options.overlay) write_overlays(views, fit.shape, solids, *options.overlay);
   std::map<std::string, Colour> colours = measured(options, solids, scans, out);
   colours.merge(
       tag_colours(set.tracking.family, start.layout, parts, views, camera.response, colours));

@@ -13,11 +13,14 @@ namespace previz::model {
 struct ModelOptions {
   std::filesystem::path footage;                  // session, folder of pictures, or video
   std::filesystem::path parts_file;               // parts.hpp
+  std::optional<std::filesystem::path> pictures;  // only write pictures to mark into this folder
   std::optional<std::filesystem::path> set_file;  // default: the session's own
   std::optional<std::filesystem::path> out;       // default: the parts file's name, ending in .glb
-  bool write = false;                             // add the model to the set file
-  bool grey = false;                              // do not measure colours
-  render::DeviceOptions device;                   // that colours are measured on
+  std::optional<std::filesystem::path>
+      overlay;                   // pictures with the model over them, into this folder
+  bool write = false;            // add the model to the set file
+  bool grey = false;             // do not measure colours
+  render::DeviceOptions device;  // that colours are measured on
 };
 
 // Writes the model and reports on `out` what fits how well. Throws previz::Error naming the file,

@@ -15,6 +15,8 @@ namespace previz::model {
 namespace {
 
 constexpr int cylinder_sides = 48;
+// What is nearer by less than this share of the distance hides nothing.
+constexpr double hidden_share = 2e-3;
 
 using Points = std::vector<glm::dvec3>;
 
@@ -32,6 +34,22 @@ Points clipped(const Points& polygon, const Plane& by) {
     if ((da >= 0) != (db >= 0)) kept.push_back(a + da / (da - db) * (b - a));
   }
   return kept;
+}
+
+// Returns whether the segment from an eye to a point passes through the face, before its end.
+bool hides(const Face& face, const glm::dvec3& eye, const glm::dvec3& point) {
+  const glm::dvec3 normal = normal_of(face);
+  const double from = glm::dot(eye - face.outline[0], normal);
+  const double to = glm::dot(point - face.outline[0], normal);
+  if (from == to) return false;
+  const double t = from / (from - to);
+  if (!(t > 0 && t < 1 - hidden_share)) return false;
+  const glm::dvec3 at = eye + t * (point - eye);
+  for (std::size_t i = 0; i < face.outline.size(); ++i) {
+    const glm::dvec3 &a = face.outline[i], &b = face.outline[(i + 1) % face.outline.size()];
+    if (glm::dot(glm::cross(b - a, at - a), normal) < 0) return false;
+  }
+  return true;
 }
 
 class Solids {
@@ -269,6 +287,13 @@ glm::dvec3 normal_of(const Face& face) {
   for (std::size_t i = 1; i + 1 < face.outline.size(); ++i)
     sum += glm::cross(face.outline[i] - face.outline[0], face.outline[i + 1] - face.outline[0]);
   return glm::normalize(sum);
+}
+
+bool is_hidden(const std::vector<Solid>& solids, const glm::dvec3& eye, const glm::dvec3& point) {
+  for (const Solid& solid : solids)
+    for (const Face& face : solid.faces)
+      if (hides(face, eye, point)) return true;
+  return false;
 }
 
 std::vector<Solid> solids_of(const Parts& parts, const Layout& layout, const Shape& shape) {

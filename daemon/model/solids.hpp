@@ -23,6 +23,9 @@ struct Solid {
 
 glm::dvec3 normal_of(const Face& face);
 
+// Returns whether a face lies between an eye and a point, and not just at the point.
+bool is_hidden(const std::vector<Solid>& solids, const glm::dvec3& eye, const glm::dvec3& point);
+
 // Returns a solid for each plane that belongs to no room, each box, cylinder and room, in this
 // order. The shape must be settled. Throws previz::Error naming a plane whose outline is not
 // convex, or of which the planes that stand on it leave nothing.

@@ -404,7 +404,8 @@ class Starter {
   std::pair<Cylinder, double> on_circle(const CylinderPart& part, const Plane& plane,
                                         double height) const {
     std::vector<glm::dvec2> flat;
-    const auto [x, y] = across(plane.normal);
+    const std::array<glm::dvec3, 2> axes = across(plane.normal);
+    const glm::dvec3 &x = axes[0], &y = axes[1];
     const auto add = [&](const std::vector<std::string>& names, double above) {
       const Plane at{plane.at + above * plane.normal, plane.normal};
       for (const std::string& point : names)

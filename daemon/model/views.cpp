@@ -7,7 +7,6 @@
 #include <limits>
 #include <map>
 
-#include "daemon/tracking/tag_detector.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 
@@ -35,22 +34,12 @@ void insist_on_size(const Frame& frame, const PinholeIntrinsics& lens,
 tracking::FittedPose pose_of(const std::vector<tracking::TagDetection>& detections,
                              const PinholeIntrinsics& lens, const set::Tracking& tracking,
                              const std::string& picture) {
-  std::vector<tracking::TagObservation> seen;
-  for (const tracking::TagDetection& detection : detections) {
-    const auto tag = std::ranges::find(tracking.tags, detection.id, &set::Tag::id);
-    if (tag != tracking.tags.end() && detection.trouble.empty())
-      seen.push_back(
-          {tag->id, tag->size_m, tag->world_from_tag, detection.corners, detection.covariance});
-  }
-  if (seen.empty())
+  const auto pose = pose_by_tags(detections, lens, tracking);
+  if (!pose)
     throw Error(picture +
-                ": shows no tag of the set, so where the camera stood is unknown; mark the "
-                "points in another picture");
-  const auto poses = tracking::solve_joint_pose(seen, lens, std::nullopt);
-  if (poses.empty())
-    throw Error(picture +
-                ": no position of the camera fits the tags in it; check their [[tag]] tables");
-  return poses.front();
+                ": shows no tags of the set that fit together, so where the camera stood is "
+                "unknown; mark the points in another picture, or check the [[tag]] tables");
+  return *pose;
 }
 
 }  // namespace
@@ -93,6 +82,21 @@ Ray ray_of(const Views& views, const MarkedView& view, const Mark& mark) {
                     view.name, mark.point));
   const glm::dmat3 turn = glm::transpose(view.pose.pose.rotation);
   return {-(turn * view.pose.pose.translation), glm::normalize(turn * glm::dvec3(*at, 1))};
+}
+
+std::optional<tracking::FittedPose> pose_by_tags(
+    const std::vector<tracking::TagDetection>& detections, const PinholeIntrinsics& lens,
+    const set::Tracking& tracking) {
+  std::vector<tracking::TagObservation> seen;
+  for (const tracking::TagDetection& detection : detections) {
+    const auto tag = std::ranges::find(tracking.tags, detection.id, &set::Tag::id);
+    if (tag != tracking.tags.end() && detection.trouble.empty())
+      seen.push_back(
+          {tag->id, tag->size_m, tag->world_from_tag, detection.corners, detection.covariance});
+  }
+  if (seen.empty()) return {};
+  const auto poses = tracking::solve_joint_pose(seen, lens, std::nullopt);
+  return poses.empty() ? std::nullopt : std::optional(poses.front());
 }
 
 tracking::CameraFromWorld adjusted_pose(const MarkedView& view, const std::array<double, 6>& off) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "daemon/model/parts.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/joint_pose.hpp"
+#include "daemon/tracking/tag_detector.hpp"
 #include "drivers/calibration.hpp"
 
 namespace previz::model {
@@ -38,6 +40,12 @@ struct Ray {
 // a mark lies outside, or that shows no tag of the set.
 Views find_views(calibrate::PictureSource& source, const ObserverCalibration& camera,
                  const set::Tracking& tracking, const Parts& parts);
+
+// Returns the best pose by the tags of the set among these; nothing if there are none, or none
+// fits.
+std::optional<tracking::FittedPose> pose_by_tags(
+    const std::vector<tracking::TagDetection>& detections, const PinholeIntrinsics& lens,
+    const set::Tracking& tracking);
 
 // Returns the ray of a pixel, as the tags place the camera. Throws previz::Error naming the mark if
 // the lens shows nothing there.

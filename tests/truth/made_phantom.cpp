@@ -85,7 +85,7 @@ fs::path make_phantom(const TruthSet& set, const fs::path& directory, const std:
   options.device.name = device;
   std::ofstream(options.parts_file) << for_session(session::read_file(marks), set);
   model::make_model(options, out);
-  const fs::path made = directory / "made.glb";
+  fs::path made = directory / "made.glb";
   report_corners(set, made, out);
   return made;
 }

@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 
 #include "daemon/calibrate/known_camera.hpp"
+#include "daemon/model/parts.hpp"
 #include "daemon/model/views.hpp"
+#include "daemon/output/png.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/set/load.hpp"
+#include "drivers/session/files.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
@@ -188,6 +191,48 @@ TEST_F(ModelCommand, PlacesAScanByItsPoints) {
   EXPECT_THAT(out.str(), HasSubstr("scan cube: 1 open borders"));
   EXPECT_THAT(out.str(), Not(HasSubstr("ignored")));
   EXPECT_TRUE(fs::exists(folder_ / "demo/real.glb"));
+}
+
+// A green line goes along the cube's upper front edge, and a red cross is on each mark.
+TEST_F(ModelCommand, DrawsTheModelOverThePictures) {
+  options_.write = false;
+  options_.overlay = folder_ / "over";
+  write_parts(marks() + parts_text);
+  std::ostringstream out;
+  model::make_model(options_, out);
+  for (const int frame : frames) {
+    const Plate over = output::read_png(*options_.overlay / fmt::format("frame_{}.png", frame));
+    int green = 0, red = 0;
+    for (std::size_t i = 0; i + 2 < over.samples.size(); i += 3) {
+      const int r = over.samples[i], g = over.samples[i + 1], b = over.samples[i + 2];
+      green += g > 200 && r < 120 && b < 140;
+      red += r > 240 && g < 75 && b < 75;
+    }
+    EXPECT_GT(green, 100) << frame;
+    EXPECT_GT(red, 8) << frame;  // crosses are smoothed
+  }
+}
+
+TEST_F(ModelCommand, WritesPicturesToMarkPointsIn) {
+  options_.parts_file.clear();
+  options_.pictures = folder_ / "marks";
+  std::ostringstream out;
+  model::make_model(options_, out);
+  const std::string text = session::read_file(folder_ / "marks/model.toml");
+  EXPECT_THAT(text, HasSubstr("tags = [0, 1, 2]"));
+  EXPECT_TRUE(fs::exists(folder_ / "marks/frame_0.png"));
+  // It is a file of parts as it is: a model of nothing but the table.
+  const model::Parts parts = model::parse_parts(text, "model.toml");
+  EXPECT_EQ(parts.planes.size(), 1u);
+  EXPECT_GE(parts.pictures.size(), 3u);
+  options_.pictures.reset();
+  options_.parts_file = folder_ / "marks/model.toml";
+  options_.write = false;
+  model::make_model(options_, out);
+  EXPECT_TRUE(fs::exists(folder_ / "marks/model.glb"));
+  // Marks are never overwritten.
+  options_.pictures = folder_ / "marks";
+  EXPECT_THAT(refusal(), HasSubstr("model.toml: already exists and may hold marks"));
 }
 
 TEST_F(ModelCommand, NothingIsWrittenWhereSomethingIsWrong) {
