@@ -108,28 +108,40 @@ std::map<std::string, Colour> measured(const ModelOptions& options,
       render::open_device(render::options_for(options.device, take.set.quality.hardware_rays)));
 }
 
-// Reports the colours, and returns those that are possible.
+void print_colour(const std::string& name, const Colour& colour, std::ostream& out) {
+  fmt::print(out, "  {}: albedo {:.3f} {:.3f} {:.3f} (accurate to {:.4f} {:.4f} {:.4f})\n", name,
+             colour.albedo.r, colour.albedo.g, colour.albedo.b, colour.sigma.r, colour.sigma.g,
+             colour.sigma.b);
+  if (std::max({colour.albedo.r, colour.albedo.g, colour.albedo.b}) > 1)
+    fmt::print(out,
+               "warning: {} reflects more light than falls on it: the light and the film camera "
+               "disagree; run previzd calibrate balance with a surface of known colour first\n",
+               name);
+}
+
+// Reports the measured colours, and returns what the model gets: `usual` ones of tags that were not
+// measured, and grey for all else.
 Colours reported(const std::map<std::string, Colour>& colours,
+                 const std::map<std::string, glm::dvec3>& usual,
                  const std::vector<std::string>& names, std::ostream& out) {
-  Colours albedos;
+  Colours albedos = usual;
   for (const std::string& name : names) {
     const auto found = colours.find(name);
-    if (found == colours.end()) {
-      fmt::print(out, "  {}: no plate shows enough of it; it stays grey\n", name);
-      continue;
+    if (found != colours.end()) {
+      print_colour(name, found->second, out);
+      albedos[name] = glm::clamp(found->second.albedo, 0.0, 1.0);
+    } else if (!colours.empty()) {
+      fmt::print(out, "  {}: no plate shows enough of it; {}\n", name,
+                 usual.contains(name) ? "it gets the usual colour of tags" : "it stays grey");
     }
-    const Colour& colour = found->second;
-    fmt::print(out, "  {}: albedo {:.3f} {:.3f} {:.3f} (accurate to {:.4f} {:.4f} {:.4f})\n", name,
-               colour.albedo.r, colour.albedo.g, colour.albedo.b, colour.sigma.r, colour.sigma.g,
-               colour.sigma.b);
-    if (std::max({colour.albedo.r, colour.albedo.g, colour.albedo.b}) > 1)
-      fmt::print(out,
-                 "warning: {} reflects more light than falls on it: the light and the film camera "
-                 "disagree; run previzd calibrate balance with a surface of known colour first\n",
-                 name);
-    albedos[name] = glm::clamp(colour.albedo, 0.0, 1.0);
   }
   return albedos;
+}
+
+bool is_taken(const set::FileEdit& edit, const std::string& name) {
+  for (std::size_t i = 0; i < edit.count("object"); ++i)
+    if (edit.written("object", i, "name") == codec::quote(name)) return true;
+  return false;
 }
 
 // Adds the model to the set file, unless the file has it.
@@ -144,8 +156,11 @@ void add_to_set(const std::filesystem::path& set_file, const std::filesystem::pa
   for (std::size_t i = 0; i < edit.count("object"); ++i)
     if (edit.written("object", i, "file") == codec::quote(name))
       return fmt::print(out, "{}: has the model already\n", set_file.string());
+  std::string own = model.stem().string();
+  for (int number = 2; is_taken(edit, own); ++number)
+    own = fmt::format("{} {}", model.stem().string(), number);
   edit.append(fmt::format("[[object]]\nname = {}\nfile = {}\npresence = \"phantom\"\n",
-                          codec::quote(model.stem().string()), codec::quote(name)));
+                          codec::quote(own), codec::quote(name)));
   set::parse_set(edit.text(), set_file);
   const auto old = set::keep_beside(set_file);
   session::replace_file(set_file, edit.text());
@@ -198,7 +213,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   std::vector<std::string> names;
   for (const Solid& solid : solids) names.push_back(solid.name);
   for (const PlacedScan& scan : scans) names.push_back(scan.name);
-  const Colours albedos = colours.empty() ? Colours{} : reported(colours, names, out);
+  const Colours albedos = reported(colours, usual_tag_colours(start.layout), names, out);
   session::replace_file(file, glb_of(solids, albedos, scans));
   fmt::print(out, "model: {}\n", file.string());
   warn_of_others(set, file, out);

@@ -212,4 +212,15 @@ std::map<std::string, Colour> tag_colours(const std::string& family, const Layou
   return colours;
 }
 
+std::map<std::string, glm::dvec3> usual_tag_colours(const Layout& layout) {
+  constexpr double paper = 0.8, print = 0.04;  // office paper and toner
+  std::map<std::string, glm::dvec3> colours;
+  for (const auto* tags : {&layout.plane_tags, &layout.box_tags})
+    for (const FlatTag& flat : *tags) {
+      colours[paper_of(flat)] = glm::dvec3(paper);
+      colours[print_of(flat)] = glm::dvec3(print);
+    }
+  return colours;
+}
+
 }  // namespace previz::model

@@ -27,4 +27,7 @@ std::map<std::string, Colour> tag_colours(const std::string& family, const Layou
                                           const ResponseCurve& response,
                                           const std::map<std::string, Colour>& surfaces);
 
+// Returns what papers and prints of tags usually have, for those of which no picture shows it.
+std::map<std::string, glm::dvec3> usual_tag_colours(const Layout& layout);
+
 }  // namespace previz::model

@@ -193,6 +193,16 @@ TEST_F(ModelCommand, PlacesAScanByItsPoints) {
   EXPECT_TRUE(fs::exists(folder_ / "demo/real.glb"));
 }
 
+TEST_F(ModelCommand, TakesANameThatTheSetDoesNotHave) {
+  std::ofstream(*options_.set_file, std::ios::app)
+      << "\n[[object]]\nname = \"real\"\nfile = \"phantom.glb\"\npresence = \"phantom\"\n";
+  write_parts(marks() + parts_text);
+  std::ostringstream out;
+  model::make_model(options_, out);
+  const set::Set set = set::load_set(*options_.set_file);
+  EXPECT_NE(std::ranges::find(set.objects, "real 2", &set::Object::name), set.objects.end());
+}
+
 // A green line goes along the cube's upper front edge, and a red cross is on each mark.
 TEST_F(ModelCommand, DrawsTheModelOverThePictures) {
   options_.write = false;
