@@ -184,19 +184,25 @@ void add_model(CLI::App& app, model::ModelOptions& options) {
   CLI::Option* const parts = command.add_option(
       "--parts", options.parts_file,
       "File of the scene's planes, boxes, cylinders and scans, and of the marked points");
-  command
-      .add_option(
-          "--pictures", options.pictures,
-          "Only write pictures to mark points in, and a file of parts to fill in, into this folder")
-      ->excludes(parts);
+  CLI::Option* const pictures = command
+                                    .add_option("--pictures", options.pictures,
+                                                "Only write pictures to mark points in, and a file "
+                                                "of parts to fill in, into this folder")
+                                    ->excludes(parts);
   command.add_option("--set", options.set_file,
                      "Set file with the tags and the film camera's lens (default: the session's)");
-  command.add_option("--out", options.out,
-                     "File of the model, .glb (default: as the file of parts is named)");
-  command.add_option("--overlay", options.overlay,
-                     "Folder for the marked pictures with the model drawn over them");
-  command.add_flag("--write", options.write,
-                   "Add the model to the set file; keeps the old file beside it");
+  command
+      .add_option("--out", options.out,
+                  "File of the model, .glb (default: as the file of parts is named)")
+      ->excludes(pictures);
+  command
+      .add_option("--overlay", options.overlay,
+                  "Folder for the marked pictures with the model drawn over them")
+      ->excludes(pictures);
+  command
+      .add_flag("--write", options.write,
+                "Add the model to the set file; keeps the old file beside it")
+      ->excludes(pictures);
   command.add_flag("--grey", options.grey, "Do not measure the colours of its faces");
   add_device_options(command, options.device);
 }

@@ -27,12 +27,19 @@ bool is_in_picture(const PinholeIntrinsics& lens, const glm::dvec2& px) {
          px.y < lens.height - 1 - depth_px;
 }
 
+// Returns whether walls may end this plane. Which of its corners is which then depends on where
+// they are.
+bool may_be_cut(const Parts& parts, const PlanePart& plane) {
+  return !plane.upright_on.empty() ||
+         std::ranges::find(parts.planes, plane.name, &PlanePart::upright_on) != parts.planes.end();
+}
+
 // Returns whether light changes where this face ends. The rectangle of a plane ends anywhere, and a
 // cylinder is round. Where a box stands on something its shadow begins, which moves the edge of
 // light by half a pixel and more.
 bool has_edges(const Parts& parts, const std::string& name, const std::string& face) {
   const auto plane = std::ranges::find(parts.planes, name, &PlanePart::name);
-  if (plane != parts.planes.end()) return !plane->outline.empty();
+  if (plane != parts.planes.end()) return !plane->outline.empty() && !may_be_cut(parts, *plane);
   const auto box = std::ranges::find(parts.boxes, name, &BoxPart::name);
   if (box != parts.boxes.end()) return box->on.empty() || face != "bottom";
   return std::ranges::find(parts.cylinders, name, &CylinderPart::name) == parts.cylinders.end();

@@ -228,7 +228,13 @@ void observe_edges(const Parts& parts, const Views& views, const Layout& layout,
                    const std::vector<EdgePiece>& pieces, std::vector<Observation>& all) {
   if (pieces.empty()) return;
   all.push_back({2 * pieces.size(), [&](const Shape& s, double* out) {
-                   const std::vector<Solid> solids = solids_of(parts, layout, s);
+                   std::vector<Solid> solids;
+                   try {
+                     solids = solids_of(parts, layout, s);
+                   } catch (const Error&) {  // a step that goes too far is not taken
+                     std::fill_n(out, 2 * pieces.size(), std::numeric_limits<double>::quiet_NaN());
+                     return;
+                   }
                    for (const EdgePiece& piece : pieces) {
                      const double sigma =
                          std::sqrt(piece.variance_px2 + edge_sigma_px * edge_sigma_px);
@@ -244,7 +250,7 @@ class Problem {
   struct Equations {
     double cost = 0;
     Residuals residuals;
-    cv::Mat1d information, gradient;
+    cv::Mat1d jacobian, information, gradient;
   };
 
   Problem(const Parts& parts, const Views& views, const Start& start,
@@ -295,7 +301,8 @@ class Problem {
 
   void linearise(const Shape& shape, Equations& e) const {
     const int n = int(unknowns_.size());
-    cv::Mat1d jacobian(int(rows_), n);
+    cv::Mat1d& jacobian = e.jacobian;
+    jacobian.create(int(rows_), n);
     for (int u = 0; u < n; ++u) {
       // Residuals are measured less predicted.
       const auto column =
@@ -353,6 +360,15 @@ std::vector<MarkResidual> mark_residuals(const Views& views, const Layout& layou
   return all;
 }
 
+// A mark on a rim says how far the rim is, and nothing about where on it the mark is.
+std::size_t rim_marks(const Views& views, const Layout& layout) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(used_marks(views, layout), [](const UsedMark& used) {
+        return used.place.kind == Place::Kind::upper_rim ||
+               used.place.kind == Place::Kind::lower_rim;
+      }));
+}
+
 void insist_on_marks(const Parts& parts, const std::vector<MarkResidual>& marks) {
   const auto worst = std::ranges::max_element(marks, {}, &MarkResidual::off_px);
   if (worst == marks.end() || worst->off_px <= most_off * parts.mark_px) return;
@@ -404,6 +420,14 @@ std::vector<FaceAccuracy> accuracies(const Parts& parts, const Layout& layout,
   return all;
 }
 
+// Returns how many of the first rows of residuals are left to show the noise, which are those that
+// the unknowns do not follow: rows less the trace of J C J^T.
+double redundancy_of(const cv::Mat1d& jacobian, const cv::Mat1d& covariance, int rows) {
+  if (rows == 0) return 0;
+  const cv::Mat1d j = jacobian.rowRange(0, rows);
+  return rows - cv::sum((j * covariance).mul(j))[0];
+}
+
 }  // namespace
 
 Fit adjust(const Parts& parts, const Views& views, const Start& start,
@@ -429,11 +453,17 @@ Fit adjust(const Parts& parts, const Views& views, const Start& start,
   double squares = 0;
   for (const MarkResidual& mark : fit.marks) squares += mark.off_px * mark.off_px;
   fit.rms_px = fit.marks.empty() ? 0 : std::sqrt(squares / double(fit.marks.size()));
-  const double freedom = double(problem.rows()) - double(problem.unknowns().size());
+  const double rims = double(rim_marks(views, start.layout));
+  const double freedom = double(problem.rows()) - rims - double(problem.unknowns().size());
   fit.noise_factor = freedom > 0 ? std::sqrt(std::max(1.0, 2 * at.cost / freedom)) : 1;
-  if (const auto covariance = tracking::inverse_of(at.information))
+  if (const auto covariance = tracking::inverse_of(at.information)) {
+    const double redundancy =
+        redundancy_of(at.jacobian, *covariance, 2 * int(fit.marks.size())) - rims;
+    if (redundancy > 0.5) fit.mark_factor = std::sqrt(squares / redundancy) / parts.mark_px;
+    fit.noise_factor = std::max(fit.noise_factor, fit.mark_factor);
     fit.faces = accuracies(parts, start.layout, problem, fit.shape,
                            fit.noise_factor * fit.noise_factor * *covariance);
+  }
   return fit;
 }
 

@@ -26,7 +26,8 @@ struct Fit {
   Shape shape;
   std::vector<MarkResidual> marks;
   double rms_px = 0;        // of the marks' distances
-  double noise_factor = 1;  // by which deviations are larger than expected; at least 1
+  double mark_factor = 1;   // by which marks are farther off than their accuracy
+  double noise_factor = 1;  // the same of all that was observed, or of the marks; at least 1
   std::vector<FaceAccuracy> faces;
   std::vector<double> edges_off_px;  // of each piece, the mean of both ends
 };

@@ -3,6 +3,7 @@
 #include <tiny_gltf.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <glm/common.hpp>
 #include <limits>
@@ -41,6 +42,16 @@ Mesh mesh_of(const PlacedScan& scan) {
   for (glm::vec3& p : mesh.positions) p = y_up(p);
   for (glm::vec3& n : mesh.normals) n = y_up(n);
   return mesh;
+}
+
+// A model that no reader accepts is a fault of what it was made of.
+void insist_on_numbers(const std::string& name, const Mesh& mesh) {
+  for (const auto* vectors : {&mesh.positions, &mesh.normals})
+    for (const glm::vec3& v : *vectors)
+      if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
+        throw Error(
+            "\"" + name +
+            "\" has no shape: a side of it has no area or lies infinitely far; check its points");
 }
 
 // Appends values to the buffer and returns the view of them.
@@ -108,6 +119,7 @@ std::string glb_of(const std::vector<Solid>& solids, const Colours& colours,
   model.buffers.emplace_back();
   tinygltf::Scene scene;
   const auto add = [&](const std::string& name, const Mesh& mesh) {
+    insist_on_numbers(name, mesh);
     const auto colour = colours.find(name);
     model.materials.push_back(
         matt(name, colour == colours.end() ? glm::dvec3(0.5) : colour->second));

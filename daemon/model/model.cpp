@@ -55,16 +55,17 @@ void print_fit(const Parts& parts, const Layout& layout, const Fit& fit, std::os
                "median, {:.2f} px in 90 %\n",
                off.size(), off[off.size() / 2], off[off.size() * 9 / 10]);
   }
-  if (fit.noise_factor > 1.5)
+  if (fit.mark_factor > 1.5)
     fmt::print(out,
                "warning: the marks disagree by {:.1f} times their accuracy of {:g} px; check those "
                "that are farthest "
                "off, or give the accuracy under [marks]\n",
-               fit.noise_factor, parts.mark_px);
+               fit.mark_factor, parts.mark_px);
   for (const std::string& point : layout.unused_points)
     fmt::print(out, "point \"{}\" belongs to no part and is ignored\n", point);
   for (std::size_t i = 0; i < parts.boxes.size(); ++i) {
-    const glm::dvec3 mm = 1000.0 * fit.shape.boxes[i].size;
+    glm::dvec3 mm = 1000.0 * fit.shape.boxes[i].size;
+    if (layout.is_clockwise[i]) std::swap(mm.x, mm.y);  // length and width as they are marked
     fmt::print(out, "box {}: {:.1f} x {:.1f} x {:.1f} mm\n", parts.boxes[i].name, mm.x, mm.y, mm.z);
   }
   for (std::size_t i = 0; i < parts.cylinders.size(); ++i)
@@ -138,43 +139,85 @@ Colours reported(const std::map<std::string, Colour>& colours,
   return albedos;
 }
 
+bool is_same(const std::filesystem::path& a, const std::filesystem::path& b) {
+  return std::filesystem::weakly_canonical(a) == std::filesystem::weakly_canonical(b);
+}
+
+// Refuses to replace what the model is made of.
+void insist_on_outputs(const ModelOptions& options, const Parts& parts) {
+  const std::filesystem::path file = file_of(options);
+  if (file.extension() != ".glb")
+    throw Error(file.string() + ": the model is a .glb file; name one with --out");
+  for (const ScanPart& scan : parts.scans)
+    if (is_same(file, scan.file))
+      throw Error(file.string() + ": is a scan of the model; name another file with --out");
+  if (is_same(file, options.footage))
+    throw Error(file.string() + ": is the footage; name another file with --out");
+}
+
 bool is_taken(const set::FileEdit& edit, const std::string& name) {
   for (std::size_t i = 0; i < edit.count("object"); ++i)
     if (edit.written("object", i, "name") == codec::quote(name)) return true;
   return false;
 }
 
-// Adds the model to the set file, unless the file has it.
-void add_to_set(const std::filesystem::path& set_file, const std::filesystem::path& model,
-                std::ostream& out) {
-  const std::string before = set::read_set_file(set_file);
-  set::FileEdit edit(before);
+// Returns the set file's text with the model; nothing if the set has it. Throws previz::Error if
+// the file cannot be changed.
+std::optional<std::string> with_model(const std::filesystem::path& set_file, const set::Set& set,
+                                      const ModelOptions& options) {
+  const std::filesystem::path model = file_of(options);
+  for (const set::Object& object : set.objects) {
+    if (!is_same(object.file, model)) continue;
+    if (object.presence == set::Presence::phantom) return {};
+    throw Error(fmt::format(
+        "{}: has {} as the object \"{}\", which is not a phantom; name another file with --out",
+        set_file.string(), model.string(), object.name));
+  }
+  set::FileEdit edit(set::read_set_file(set_file));
   const std::string name =
       std::filesystem::relative(std::filesystem::absolute(model),
                                 std::filesystem::absolute(set_file).parent_path())
           .string();
-  for (std::size_t i = 0; i < edit.count("object"); ++i)
-    if (edit.written("object", i, "file") == codec::quote(name))
-      return fmt::print(out, "{}: has the model already\n", set_file.string());
   std::string own = model.stem().string();
   for (int number = 2; is_taken(edit, own); ++number)
     own = fmt::format("{} {}", model.stem().string(), number);
   edit.append(fmt::format("[[object]]\nname = {}\nfile = {}\npresence = \"phantom\"\n",
                           codec::quote(own), codec::quote(name)));
-  set::parse_set(edit.text(), set_file);
-  const auto old = set::keep_beside(set_file);
-  session::replace_file(set_file, edit.text());
-  fmt::print(out, "written to {}; previous version: {}\n", set_file.string(), old.string());
+  // The model is not there yet; another file stands in for it.
+  set::parse_set(edit.text(), set_file, {{name, std::filesystem::absolute(options.parts_file)}});
+  return edit.text();
 }
 
 void warn_of_others(const set::Set& set, const std::filesystem::path& model, std::ostream& out) {
   for (const set::Object& object : set.objects)
-    if (object.presence == set::Presence::phantom &&
-        std::filesystem::weakly_canonical(object.file) != std::filesystem::weakly_canonical(model))
+    if (object.presence == set::Presence::phantom && !is_same(object.file, model))
       fmt::print(out,
                  "the set has a phantom \"{}\" beside this model; remove its [[object]] if it is "
                  "of the same things\n",
                  object.name);
+}
+
+// What the colours are measured of.
+struct Adjusted {
+  const Parts& parts;
+  const Views& views;
+  const Layout& layout;
+  const Shape& shape;
+};
+
+// Returns the bytes of the model's file, with the tags and the colours of everything.
+std::string coloured_model(const ModelOptions& options, const set::Set& set, const Adjusted& at,
+                           std::vector<Solid> solids, const std::vector<PlacedScan>& scans,
+                           const ResponseCurve& response, std::ostream& out) {
+  std::map<std::string, Colour> colours = measured(options, solids, scans, out);
+  colours.merge(tag_colours(set.tracking.family, at.layout, at.parts, at.views, at.shape, solids,
+                            response, colours));
+  for (Solid& tag : tag_solids(set.tracking.family, at.layout, at.shape))
+    solids.push_back(std::move(tag));
+  std::vector<std::string> names;
+  for (const Solid& solid : solids) names.push_back(solid.name);
+  for (const PlacedScan& scan : scans) names.push_back(scan.name);
+  return glb_of(solids, reported(colours, usual_tag_colours(at.layout), names, out), scans);
 }
 
 }  // namespace
@@ -191,8 +234,10 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   if (options.write && !options.set_file)
     throw Error("--write needs --set: it changes that set file");
   const Parts parts = parse_parts(session::read_file(options.parts_file), options.parts_file);
+  insist_on_outputs(options, parts);
   const std::vector<ScanFile> scan_files = read_scans(parts);
   const set::Set set = set_of(options);
+  const auto edited = options.write ? with_model(*options.set_file, set, options) : std::nullopt;
   const ObserverCalibration camera = calibrate::known_observer(options.set_file, options.footage);
   const auto source = calibrate::open_source(options.footage, "observer");
   const Views views = find_views(*source, camera, set.tracking, parts);
@@ -202,22 +247,23 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   print_faces(fit, out);
   const std::vector<PlacedScan> scans =
       place_scans(parts, start.layout, fit.shape, scan_files, out);
+  const std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
+  const std::string model = coloured_model(options, set, {parts, views, start.layout, fit.shape},
+                                           solids, scans, camera.response, out);
   const std::filesystem::path file = file_of(options);
-  std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
-  if (options.overlay) write_overlays(views, fit.shape, solids, *options.overlay);
-  std::map<std::string, Colour> colours = measured(options, solids, scans, out);
-  colours.merge(
-      tag_colours(set.tracking.family, start.layout, parts, views, camera.response, colours));
-  for (Solid& tag : tag_solids(set.tracking.family, start.layout, fit.shape))
-    solids.push_back(std::move(tag));
-  std::vector<std::string> names;
-  for (const Solid& solid : solids) names.push_back(solid.name);
-  for (const PlacedScan& scan : scans) names.push_back(scan.name);
-  const Colours albedos = reported(colours, usual_tag_colours(start.layout), names, out);
-  session::replace_file(file, glb_of(solids, albedos, scans));
+  session::replace_file(file, model);
   fmt::print(out, "model: {}\n", file.string());
+  if (options.overlay) write_overlays(views, fit.shape, solids, *options.overlay);
+  if (options.overlay && !scans.empty()) out << "scans are not drawn over the pictures\n";
   warn_of_others(set, file, out);
-  if (options.write) add_to_set(*options.set_file, file, out);
+  if (edited) {
+    const auto old = set::keep_beside(*options.set_file);
+    session::replace_file(*options.set_file, *edited);
+    fmt::print(out, "written to {}; previous version: {}\n", options.set_file->string(),
+               old.string());
+  } else if (options.write) {
+    fmt::print(out, "{}: has the model already\n", options.set_file->string());
+  }
 }
 
 }  // namespace previz::model

@@ -79,9 +79,12 @@ void write_overlays(const Views& views, const Shape& shape, const std::vector<So
       draw_line(picture, mark.px - glm::dvec2(cross_px, 0), mark.px + glm::dvec2(cross_px, 0), red);
       draw_line(picture, mark.px - glm::dvec2(0, cross_px), mark.px + glm::dvec2(0, cross_px), red);
     }
-    std::string name = view.name.ends_with(".png") ? view.name : view.name + ".png";
+    // "0012.png" becomes "0012.model.png", so that no picture is replaced.
+    std::string name =
+        view.name.ends_with(".png") ? view.name.substr(0, view.name.size() - 4) : view.name;
     for (char& c : name)
       if (c == ' ' || c == '/') c = '_';
+    name += ".model.png";
     output::write_png(folder / name, plate_of(picture));
   }
 }

@@ -8,9 +8,9 @@
 
 namespace previz::model {
 
-// Writes a PNG for each marked picture into a folder, which is created: the edges that the model
-// does not hide in green, its marks as red crosses. Throws previz::Error naming a file that cannot
-// be written.
+// Writes NAME.model.png for each marked picture into a folder, which is created: the edges of the
+// solids that they do not hide in green, the marks as red crosses. Throws previz::Error naming a
+// file that cannot be written.
 void write_overlays(const Views& views, const Shape& shape, const std::vector<Solid>& solids,
                     const std::filesystem::path& folder);
 

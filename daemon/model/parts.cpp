@@ -101,9 +101,9 @@ Keys box_keys(BoxPart& b) {
       {"bottom", &b.bottom, {}, "Points at the corners below them.", optional("[\"e\", \"f\", \"\", \"\"]")},
       {"tags", &b.tags, ids, "Tags that lie flat on its sides.", optional("[7]")},
       {"tag_thickness_m", &b.tag_thickness_m, thin, "Thickness of their paper or board."},
-      {"length_m", &b.length_m, length, "Distance of the first two corners, if it is known; of a box with tags only, its size along the first tag's right.", optional("0.3")},
-      {"width_m", &b.width_m, length, "Distance of the second and the third corner, or along the first tag's up.", optional("0.2")},
-      {"height_m", &b.height_m, length, "Height, or along the first tag's normal.", optional("0.1")},
+      {"length_m", &b.length_m, length, "Distance of the first two corners, if it is known; of a box with tags only, its size along the first tag's right or up, whichever is more level.", optional("0.3")},
+      {"width_m", &b.width_m, length, "Distance of the second and the third corner, or at a right angle to that of the tag.", optional("0.2")},
+      {"height_m", &b.height_m, length, "Height; of a box with tags only that stands on nothing, along the first tag's normal.", optional("0.1")},
   };
 }
 
@@ -150,7 +150,8 @@ Section many(const std::string& path, Drafts<Part>& parts, Keys (*keys)(Part&)) 
 Section points_section(Draft& d) {
   return {"picture.points", Section::Kind::optional, "", [&d]() -> Section::Opened {
             d.points.emplace_back().path = "picture.points";
-            const auto mark = [&d](Position, const std::string& name, const Value& value) {
+            const auto mark = [&d](Position at, const std::string& name, const Value& value) {
+              if (name.empty()) throw Misread{at, "has an empty name; allowed: a name"};
               const auto px = codec::numbers(value, 2, units::px.within(-1e5, 1e5));
               if (!d.pictures.empty())
                 d.pictures.back().second.marks.push_back({name, {px[0], px[1]}});
@@ -246,10 +247,17 @@ class Checker {
                     "has no part; add a [[plane]], [[box]], [[cylinder]], [[room]] or [[scan]]");
   }
 
+  // A corner of a box need not be marked: "" stands for it.
+  enum class Empty { refused, allowed };
+
   // A point that is given must be marked; how often, says what it is used for.
-  void points(const Given& given, const std::string& key, const Texts& names, int least) {
+  void points(const Given& given, const std::string& key, const Texts& names, int least,
+              Empty empty = Empty::refused) {
     for (const std::string& point : names) {
-      if (point.empty()) continue;
+      if (point.empty()) {
+        if (empty == Empty::refused) add(given, key, "has an empty name; allowed: names of points");
+        continue;
+      }
       const auto found = pictures_of_.find(point);
       if (found == pictures_of_.end()) {
         Texts known;
@@ -265,6 +273,21 @@ class Checker {
                 "side");
       }
     }
+  }
+
+  // A tag lies on one thing.
+  void flat_tags(const Given& given, const std::vector<int>& tags) {
+    for (const int tag : tags)
+      if (!tags_.insert(tag).second)
+        add(given, "tags", fmt::format("tag {} is listed twice; it can lie on one part only", tag));
+  }
+
+  // Returns the name of the cylinder that has this point on a rim; null if none has.
+  const std::string* rim_of(const std::string& point) const {
+    for (const auto& [given, c] : draft_.cylinders)
+      for (const auto* rim : {&c.top, &c.bottom})
+        if (std::ranges::find(*rim, point) != rim->end()) return &c.name;
+    return nullptr;
   }
 
   // Returns whether the plane exists.
@@ -288,6 +311,14 @@ class Checker {
     points(given, "outline", p.outline, 2);
     for (const auto& [a, b] : p.edges) points(given, "edges", {a, b}, 1);
     points(given, "foot", p.foot, 1);
+    for (const std::string& point : points_on(p))
+      if (const std::string* rim = rim_of(point))
+        add(given, "name",
+            "point \"" + point + "\" is on a rim of cylinder \"" + *rim +
+                "\", where each picture has points of its own; mark another one");
+    flat_tags(given, p.tags);
+    if (!p.outline.empty() && !p.edges.empty())
+      add(given, "edges", "conflicts with outline; remove one of the two");
     if (!p.foot.empty() && p.upright_on.empty())
       add(given, "foot", "needs upright_on, the plane that the foot is on");
     const std::size_t on_it = marked(p.points) + marked(p.outline) + marked(p.foot);
@@ -318,14 +349,20 @@ class Checker {
   }
 
   void check(const Given& given, const BoxPart& b) {
-    points(given, "top", b.top, 2);
-    points(given, "bottom", b.bottom, b.on.empty() ? 2 : 1);
+    points(given, "top", b.top, 2, Empty::allowed);
+    points(given, "bottom", b.bottom, b.on.empty() ? 2 : 1, Empty::allowed);
+    flat_tags(given, b.tags);
     const bool has_plane = b.on.empty() || plane(given, "on", b.on);
     if (!four(given, "top", b.top) || !four(given, "bottom", b.bottom) || !has_plane) return;
     std::size_t corners = 0;  // around the box, marked above or below
     for (std::size_t i = 0; i < 4; ++i)
       corners +=
           (!b.top.empty() && !b.top[i].empty()) || (!b.bottom.empty() && !b.bottom[i].empty());
+    if (corners > 0 && corners < 3 && !b.tags.empty())
+      add(given, "name",
+          fmt::format("box \"{}\" has tags and {} of its four upright edges marked; mark three, or "
+                      "none",
+                      b.name, corners));
     if (corners < 3 && b.tags.empty())
       add(given, "name",
           fmt::format(
@@ -359,6 +396,10 @@ class Checker {
     if (r.walls.size() != 4)
       add(given, "walls",
           fmt::format("has {} planes; allowed: 4, in order around", r.walls.size()));
+    std::set<std::string> different(r.walls.begin(), r.walls.end());
+    different.insert(r.floor);
+    if (different.size() != r.walls.size() + 1)
+      add(given, "walls", "has a plane twice, or the floor; allowed: 4 different planes");
     plane(given, "floor", r.floor);
     for (const std::string& wall : r.walls) plane(given, "walls", wall);
   }
@@ -385,6 +426,7 @@ class Checker {
   Problems& problems_;
   std::map<std::string, int> pictures_of_;  // how many show each point
   std::set<std::string> names_;
+  std::set<int> tags_;  // that lie on a part
 };
 
 template <class Part>
@@ -395,6 +437,16 @@ std::vector<Part> values_of(const Drafts<Part>& drafts) {
 }
 
 }  // namespace
+
+std::vector<std::string> points_on(const PlanePart& part) {
+  std::vector<std::string> names = part.points;
+  for (const auto* more : {&part.outline, &part.foot})
+    names.insert(names.end(), more->begin(), more->end());
+  for (const auto& pair : part.edges) names.insert(names.end(), pair.begin(), pair.end());
+  std::ranges::sort(names);
+  names.erase(std::unique(names.begin(), names.end()), names.end());
+  return names;
+}
 
 Parts parse_parts(const std::string& text, const std::filesystem::path& file) {
   Problems problems(file.string());

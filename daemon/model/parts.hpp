@@ -107,6 +107,9 @@ struct Parts {
   std::vector<ScanPart> scans;
 };
 
+// Returns the names of all points that lie on a plane.
+std::vector<std::string> points_on(const PlanePart& part);
+
 // Parses a file of parts; `file` names it in errors. Throws previz::Error with every problem found,
 // one a line: what cannot be read, names that are used twice or not known, points that no picture
 // has, and parts that nothing determines. Paths are relative to the folder of `file`.

@@ -150,6 +150,8 @@ void write_pictures(const std::filesystem::path& footage, const ObserverCalibrat
   if (std::filesystem::exists(parts))
     throw Error(parts.string() +
                 ": already exists and may hold marks; name another folder, or delete the file");
+  if (std::filesystem::weakly_canonical(folder) == std::filesystem::weakly_canonical(footage))
+    throw Error(folder.string() + ": is the footage; name another folder for the pictures to mark");
   std::vector<std::string> names;
   const std::vector<Candidate> chosen = apart(candidates_of(footage, camera, tracking));
   session::make_folders(folder);

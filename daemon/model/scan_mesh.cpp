@@ -162,6 +162,16 @@ void turn_what_disagrees(TriangleMesh& mesh, const std::vector<Neighbour>& neigh
   }
 }
 
+// Six times the volume inside a closed mesh; below 0 if it faces inwards.
+double volume_6(const TriangleMesh& mesh) {
+  double sum = 0;
+  for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+    const glm::dvec3 a(mesh.positions[mesh.indices[i]]), b(mesh.positions[mesh.indices[i + 1]]);
+    sum += glm::dot(a, glm::cross(b, glm::dvec3(mesh.positions[mesh.indices[i + 2]])));
+  }
+  return sum;
+}
+
 }  // namespace
 
 void weld(TriangleMesh& mesh) {
@@ -189,6 +199,10 @@ MeshFaults mend(TriangleMesh& mesh) {
   mesh.indices.resize(kept);
   const std::vector<Neighbour> neighbours = find_neighbours(mesh, faults);
   if (faults.opposite_edges > 0) turn_what_disagrees(mesh, neighbours, faults);
+  const bool is_closed =
+      faults.open_borders == 0 && faults.opposite_left == 0 && faults.crowded_edges == 0;
+  faults.was_inside_out = is_closed && volume_6(mesh) < 0;
+  for (std::size_t t = 0; faults.was_inside_out && t < mesh.triangles(); ++t) turn(mesh, t);
   return faults;
 }
 

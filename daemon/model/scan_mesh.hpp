@@ -24,13 +24,15 @@ struct MeshFaults {
   std::size_t turned = 0;          // triangles that were turned to agree with their neighbours
   std::size_t opposite_left = 0;   // edges of surfaces with one side only, which cannot be mended
   std::size_t crowded_edges = 0;   // that more than two triangles have
+  bool was_inside_out = false;     // closed, and all of it faced inwards; it is turned
 };
 
 // Makes one vertex of all that are in exactly the same place.
 void weld(TriangleMesh& mesh);
 
 // Removes triangles with fewer than three different corners and turns those that face the other way
-// than their neighbours: of each connected piece the side with less area. The mesh must be welded.
+// than their neighbours: of each connected piece the side with less area; and all of a closed mesh
+// that faces inwards. The mesh must be welded.
 MeshFaults mend(TriangleMesh& mesh);
 
 struct ShadedMesh {

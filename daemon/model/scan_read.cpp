@@ -33,6 +33,7 @@ std::string extension_of(const std::filesystem::path& file) {
 void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
             TriangleMesh& mesh) {
   const aiMatrix4x4 to_file = parent * node.mTransformation;
+  const bool is_mirrored = to_file.Determinant() < 0;  // glTF 2.0, 3.7.4
   for (unsigned m = 0; m < node.mNumMeshes; ++m) {
     const aiMesh& from = *scene.mMeshes[node.mMeshes[m]];
     const auto first = static_cast<unsigned>(mesh.positions.size());
@@ -46,6 +47,8 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
       for (unsigned k = 0; face.mNumIndices == 3 && k < 3; ++k)
         mesh.indices.push_back(face.mIndices[k] < from.mNumVertices ? first + face.mIndices[k]
                                                                     : out_of_range);
+      if (is_mirrored && face.mNumIndices == 3)
+        std::swap(mesh.indices[mesh.indices.size() - 2], mesh.indices.back());
     }
   }
   for (unsigned c = 0; c < node.mNumChildren; ++c) append(scene, *node.mChildren[c], to_file, mesh);

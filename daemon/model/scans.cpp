@@ -89,6 +89,8 @@ void print_faults(const std::string& name, const MeshFaults& faults, std::ostrea
                    ? std::string()
                    : fmt::format("; {} edges unchanged, because their surface has one side only",
                                  faults.opposite_left));
+  if (faults.was_inside_out)
+    fmt::print(out, "warning: scan {}: was inside out; all of its faces are turned\n", name);
   if (faults.crowded_edges > 0)
     fmt::print(out,
                "warning: scan {}: {} edges belong to more than two faces; faces across them are "

@@ -15,6 +15,8 @@ namespace previz::model {
 namespace {
 
 constexpr int cylinder_sides = 48;
+// What is farther behind a wall than this is not at its foot.
+constexpr double behind_m = 5e-3;
 // What is nearer by less than this share of the distance hides nothing.
 constexpr double hidden_share = 2e-3;
 
@@ -185,6 +187,14 @@ class Solids {
     return corners;
   }
 
+  // A wall ends what it stands on and the walls beside it, but for a screen that has some of it
+  // behind itself.
+  bool has_all_before(std::size_t index, const Plane& wall) const {
+    return std::ranges::all_of(things_on(index), [&](const glm::dvec3& p) {
+      return glm::dot(p - wall.at, wall.normal) > -behind_m;
+    });
+  }
+
   Solid plane(std::size_t index) const {
     const PlanePart& part = parts_.planes[index];
     Points corners =
@@ -193,7 +203,8 @@ class Solids {
       const bool stands_here = layout_.plane_on[i] == index;
       const bool stands_beside =
           i != index && layout_.plane_on[index] && layout_.plane_on[i] == layout_.plane_on[index];
-      if (stands_here || stands_beside) corners = clipped(corners, shape_.planes[i]);
+      if ((stands_here || stands_beside) && has_all_before(index, shape_.planes[i]))
+        corners = clipped(corners, shape_.planes[i]);
     }
     if (corners.size() < 3)
       throw Error(
@@ -265,6 +276,15 @@ class Solids {
     }
     const bool is_clockwise =
         glm::dot(glm::cross(low[2] - low[0], low[3] - low[1]), floor.normal) < 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const glm::dvec3 &a = low[i], &b = low[(i + 1) % 4], &c = low[(i + 2) % 4];
+      const double turn = glm::dot(glm::cross(b - a, c - b), floor.normal);
+      if (!(is_clockwise ? turn < 0 : turn > 0))
+        throw Error(fmt::format(
+            "{}: the walls of room \"{}\" do not go around its floor; list them in order "
+            "around, and check the points of each",
+            parts_.file.string(), part.name));
+    }
     Solid solid{part.name, {{"floor", low}, {"ceiling", {high.rbegin(), high.rend()}}}};
     for (std::size_t i = 0; i < 4; ++i) {
       const std::size_t before = (i + 3) % 4;

@@ -293,6 +293,7 @@ class Starter {
     const auto known = known_sizes(part, is_clockwise);
     for (std::size_t k = 0; k < 3; ++k)
       if (known[k]) box.size[glm::length_t(k)] = *known[k];
+    if (top.empty() && !known[2]) box.size.z = height_by_tags(part, box, ground);
     box.foot = 0.25 * (feet[0] + feet[1] + feet[2] + feet[3]);
     if (!on && bottom.empty()) box.foot -= box.size.z * up;
     if (!(box.size.x > 1e-4 && box.size.y > 1e-4 && box.size.z > 1e-4))
@@ -302,6 +303,20 @@ class Starter {
                       "{:.1f} mm; check that they are listed in order around, and bottom corners "
                       "below top ones",
                       part.name, 1000 * box.size.x, 1000 * box.size.y, 1000 * box.size.z));
+  }
+
+  // Returns how high a tag lies on top of the box.
+  double height_by_tags(const BoxPart& part, const Box& box, const glm::dvec3& ground) const {
+    for (const int id : part.tags) {
+      const set::Tag& flat = tag(id, part.name);
+      if (side_of(flat, box) == std::pair<std::size_t, bool>(2, true))
+        return glm::dot(mean_of(corners_of(flat, part.tag_thickness_m)) - ground, box.axes[2]);
+    }
+    refuse(
+        fmt::format("box \"{}\" has no corner of its upper side marked and no tag on it; mark a "
+                    "corner, or give "
+                    "height_m",
+                    part.name));
   }
 
   glm::dvec3 up_of(const BoxPart& part, const Points& top, const Points& bottom) const {
@@ -322,8 +337,11 @@ class Starter {
     Box& box = shape_.boxes.back();
     const std::optional<std::size_t> on = layout_.box_on.back();
     const glm::dmat4& first = tag(part.tags.front(), part.name).world_from_tag;
-    box.axes =
-        upright_axes(glm::dvec3(first[0]), on ? shape_.planes[*on].normal : glm::dvec3(first[2]));
+    const glm::dvec3 up = on ? shape_.planes[*on].normal : glm::dvec3(first[2]);
+    const glm::dvec3 right(first[0]), over(first[1]);
+    // What is upright has no direction on the ground but that of its rounding.
+    const bool is_level = std::abs(glm::dot(right, up)) <= std::abs(glm::dot(over, up));
+    box.axes = upright_axes(is_level ? right : over, up);
     std::array<std::optional<double>, 3> low, high;  // where its sides are along its axes
     if (on) low[2] = glm::dot(shape_.planes[*on].at, box.axes[2]);
     for (const int id : part.tags) {
@@ -346,7 +364,7 @@ class Starter {
             "corners, or give {} and a tag on one of the two sides",
             part.name, std::string(names[k]).substr(0, std::string(names[k]).size() - 2),
             names[k]));
-      box.size[axis] = *high[k] - *low[k];
+      box.size[axis] = known[k].value_or(*high[k] - *low[k]);
       middle += (k == 2 ? *low[k] : 0.5 * (*low[k] + *high[k])) * box.axes[axis];
     }
     box.foot = middle;
@@ -496,16 +514,6 @@ class Starter {
 
 Start first_guess(const Parts& parts, const Views& views, const std::vector<set::Tag>& tags) {
   return Starter(parts, views, tags).start();
-}
-
-std::vector<std::string> points_on(const PlanePart& part) {
-  std::vector<std::string> names = part.points;
-  for (const auto* more : {&part.outline, &part.foot})
-    names.insert(names.end(), more->begin(), more->end());
-  for (const auto& pair : part.edges) names.insert(names.end(), pair.begin(), pair.end());
-  std::ranges::sort(names);
-  names.erase(std::unique(names.begin(), names.end()), names.end());
-  return names;
 }
 
 void settle(const Layout& layout, Shape& shape) {

@@ -56,9 +56,6 @@ Start first_guess(const Parts& parts, const Views& views, const std::vector<set:
 // Moves what stands on a plane onto it, upright.
 void settle(const Layout& layout, Shape& shape);
 
-// Returns the names of all points that lie on a plane.
-std::vector<std::string> points_on(const PlanePart& part);
-
 // Returns the known sizes of a box, in the order of Box::size.
 std::array<std::optional<double>, 3> known_sizes(const BoxPart& part, bool is_clockwise);
 

@@ -120,9 +120,13 @@ struct Ratios {
 
 class TagColours {
  public:
-  TagColours(const std::string& family, const Views& views, const ResponseCurve& response)
-      : family_(family), views_(views), response_(response) {
-    for (const MarkedView& view : views.views) signals_.emplace_back(*view.frame, response);
+  TagColours(const std::string& family, const Views& views, const Shape& shape,
+             const std::vector<Solid>& solids, const ResponseCurve& response)
+      : family_(family), views_(views), solids_(solids) {
+    for (std::size_t v = 0; v < views.views.size(); ++v) {
+      signals_.emplace_back(*views.views[v].frame, response);
+      poses_.push_back(adjusted_pose(views.views[v], shape.cameras_off[v]));
+    }
   }
 
   Ratios of(const FlatTag& flat) const {
@@ -134,7 +138,7 @@ class TagColours {
 
  private:
   glm::dvec2 pixel(std::size_t view, const FlatTag& flat, const glm::dvec2& at) const {
-    const auto& pose = views_.views[view].pose.pose;
+    const tracking::CameraFromWorld& pose = poses_[view];
     return projected(views_.lens, pose.rotation * in_world(flat, at.x, at.y) + pose.translation);
   }
 
@@ -146,9 +150,10 @@ class TagColours {
     const double middle = 0.5 * cells.total;
     const glm::dvec2 down = px(middle + 0.5, middle) - px(middle - 0.5, middle);
     const glm::dvec2 right = px(middle, middle + 0.5) - px(middle, middle - 0.5);
-    const double narrowest = std::abs(down.x * right.y - down.y * right.x) /
-                             std::max(glm::length(down), glm::length(right));
-    if (!(narrowest >= least_cell_px)) return;
+    // Below 0 where the tag faces away.
+    const double narrowest =
+        (right.x * down.y - right.y * down.x) / std::max(glm::length(down), glm::length(right));
+    if (!(narrowest >= least_cell_px) || is_hidden_in(v, flat, cells)) return;
     Values beside, paper, print;
     const auto add = [&](const glm::dvec2& at, Values& values) {
       if (const auto signal = signals_[v].at(at)) values.push_back(*signal);
@@ -170,10 +175,24 @@ class TagColours {
     if (!print.empty()) ratios.print.push_back(median_of(print) / ground);
   }
 
+  bool is_hidden_in(std::size_t view, const FlatTag& flat, const tracking::TagCells& cells) const {
+    const glm::dvec3 eye = -(glm::transpose(poses_[view].rotation) * poses_[view].translation);
+    const double end = cells.total;
+    for (const auto& [row, column] :
+         {std::pair{0.0, 0.0}, {0.0, end}, {end, 0.0}, {end, end}, {end / 2, end / 2}}) {
+      const glm::dvec2 at = in_tag(flat, cells, row, column);
+      // The map of tags may have a corner below what the tag lies on.
+      const glm::dvec3 above = 1e-3 * glm::dvec3(flat.tag->world_from_tag[2]);
+      if (is_hidden(solids_, eye, in_world(flat, at.x, at.y) + above)) return true;
+    }
+    return false;
+  }
+
   std::string family_;
   const Views& views_;
-  ResponseCurve response_;
+  const std::vector<Solid>& solids_;
   std::vector<Signals> signals_;
+  std::vector<tracking::CameraFromWorld> poses_;
 };
 
 }  // namespace
@@ -189,9 +208,10 @@ std::vector<Solid> tag_solids(const std::string& family, const Layout& layout, c
 
 std::map<std::string, Colour> tag_colours(const std::string& family, const Layout& layout,
                                           const Parts& parts, const Views& views,
+                                          const Shape& shape, const std::vector<Solid>& solids,
                                           const ResponseCurve& response,
                                           const std::map<std::string, Colour>& surfaces) {
-  const TagColours all(family, views, response);
+  const TagColours all(family, views, shape, solids, response);
   std::map<std::string, Colour> colours;
   const auto add = [&](const FlatTag& flat, const std::string& ground) {
     const auto surface = surfaces.find(ground);

@@ -21,9 +21,10 @@ std::vector<Solid> tag_solids(const std::string& family, const Layout& layout, c
 // Returns the colours of papers and prints, from what the plates have in their cells over what they
 // have beside the tag, where the light is the same, times the albedo of what the tag lies on.
 // Cells that are less than 3 px wide are too blurred to show it; tags without others are not
-// listed.
+// listed, nor are tags that face away or that `solids`, the model without tags, hide.
 std::map<std::string, Colour> tag_colours(const std::string& family, const Layout& layout,
                                           const Parts& parts, const Views& views,
+                                          const Shape& shape, const std::vector<Solid>& solids,
                                           const ResponseCurve& response,
                                           const std::map<std::string, Colour>& surfaces);
 

@@ -55,9 +55,16 @@ Views find_views(calibrate::PictureSource& source, const ObserverCalibration& ca
        picture = source.next()) {
     if (first.empty()) first = picture->name;
     last = picture->name;
+    const MarkedPicture* first_of_it = nullptr;
     for (std::size_t i = 0; i < parts.pictures.size(); ++i) {
       const MarkedPicture& marked = parts.pictures[i];
       if (!is_named(picture->name, marked.name) || !views.views[i].name.empty()) continue;
+      if (first_of_it)
+        throw Error(
+            fmt::format("{}: \"{}\" and \"{}\" are the same picture; put all its points into one "
+                        "[[picture]]",
+                        parts.file.string(), first_of_it->name, marked.name));
+      first_of_it = &marked;
       insist_on_size(*picture->frame, camera.intrinsics, marked);
       views.views[i] = {
           marked.name, marked.marks,

@@ -88,6 +88,31 @@ TEST(ModelEdges, LeadFurtherThanMarks) {
   EXPECT_LT(by_edges, 0.25 * by_marks);
 }
 
+// A wall that stands at the border of an outlined table cuts it or not, from step to step.
+TEST(ModelEdges, OfAnOutlineThatAWallMayCutAreLeftOut) {
+  Drawn drawn(5);
+  drawn.scene.points["table a"] = {-0.6, -0.4, 0};
+  drawn.scene.points["table b"] = {0.6, -0.4, 0};
+  drawn.scene.points["table c"] = {0.6, 0.6, 0};
+  drawn.scene.points["table d"] = {-0.6, 0.6, 0};
+  for (const auto& outline : {std::vector<std::string>{"table a", "table b", "table c", "table d"},
+                              {"table c", "table d", "table a", "table b"}}) {
+    drawn.parts.planes.resize(1);
+    drawn.parts.planes[0].outline = outline;
+    drawn.parts.planes.push_back(
+        {.name = "wall", .upright_on = "table", .foot = {"table c", "table d"}});
+    std::mt19937 random(5);
+    drawn.parts.pictures = drawn.scene.pictures(random);
+    drawn.views = drawn.scene.views(drawn.parts, random);
+    for (std::size_t i = 0; i < drawn.views.views.size(); ++i)
+      drawn.views.views[i].frame = picture_of(drawn.scene, i, random);
+    const model::Start start = model::first_guess(drawn.parts, drawn.views, drawn.scene.tags);
+    EXPECT_LT(
+        worst_corner(model::adjust_to_edges(drawn.parts, drawn.views, start, ResponseCurve{})),
+        1e-3);
+  }
+}
+
 TEST(ModelEdges, AreThoseThatTheModelDoesNotHide) {
   const Drawn drawn(4);
   model::Start start = drawn.start;

@@ -203,6 +203,41 @@ TEST_F(ModelCommand, TakesANameThatTheSetDoesNotHave) {
   EXPECT_NE(std::ranges::find(set.objects, "real 2", &set::Object::name), set.objects.end());
 }
 
+TEST_F(ModelCommand, ReplacesNothingThatItIsMadeOf) {
+  write_parts(marks() + parts_text);
+  const std::string before = session::read_file(options_.parts_file);
+  options_.out = options_.parts_file;
+  EXPECT_THAT(refusal(), HasSubstr("real.toml: the model is a .glb file"));
+  EXPECT_EQ(session::read_file(options_.parts_file), before);
+  options_.out = folder_ / "demo/phantom.glb";
+  write_parts(marks() + parts_text +
+              "[[scan]]\nname = \"s\"\nfile = \"phantom.glb\"\n[scan.points]\n"
+              "t1 = [0, 0, 0]\nt2 = [1, 0, 0]\nt3 = [0, 1, 0]\n");
+  EXPECT_THAT(refusal(), HasSubstr("phantom.glb: is a scan of the model"));
+  options_.out = folder_ / "demo/virtual.glb";
+  write_parts(marks() + parts_text);
+  EXPECT_THAT(refusal(), HasSubstr("which is not a phantom"));
+}
+
+TEST_F(ModelCommand, OnePictureHasOneTable) {
+  write_parts(marks() +
+              "[[picture]]\nfile = \"observer frame 0\"\n[picture.points]\nq = [10, 10]\n" +
+              parts_text);
+  EXPECT_THAT(refusal(), HasSubstr("are the same picture"));
+}
+
+// A set file that cannot be changed is found out before anything is written.
+TEST_F(ModelCommand, WritesNoModelForASetThatCannotBeChanged) {
+  std::string text = session::read_file(*options_.set_file);
+  const std::size_t first = text.find("[[object]]");
+  std::ofstream(*options_.set_file)
+      << "object = [{name = \"x\", file = \"phantom.glb\", presence = \"phantom\"}]\n"
+      << text.substr(0, first);
+  write_parts(marks() + parts_text);
+  EXPECT_THAT(refusal(), HasSubstr("object"));
+  EXPECT_FALSE(fs::exists(folder_ / "demo/real.glb"));
+}
+
 // A green line goes along the cube's upper front edge, and a red cross is on each mark.
 TEST_F(ModelCommand, DrawsTheModelOverThePictures) {
   options_.write = false;
@@ -211,7 +246,8 @@ TEST_F(ModelCommand, DrawsTheModelOverThePictures) {
   std::ostringstream out;
   model::make_model(options_, out);
   for (const int frame : frames) {
-    const Plate over = output::read_png(*options_.overlay / fmt::format("frame_{}.png", frame));
+    const Plate over =
+        output::read_png(*options_.overlay / fmt::format("frame_{}.model.png", frame));
     int green = 0, red = 0;
     for (std::size_t i = 0; i + 2 < over.samples.size(); i += 3) {
       const int r = over.samples[i], g = over.samples[i + 1], b = over.samples[i + 2];

@@ -128,6 +128,24 @@ TEST(ModelParts, MistakesAreNamedWithTheirLine) {
       {"[[picture]]\nfile = \"0000.png\"\n[[plane]]\nname = \"t\"\ntags = [0]\n",
        "has a table already"},
       {"[[picture]]\nfile = \"2\"\n[picture.points]\na = [1]\n", "picture.points.a"},
+      {"[[picture]]\nfile = \"2\"\n[picture.points]\n\"\" = [1, 1]\n", "has an empty name"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\npoints = [\"\"]\n", "plane.points: has an empty name"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\nedges = [[\"a\", \"\"]]\n",
+       "plane.edges: has an empty name"},
+      {"[[plane]]\nname = \"t\"\ntags = [0, 0]\n", "tag 0 is listed twice"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\noutline = [\"a\", \"b\", \"c\"]\nedges = [[\"a\", "
+       "\"b\"]]\n",
+       "plane.edges: conflicts with outline"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\npoints = [\"a\"]\n[[cylinder]]\nname = \"can\"\non = "
+       "\"t\"\ntop = [\"a\", \"b\", \"c\"]\n",
+       "point \"a\" is on a rim of cylinder \"can\""},
+      {"[[box]]\nname = \"b\"\ntop = [\"a\", \"b\", \"\", \"\"]\ntags = [3]\n",
+       "mark three, or none"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\n[[plane]]\nname = \"n\"\ntags = [1]\n[[plane]]\nname "
+       "= \"e\"\ntags = [2]\n"
+       "[[plane]]\nname = \"s\"\ntags = [3]\n[[room]]\nname = \"r\"\nfloor = \"t\"\nwalls = "
+       "[\"t\", \"n\", \"e\", \"s\"]\nheight_m = 2\n",
+       "room.walls: has a plane twice, or the floor"},
   };
   for (const auto& mistake : mistakes)
     EXPECT_THAT(refusal_of(mistake.parts), HasSubstr(mistake.words)) << mistake.parts;

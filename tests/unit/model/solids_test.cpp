@@ -100,6 +100,34 @@ TEST(ModelSolids, AWallEndsAtItsFloorAndTheFloorAtTheWall) {
   EXPECT_LT(glm::distance(model::normal_of(solids[1].faces[0]), glm::dvec3(0, -1, 0)), 1e-12);
 }
 
+// A low screen in the middle of a table ends nothing of it.
+TEST(ModelSolids, AScreenLeavesWhatIsBehindIt) {
+  Model m;
+  const std::size_t table = m.add_plane("table", {{0, 0, 0}, {0, 0, 1}});
+  m.add_plane("screen", {{0, 1, 0}, {0, -1, 0}}, table);
+  m.parts.planes[0].points = {"near", "far"};
+  m.parts.planes[1].points = {"on screen"};
+  m.layout.places = {{"near", {}},
+                     {"far", {model::Place::Kind::free, 1, 0}},
+                     {"on screen", {model::Place::Kind::free, 2, 0}}};
+  m.shape.points = {{0, 0, 0}, {0, 2, 0}, {0, 1, 0.2}};
+  const auto solids = model::solids_of(m.parts, m.layout, m.shape);
+  double farthest = -1;
+  for (const glm::dvec3& p : solids[0].faces[0].outline) farthest = std::max(farthest, p.y);
+  EXPECT_NEAR(farthest, 3, 1e-12);  // and its margin
+}
+
+TEST(ModelSolids, WallsThatDoNotGoAroundAreRefused) {
+  Model m;
+  const std::size_t floor = m.add_plane("floor", {{0, 0, 0}, {0, 0, 1}});
+  m.add_plane("n", {{0, 2, 0}, {0, -1, 0}}, floor);
+  m.add_plane("e", {{3, 0, 0}, {-1, 0, 0}}, floor);
+  m.add_plane("ne", {{2.5, 1.5, 0}, glm::normalize(glm::dvec3(-1, -1, 0))}, floor);
+  m.add_plane("w", {{-3, 0, 0}, {1, 0, 0}}, floor);
+  m.parts.rooms.push_back({"room", "floor", {"n", "e", "ne", "w"}, 2.5});
+  EXPECT_THROW(model::solids_of(m.parts, m.layout, m.shape), Error);
+}
+
 TEST(ModelSolids, ARoomIsClosedAndLooksInwards) {
   for (const bool reversed : {false, true}) {
     Model m;
