@@ -16,6 +16,8 @@ constexpr double longest_px = 40, shortest_px = 12;
 constexpr double corner_px = 4;
 // How far the areas beside an edge must be plain.
 constexpr double depth_px = 4;
+// Where the areas beside an edge are not plain, it is found elsewhere: over its contrast.
+constexpr double most_noise = 0.1;
 // Returns where a pinhole shows a point of the camera's axes; nothing behind it.
 std::optional<glm::dvec2> on_pinhole(const PinholeIntrinsics& lens, const glm::dvec3& p) {
   if (!(p.z > 0)) return {};
@@ -119,7 +121,7 @@ class Finder {
       const auto fit = tracking::fit_edge(luminance, views_.lens, guess, &why);
       if (fit && (!best || fit->noise / fit->contrast < best->noise / best->contrast)) best = fit;
     }
-    if (!best) return false;
+    if (!best || best->noise > most_noise * best->contrast) return false;
     piece.a = best->a;
     piece.b = best->b;
     piece.variance_px2 = std::max(best->var_a, best->var_b);

@@ -369,14 +369,26 @@ std::size_t rim_marks(const Views& views, const Layout& layout) {
       }));
 }
 
+// Returns what a mark that is far off may be owed to: in a box, the order of the corners as well.
+std::string likely_faults(const Parts& parts, const std::string& point) {
+  for (const BoxPart& box : parts.boxes)
+    for (const auto* corners : {&box.top, &box.bottom})
+      if (std::ranges::find(*corners, point) != corners->end())
+        return fmt::format(
+            "check that top and bottom of \"{}\" list its corners in order around, that the same "
+            "corner is meant in all pictures, and this mark",
+            box.name);
+  return "check this mark, that the same point is meant in all pictures, and that it belongs to "
+         "the right part";
+}
+
 void insist_on_marks(const Parts& parts, const std::vector<MarkResidual>& marks) {
   const auto worst = std::ranges::max_element(marks, {}, &MarkResidual::off_px);
   if (worst == marks.end() || worst->off_px <= most_off * parts.mark_px) return;
-  throw Error(fmt::format(
-      "{}: point \"{}\" in {} is {:.1f} px from where the other marks put it; check this mark, "
-      "whether "
-      "the same corner is meant in all pictures, and whether it belongs to the right part",
-      parts.file.string(), worst->point, worst->picture, worst->off_px));
+  throw Error(
+      fmt::format("{}: point \"{}\" in {} is {:.1f} px from where the other marks put it; {}",
+                  parts.file.string(), worst->point, worst->picture, worst->off_px,
+                  likely_faults(parts, worst->point)));
 }
 
 // Returns how far the corners of each face lie along its normal as it is now.

@@ -3,7 +3,9 @@
 #include <fmt/ostream.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "daemon/calibrate/known_camera.hpp"
@@ -22,6 +24,7 @@
 #include "daemon/pipeline/take.hpp"
 #include "daemon/set/file_edit.hpp"
 #include "daemon/set/load.hpp"
+#include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 #include "drivers/keys/value.hpp"
 #include "drivers/session/draft.hpp"
@@ -44,9 +47,34 @@ std::filesystem::path file_of(const ModelOptions& options) {
   return options.out.value_or(std::filesystem::path(options.parts_file).replace_extension(".glb"));
 }
 
+// The three marks that are farthest off: where to look again.
+void print_worst_marks(std::vector<MarkResidual> marks, std::ostream& out) {
+  constexpr std::size_t most = 3;
+  std::ranges::sort(marks, std::greater(), &MarkResidual::off_px);
+  marks.resize(std::min(marks.size(), most));
+  std::string list;
+  for (const MarkResidual& mark : marks)
+    list += fmt::format("{}\"{}\" in {} by {:.1f} px", list.empty() ? "" : ", ", mark.point,
+                        mark.picture, mark.off_px);
+  if (!list.empty()) fmt::print(out, "farthest off: {}\n", list);
+}
+
+void print_unused(const Parts& parts, const Layout& layout, std::ostream& out) {
+  std::vector<std::string> used;
+  for (const auto& [name, place] : layout.places) used.push_back(name);
+  for (const std::string& point : layout.unused_points) {
+    const std::string meant = set::nearest(point, used);
+    fmt::print(out, "warning: {}: point \"{}\" belongs to no part and is ignored{}\n",
+               parts.file.string(), point, meant.empty() ? "" : "; did you mean " + meant + "?");
+  }
+}
+
 void print_fit(const Parts& parts, const Layout& layout, const Fit& fit, std::ostream& out) {
-  fmt::print(out, "{} marks in {} pictures, rms {:.2f} px\n", fit.marks.size(),
-             parts.pictures.size(), fit.rms_px);
+  std::set<std::string> pictures;
+  for (const MarkResidual& mark : fit.marks) pictures.insert(mark.picture);
+  fmt::print(out, "{} marks in {} pictures, rms {:.2f} px\n", fit.marks.size(), pictures.size(),
+             fit.rms_px);
+  print_worst_marks(fit.marks, out);
   if (!fit.edges_off_px.empty()) {
     std::vector<double> off = fit.edges_off_px;
     std::ranges::sort(off);
@@ -57,12 +85,11 @@ void print_fit(const Parts& parts, const Layout& layout, const Fit& fit, std::os
   }
   if (fit.mark_factor > 1.5)
     fmt::print(out,
-               "warning: the marks disagree by {:.1f} times their accuracy of {:g} px; check those "
-               "that are farthest "
-               "off, or give the accuracy under [marks]\n",
+               "warning: the marks disagree by {:.1f} times their accuracy of {:g} px; look at "
+               "those that are farthest "
+               "off again, or give their accuracy: [marks] with accuracy_px\n",
                fit.mark_factor, parts.mark_px);
-  for (const std::string& point : layout.unused_points)
-    fmt::print(out, "point \"{}\" belongs to no part and is ignored\n", point);
+  print_unused(parts, layout, out);
   for (std::size_t i = 0; i < parts.boxes.size(); ++i) {
     glm::dvec3 mm = 1000.0 * fit.shape.boxes[i].size;
     if (layout.is_clockwise[i]) std::swap(mm.x, mm.y);  // length and width as they are marked
@@ -110,9 +137,12 @@ std::map<std::string, Colour> measured(const ModelOptions& options,
 }
 
 void print_colour(const std::string& name, const Colour& colour, std::ostream& out) {
-  fmt::print(out, "  {}: albedo {:.3f} {:.3f} {:.3f} (accurate to {:.4f} {:.4f} {:.4f})\n", name,
-             colour.albedo.r, colour.albedo.g, colour.albedo.b, colour.sigma.r, colour.sigma.g,
-             colour.sigma.b);
+  fmt::print(out, "  {}: colour (albedo) {:.3f} {:.3f} {:.3f}", name, colour.albedo.r,
+             colour.albedo.g, colour.albedo.b);
+  if (colour.sigma != glm::dvec3(0))
+    fmt::print(out, ", accurate to {:.4f} {:.4f} {:.4f} in this light", colour.sigma.r,
+               colour.sigma.g, colour.sigma.b);
+  out << '\n';
   if (std::max({colour.albedo.r, colour.albedo.g, colour.albedo.b}) > 1)
     fmt::print(out,
                "warning: {} reflects more light than falls on it: the light and the film camera "
@@ -262,7 +292,8 @@ void make_model(const ModelOptions& options, std::ostream& out) {
     fmt::print(out, "written to {}; previous version: {}\n", options.set_file->string(),
                old.string());
   } else if (options.write) {
-    fmt::print(out, "{}: has the model already\n", options.set_file->string());
+    fmt::print(out, "{}: lists this model already and stays as it is\n",
+               options.set_file->string());
   }
 }
 

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "daemon/set/read_tables.hpp"
+#include "drivers/error.hpp"
 
 namespace previz {
 
@@ -436,6 +437,17 @@ std::vector<Part> values_of(const Drafts<Part>& drafts) {
   return parts;
 }
 
+// Where [[picture]] is forgotten, its points are a second table of the picture before.
+toml::table parsed(const std::string& text, const std::string& file, Problems& problems) {
+  try {
+    return set::parse_toml(text, file, problems);
+  } catch (const Error& error) {
+    const std::string what = error.what();
+    const bool is_second = what.find("'picture.points'") != std::string::npos;
+    throw Error(what + (is_second ? "; is [[picture]] with its file missing above it?" : ""));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> points_on(const PlanePart& part) {
@@ -455,8 +467,7 @@ Parts parse_parts(const std::string& text, const std::filesystem::path& file) {
     Draft scratch;
     return set::home_among(sections(scratch), key);
   };
-  set::read_tables(set::parse_toml(text, file.string(), problems), sections(draft), home_of,
-                   problems);
+  set::read_tables(parsed(text, file.string(), problems), sections(draft), home_of, problems);
   problems.throw_if_any();
   Checker(draft, problems).check();
   problems.throw_if_any();

@@ -86,13 +86,6 @@ std::vector<Candidate> apart(const std::vector<Candidate>& all) {
   return result;
 }
 
-// "frame 7" of "takes/12A/observer frame 7", "0012.png" of "walk/0012.png".
-std::string short_name(const std::string& name) {
-  const std::size_t frame = name.rfind(" frame ");
-  if (frame != std::string::npos) return name.substr(frame + 1);
-  return std::filesystem::path(name).filename().string();
-}
-
 std::string file_of(const std::string& name) {
   std::string file = name.ends_with(".png") ? name : name + ".png";
   std::ranges::replace(file, ' ', '_');

@@ -13,10 +13,23 @@
 namespace previz::model {
 namespace {
 
-// A session's picture is "takes/12A/observer frame 7".
+// A session's picture is "takes/12A/observer frame 7"; --pictures calls its file frame_7.png.
 bool is_named(const std::string& name, const std::string& wanted) {
-  return name == wanted || name.ends_with('/' + wanted) || name.ends_with(' ' + wanted);
+  std::string of_file = wanted.ends_with(".png") ? wanted.substr(0, wanted.size() - 4) : wanted;
+  std::ranges::replace(of_file, '_', ' ');
+  return name == wanted || name.ends_with('/' + wanted) || name.ends_with(' ' + wanted) ||
+         name.ends_with(' ' + of_file);
 }
+
+}  // namespace
+
+std::string short_name(const std::string& name) {
+  const std::size_t frame = name.rfind(" frame ");
+  if (frame != std::string::npos) return name.substr(frame + 1);
+  return std::filesystem::path(name).filename().string();
+}
+
+namespace {
 
 void insist_on_size(const Frame& frame, const PinholeIntrinsics& lens,
                     const MarkedPicture& picture) {
@@ -53,8 +66,8 @@ Views find_views(calibrate::PictureSource& source, const ObserverCalibration& ca
   std::string first, last;
   for (auto picture = source.next(); picture && found < views.views.size();
        picture = source.next()) {
-    if (first.empty()) first = picture->name;
-    last = picture->name;
+    if (first.empty()) first = short_name(picture->name);
+    last = short_name(picture->name);
     const MarkedPicture* first_of_it = nullptr;
     for (std::size_t i = 0; i < parts.pictures.size(); ++i) {
       const MarkedPicture& marked = parts.pictures[i];

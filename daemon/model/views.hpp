@@ -34,8 +34,13 @@ struct Ray {
   glm::dvec3 origin{0}, direction{0, 0, 1};
 };
 
+// Returns how a file of parts names a picture of a source: "frame 7" of "takes/12A/observer frame
+// 7", "0012.png" of "walk/0012.png".
+std::string short_name(const std::string& name);
+
 // Looks for the marked pictures, and for the set's tags in each of them. A picture is named as the
-// source names it, or by the end of that name: "0000.png" of a folder, "frame 7" of a session.
+// source names it, or by the end of that name: "0000.png" of a folder, "frame 7" or
+// "frame_7.png" of a session.
 // Throws previz::Error naming a picture that is not there, that is not of the lens's size, in which
 // a mark lies outside, or that shows no tag of the set.
 Views find_views(calibrate::PictureSource& source, const ObserverCalibration& camera,

@@ -140,7 +140,7 @@ TEST_F(ModelCommand, MakesAPhantomAndAddsItToTheSet) {
   // Once more, nothing is added twice.
   std::ostringstream again;
   model::make_model(options_, again);
-  EXPECT_THAT(again.str(), HasSubstr("has the model already"));
+  EXPECT_THAT(again.str(), HasSubstr("lists this model already"));
   EXPECT_EQ(set::load_set(*options_.set_file).objects.size(), set.objects.size());
 }
 
@@ -219,6 +219,34 @@ TEST_F(ModelCommand, ReplacesNothingThatItIsMadeOf) {
   EXPECT_THAT(refusal(), HasSubstr("which is not a phantom"));
 }
 
+TEST_F(ModelCommand, SaysWhatABeginnerMeant) {
+  options_.write = false;
+  std::ostringstream out;
+  // A name that is misspelled in a picture.
+  write_parts(marks() + "t33 = [100, 100]\n" + parts_text);
+  model::make_model(options_, out);
+  EXPECT_THAT(
+      out.str(),
+      HasSubstr("real.toml: point \"t33\" belongs to no part and is ignored; did you mean t3?"));
+  EXPECT_THAT(out.str(), HasSubstr("farthest off: \"t"));
+  // The name of the picture's file.
+  std::string text = marks();
+  for (std::size_t at = text.find("frame "); at != std::string::npos; at = text.find("frame "))
+    text[at + 5] = '_';
+  write_parts(text + parts_text);
+  model::make_model(options_, out);
+  // Corners in another order than around.
+  std::string crossed = parts_text;
+  crossed.replace(crossed.find("\"t3\", \"t4\""), 10, "\"t4\", \"t3\"");
+  write_parts(marks() + crossed);
+  EXPECT_THAT(refusal(), HasSubstr("list"));
+  // A header that is forgotten.
+  std::string lost = marks();
+  lost.erase(lost.find("[[picture]]", 5), 11 + std::string("\nfile = \"frame 2\"").size());
+  write_parts(lost + parts_text);
+  EXPECT_THAT(refusal(), HasSubstr("is [[picture]] with its file missing above it?"));
+}
+
 TEST_F(ModelCommand, OnePictureHasOneTable) {
   write_parts(marks() +
               "[[picture]]\nfile = \"observer frame 0\"\n[picture.points]\nq = [10, 10]\n" +
@@ -289,8 +317,9 @@ TEST_F(ModelCommand, NothingIsWrittenWhereSomethingIsWrong) {
     EXPECT_FALSE(fs::exists(folder_ / "demo/demo.toml.1.old"));
   };
   refused("[[picture]]\nfile = \"frame 99\"\n" + parts_text, "no picture has a point \"t1\"");
-  refused("[[picture]]\nfile = \"frame 99\"\n[[plane]]\nname = \"t\"\ntags = [0]\n",
-          "there is no picture \"frame 99\"; the pictures are named like");
+  refused(
+      "[[picture]]\nfile = \"frame 99\"\n[[plane]]\nname = \"t\"\ntags = [0]\n",
+      "there is no picture \"frame 99\"; the pictures are named like \"frame 0\" and \"frame 5\"");
   refused(
       "[[picture]]\nfile = \"frame 0\"\n[picture.points]\na = [5000, 10]\n[[plane]]\nname = "
       "\"t\"\ntags = [0]\n",

@@ -98,14 +98,18 @@ TEST_F(RigAsAGraphicsCard, BringsNoPictureDownThatIsOnlyShown) {
   const auto stayed = [](const nlohmann::json& metrics) {
     return metrics.value("/counts/stayed in the card's memory"_json_pointer, 0);
   };
+  const auto begin = std::chrono::steady_clock::now();
   run([&] {
     until_metrics("pictures stay on the card",
                   [&](const nlohmann::json& metrics) { return stayed(metrics) > 20; });
   });
   EXPECT_GT(screenfuls, 10);
-  const std::uint64_t pictures = metrics_.counts.at("stayed in the card's memory");
+  // The file's picture each second, about as much again in figures, and the beginning and the end:
+  // half of the twenty and more that stayed, if they took three seconds. A slow machine takes more.
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
   constexpr std::uint64_t picture_bytes = 6 * 48 * 36;  // of the small take's, as a plate
-  EXPECT_LT(metrics_.devices.at("graphics").at("bytes down"), pictures / 2 * picture_bytes);
+  EXPECT_LT(metrics_.devices.at("graphics").at("bytes down"),
+            std::uint64_t(2 * taken.count() + 5) * picture_bytes);
   EXPECT_TRUE(std::filesystem::exists(directory_ / "live/picture.png"));
 }
 
