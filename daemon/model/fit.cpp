@@ -6,12 +6,12 @@
 #include <cmath>
 #include <functional>
 #include <glm/geometric.hpp>
-#include <glm/gtc/matrix_transform.hpp>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <utility>
 
 #include "daemon/model/solids.hpp"
+#include "daemon/model/unknowns.hpp"
 #include "daemon/tracking/least_squares.hpp"
 #include "daemon/tracking/pose_starts.hpp"
 #include "drivers/error.hpp"
@@ -26,82 +26,12 @@ constexpr double step = 1e-6;
 // The share of the information that its least known direction must have to be known at all.
 constexpr double least_information = 1e-12;
 
-// A number that is adjusted, by what it does to the shape.
-struct Unknown {
-  std::string part;  // for messages
-  std::function<void(Shape&, double)> move;
-};
-
 // Residuals, in standard deviations, of a settled shape.
 using Residuals = std::vector<double>;
 struct Observation {
   std::size_t count = 0;
   std::function<void(const Shape&, double*)> residuals;
 };
-
-glm::dvec3 turned(const glm::dvec3& v, const glm::dvec3& by) {
-  return tracking::rotation_by(by) * v;
-}
-
-std::vector<Unknown> unknowns_of(const Parts& parts, const Start& start) {
-  std::vector<Unknown> unknowns;
-  const Shape& shape = start.shape;
-  for (std::size_t i = 0; i < shape.planes.size(); ++i) {
-    const std::string& name = parts.planes[i].name;
-    unknowns.push_back(
-        {name, [i](Shape& s, double by) { s.planes[i].at += by * s.planes[i].normal; }});
-    const auto on = start.layout.plane_on[i];
-    // An upright plane turns about the normal of what it stands on.
-    if (on) {
-      unknowns.push_back({name, [i, on = *on](Shape& s, double by) {
-                            s.planes[i].normal =
-                                turned(s.planes[i].normal, by * s.planes[on].normal);
-                          }});
-      continue;
-    }
-    for (const std::size_t k : {0, 1})
-      unknowns.push_back({name, [i, k](Shape& s, double by) {
-                            glm::dvec3& normal = s.planes[i].normal;
-                            normal = turned(normal, by * across(normal)[k]);
-                          }});
-  }
-  for (std::size_t i = 0; i < shape.boxes.size(); ++i) {
-    const std::string& name = parts.boxes[i].name;
-    const bool stands = start.layout.box_on[i].has_value();
-    for (glm::length_t k = 0; k < (stands ? 2 : 3); ++k)
-      unknowns.push_back(
-          {name, [i, k](Shape& s, double by) { s.boxes[i].foot += by * s.boxes[i].axes[k]; }});
-    for (glm::length_t k = stands ? 2 : 0; k < 3; ++k)
-      unknowns.push_back({name, [i, k](Shape& s, double by) {
-                            glm::dmat3& axes = s.boxes[i].axes;
-                            axes =
-                                tracking::orthonormal(tracking::rotation_by(by * axes[k]) * axes);
-                          }});
-    const auto known = known_sizes(parts.boxes[i], start.layout.is_clockwise[i]);
-    for (glm::length_t k = 0; k < 3; ++k)
-      if (!known[std::size_t(k)])
-        unknowns.push_back({name, [i, k](Shape& s, double by) { s.boxes[i].size[k] += by; }});
-  }
-  for (std::size_t i = 0; i < shape.cylinders.size(); ++i) {
-    const CylinderPart& part = parts.cylinders[i];
-    for (const std::size_t k : {0, 1})
-      unknowns.push_back({part.name, [i, k](Shape& s, double by) {
-                            s.cylinders[i].foot += by * across(s.cylinders[i].axis)[k];
-                          }});
-    if (!part.diameter_m)
-      unknowns.push_back({part.name, [i](Shape& s, double by) { s.cylinders[i].radius += by; }});
-    if (!part.height_m)
-      unknowns.push_back({part.name, [i](Shape& s, double by) { s.cylinders[i].height += by; }});
-  }
-  for (std::size_t i = 0; i < shape.points.size(); ++i)
-    for (glm::length_t k = 0; k < 3; ++k)
-      unknowns.push_back(
-          {start.layout.free_points[i], [i, k](Shape& s, double by) { s.points[i][k] += by; }});
-  for (std::size_t i = 0; i < shape.cameras_off.size(); ++i)
-    for (std::size_t k = 0; k < 6; ++k)
-      unknowns.push_back({"camera", [i, k](Shape& s, double by) { s.cameras_off[i][k] += by; }});
-  return unknowns;
-}
 
 glm::dvec3 place_of(const Shape& s, const Place& place, const Ray& ray) {
   using enum Place::Kind;

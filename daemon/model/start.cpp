@@ -253,18 +253,11 @@ class Starter {
     return places;
   }
 
-  void start_box_by_corners(const BoxPart& part,
-                            const std::array<std::optional<glm::dvec3>, 4>& above,
-                            const std::array<std::optional<glm::dvec3>, 4>& below) {
-    Box& box = shape_.boxes.back();
-    const std::optional<std::size_t> on = layout_.box_on.back();
-    Points top, bottom;
-    for (std::size_t i = 0; i < 4; ++i) {
-      if (above[i]) top.push_back(*above[i]);
-      if (below[i]) bottom.push_back(*below[i]);
-    }
-    const glm::dvec3 up = on ? shape_.planes[*on].normal : up_of(part, top, bottom);
-    const glm::dvec3 ground = on ? shape_.planes[*on].at : mean_of(bottom.empty() ? top : bottom);
+  // Returns the corners as they are seen from above, on the ground; one that is not marked makes a
+  // parallelogram of the others.
+  static std::array<glm::dvec3, 4> footprint(const std::array<std::optional<glm::dvec3>, 4>& above,
+                                             const std::array<std::optional<glm::dvec3>, 4>& below,
+                                             const glm::dvec3& ground, const glm::dvec3& up) {
     std::array<glm::dvec3, 4> feet{};
     std::optional<std::size_t> missing;
     for (std::size_t i = 0; i < 4; ++i) {
@@ -278,6 +271,22 @@ class Starter {
       const std::size_t m = *missing;
       feet[m] = feet[(m + 1) % 4] + feet[(m + 3) % 4] - feet[(m + 2) % 4];
     }
+    return feet;
+  }
+
+  void start_box_by_corners(const BoxPart& part,
+                            const std::array<std::optional<glm::dvec3>, 4>& above,
+                            const std::array<std::optional<glm::dvec3>, 4>& below) {
+    Box& box = shape_.boxes.back();
+    const std::optional<std::size_t> on = layout_.box_on.back();
+    Points top, bottom;
+    for (std::size_t i = 0; i < 4; ++i) {
+      if (above[i]) top.push_back(*above[i]);
+      if (below[i]) bottom.push_back(*below[i]);
+    }
+    const glm::dvec3 up = on ? shape_.planes[*on].normal : up_of(part, top, bottom);
+    const glm::dvec3 ground = on ? shape_.planes[*on].at : mean_of(bottom.empty() ? top : bottom);
+    std::array<glm::dvec3, 4> feet = footprint(above, below, ground, up);
     const bool is_clockwise = glm::dot(glm::cross(feet[2] - feet[0], feet[3] - feet[1]), up) < 0;
     if (is_clockwise) std::swap(feet[1], feet[3]);
     layout_.is_clockwise.back() = is_clockwise;
