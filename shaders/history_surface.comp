@@ -61,7 +61,7 @@ uint mirror_of(uint instance, uint way) {
   return 1u + hash_bits(instance) % 7u + (hash_bits(way) % 8u << 3);
 }
 
-// What is kept of a pixel's own surface while a ray from it is followed over mirrors.
+// A pixel's own surface, as far as it is needed while a ray from it is followed over mirrors.
 struct OwnSurface {
   vec3 normal;
   uint instance;

@@ -13,66 +13,44 @@ namespace {
 constexpr int most_rounds = 6;
 // An albedo that changes by less, over itself, is the last.
 constexpr double settled_change = 2e-3;
-// What reflects less or more is not paint, and its light would be taken from a model that is wrong.
+// No paint reflects less or more; the round that guesses such an albedo has a wrong light or model.
 constexpr double least_albedo = 0.005, most_albedo = 0.98;
 
 // Adds a mesh in the world, of a matt material of its name.
-void add(scene::Mesh mesh, scene::Scene& scene) {
+void add(const NamedMesh& named, scene::Scene& scene) {
+  const ShadedMesh& from = named.mesh;
+  scene::Mesh mesh;
+  mesh.name = named.name;
+  mesh.positions = from.positions;
+  mesh.normals = from.normals;
+  for (std::size_t i = 0; i + 2 < from.indices.size(); i += 3)
+    mesh.triangles.emplace_back(from.indices[i], from.indices[i + 1], from.indices[i + 2]);
   scene::Material matt;
-  matt.name = mesh.name;
+  matt.name = named.name;
   matt.base_color = glm::vec3(0.5f);
   matt.specular = 0;
   const auto index = static_cast<std::uint32_t>(scene.meshes.size());
-  scene.instances.push_back({.name = mesh.name, .mesh = index, .material = index});
+  scene.instances.push_back({.name = named.name, .mesh = index, .material = index});
   scene.meshes.push_back(std::move(mesh));
   scene.materials.push_back(std::move(matt));
 }
 
-scene::Mesh scene_mesh_of(const PlacedScan& scan) {
-  scene::Mesh mesh;
-  mesh.name = scan.name;
-  mesh.positions = scan.mesh.positions;
-  mesh.normals = scan.mesh.normals;
-  for (std::size_t i = 0; i + 2 < scan.mesh.indices.size(); i += 3)
-    mesh.triangles.emplace_back(scan.mesh.indices[i], scan.mesh.indices[i + 1],
-                                scan.mesh.indices[i + 2]);
-  return mesh;
-}
-
-scene::Mesh scene_mesh_of(const Solid& solid) {
-  scene::Mesh mesh;
-  mesh.name = solid.name;
-  for (const Face& face : solid.faces) {
-    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-    for (const glm::dvec3& p : face.outline) {
-      mesh.positions.emplace_back(p);
-      mesh.normals.emplace_back(normal_of(face));
-    }
-    for (std::uint32_t i = 1; i + 1 < face.outline.size(); ++i)
-      mesh.triangles.emplace_back(first, first + i, first + i + 1);
-  }
-  return mesh;
-}
-
 // The set's lamps and the model.
-scene::Scene scene_of(const pipeline::Take& take, const std::vector<Solid>& solids,
-                      const std::vector<PlacedScan>& scans) {
+scene::Scene scene_of(const pipeline::Take& take, const std::vector<NamedMesh>& meshes) {
   set::Set lamps_only = take.set;
   lamps_only.objects.clear();
   lamps_only.surfaces.clear();
   scene::Scene scene = scene::load_scene(lamps_only);
-  for (const Solid& solid : solids) add(scene_mesh_of(solid), scene);
-  for (const PlacedScan& scan : scans) add(scene_mesh_of(scan), scene);
+  for (const NamedMesh& mesh : meshes) add(mesh, scene);
   return scene;
 }
 
 }  // namespace
 
 std::map<std::string, Colour> measure_colours(const pipeline::Take& take,
-                                              const std::vector<Solid>& solids,
-                                              const std::vector<PlacedScan>& scans,
+                                              const std::vector<NamedMesh>& meshes,
                                               const std::shared_ptr<render::Device>& device) {
-  scene::Scene scene = scene_of(take, solids, scans);
+  scene::Scene scene = scene_of(take, meshes);
   std::map<std::string, Colour> colours;
   for (int round = 0; round < most_rounds; ++round) {
     const calibrate::SurfacePixels seen = calibrate::probe_surfaces(take, scene, device, {});

@@ -7,8 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/model/scans.hpp"
-#include "daemon/model/solids.hpp"
+#include "daemon/model/scan_mesh.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/render/gpu.hpp"
 
@@ -20,14 +19,13 @@ struct Colour {
   std::size_t pixels = 0;  // that it was measured in
 };
 
-// Returns the colour of every solid and scan that enough pixels show, by its name. The model is
+// Returns the colour of every mesh that enough pixels show, by its name. The model is
 // rendered grey by the take's light, with all bounces, and each albedo is multiplied by what the
 // plates have over it, until it changes no more: the same comparison as `previzd calibrate
 // balance`, whose result, lighting.balance, is taken as right. Throws previz::Error if no frame of
 // the take is tracked and lit.
 std::map<std::string, Colour> measure_colours(const pipeline::Take& take,
-                                              const std::vector<Solid>& solids,
-                                              const std::vector<PlacedScan>& scans,
+                                              const std::vector<NamedMesh>& meshes,
                                               const std::shared_ptr<render::Device>& device);
 
 }  // namespace previz::model

@@ -14,10 +14,12 @@ namespace {
 constexpr double longest_px = 40, shortest_px = 12;
 // So much of an edge is left out at either end, where other edges meet it.
 constexpr double corner_px = 4;
-// How far the areas beside an edge must be plain.
+// The areas beside an edge must be plain so far.
 constexpr double depth_px = 4;
-// Where the areas beside an edge are not plain, it is found elsewhere: over its contrast.
+// An edge is found in a wrong place where the areas beside it are not plain: the largest residual
+// of a fit, rms over the contrast.
 constexpr double most_noise = 0.1;
+
 // Returns where a pinhole shows a point of the camera's axes; nothing behind it.
 std::optional<glm::dvec2> on_pinhole(const PinholeIntrinsics& lens, const glm::dvec3& p) {
   if (!(p.z > 0)) return {};
@@ -55,7 +57,7 @@ class Finder {
         solids_(solids),
         view_(view),
         pose_(pose),
-        eye_(-(glm::transpose(pose.rotation) * pose.translation)),
+        eye_(tracking::world_from_camera(pose)[3]),
         photometry_(response) {}
 
   // An edge that two faces share is looked for once.
@@ -73,8 +75,8 @@ class Finder {
     return {face.outline[edge], face.outline[(edge + 1) % face.outline.size()]};
   }
 
-  // Whether no earlier face of the solid has this edge, the other way round. A box's bottom comes
-  // first, so that what it shares with the sides is looked for there or not at all.
+  // Returns whether no earlier face of the solid has this edge, the other way round. A box's bottom
+  // comes first, so that what it shares with the sides is looked for there or not at all.
   static bool is_first(const Solid& solid, std::size_t face, std::size_t edge) {
     const auto [a, b] = ends(solid.faces[face], edge);
     for (std::size_t f = 0; f < face; ++f)
@@ -97,7 +99,7 @@ class Finder {
     const int count = static_cast<int>(std::ceil((length - 2 * corner_px) / longest_px));
     const double margin = corner_px / length, each = (1 - 2 * margin) / count;
     for (int i = 0; i < count; ++i) {
-      EdgePiece piece{view_, s, f, e, margin + i * each, margin + (i + 1) * each, {}, {}, 0, 0};
+      EdgePiece piece{view_, s, f, e, margin + i * each, margin + (i + 1) * each, {}, {}, 0};
       if (find_light(piece, a + piece.from * (b - a), a + piece.to * (b - a)))
         pieces.push_back(piece);
     }
@@ -125,11 +127,6 @@ class Finder {
     piece.a = best->a;
     piece.b = best->b;
     piece.variance_px2 = std::max(best->var_a, best->var_b);
-    const auto off = [&](const glm::dvec2& p) {
-      const glm::dvec2 d = glm::normalize(piece.b - piece.a);
-      return std::abs(d.x * (p - piece.a).y - d.y * (p - piece.a).x);
-    };
-    piece.off_px = 0.5 * (off(*pa) + off(*pb));
     return true;
   }
 

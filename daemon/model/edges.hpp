@@ -18,7 +18,6 @@ struct EdgePiece {
   double from = 0, to = 1;  // shares of that edge
   glm::dvec2 a{0}, b{0};    // where the picture has its ends
   double variance_px2 = 0;  // of their distance across it
-  double off_px = 0;        // the model's distance from it when it was found, the mean of both ends
 };
 
 // Looks for every edge of the boxes, of planes with an outline and of rooms that the model itself

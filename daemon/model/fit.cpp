@@ -13,7 +13,6 @@
 #include "daemon/model/solids.hpp"
 #include "daemon/model/unknowns.hpp"
 #include "daemon/tracking/least_squares.hpp"
-#include "daemon/tracking/pose_starts.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::model {
@@ -33,19 +32,12 @@ struct Observation {
   std::function<void(const Shape&, double*)> residuals;
 };
 
-glm::dvec3 place_of(const Shape& s, const Place& place, const Ray& ray) {
-  using enum Place::Kind;
-  switch (place.kind) {
-    case box_corner:
-      return corner(s.boxes[place.part], place.corner);
-    case upper_rim:
-      return rim_point(s.cylinders[place.part], true, ray.origin, ray.direction);
-    case lower_rim:
-      return rim_point(s.cylinders[place.part], false, ray.origin, ray.direction);
-    case free:
-      break;
-  }
-  return s.points[place.part];
+// Returns what a ray that is marked shows of a place: of a rim, the point that is nearest to it.
+glm::dvec3 shown_place(const Shape& s, const Place& place, const Ray& ray) {
+  const bool is_upper = place.kind == Place::Kind::upper_rim;
+  if (is_upper || place.kind == Place::Kind::lower_rim)
+    return rim_point(s.cylinders[place.part], is_upper, ray.origin, ray.direction);
+  return place_of(s, place);
 }
 
 // A mark of a point that belongs to a part.
@@ -71,10 +63,10 @@ std::vector<UsedMark> used_marks(const Views& views, const Layout& layout) {
 glm::dvec2 mark_off(const Views& views, const UsedMark& used, const Shape& s) {
   const tracking::CameraFromWorld pose =
       adjusted_pose(views.views[used.view], s.cameras_off[used.view]);
-  const glm::dmat3 turn = glm::transpose(pose.rotation);
-  const Ray ray{-(turn * pose.translation), turn * used.direction};
+  const glm::dmat4 camera = tracking::world_from_camera(pose);
+  const Ray ray{glm::dvec3(camera[3]), glm::dmat3(camera) * used.direction};
   return used.mark->px -
-         projected(views.lens, pose.rotation * place_of(s, used.place, ray) + pose.translation);
+         projected(views.lens, pose.rotation * shown_place(s, used.place, ray) + pose.translation);
 }
 
 void observe_marks(const Parts& parts, const Views& views, const Layout& layout,
@@ -107,40 +99,20 @@ void observe_cameras(const Views& views, std::vector<Observation>& all) {
          }});
 }
 
-std::array<glm::dvec3, 4> corners_of(const FlatTag& flat) {
-  std::array<glm::dvec3, 4> corners;
-  for (std::size_t i = 0; i < 4; ++i)
-    corners[i] = glm::dvec3(flat.tag->world_from_tag *
-                            glm::dvec4(tracking::tag_corner(flat.tag->size_m, i), 1));
-  return corners;
-}
-
 void observe_tags(const Layout& layout, std::vector<Observation>& all) {
-  for (const FlatTag& flat : layout.plane_tags)
-    all.push_back({4, [flat, at = corners_of(flat)](const Shape& s, double* out) {
-                     const Plane& plane = s.planes[flat.part];
+  for (const FlatTag& flat : layout.tags)
+    all.push_back({4, [flat, at = corners_of(*flat.tag)](const Shape& s, double* out) {
+                     const Plane ground = ground_of(flat, s);
                      for (std::size_t i = 0; i < 4; ++i)
-                       out[i] = (glm::dot(at[i] - plane.at, plane.normal) - flat.thickness_m) /
+                       out[i] = (glm::dot(at[i] - ground.at, ground.normal) - flat.thickness_m) /
                                 tag_sigma_m;
-                   }});
-  for (const FlatTag& flat : layout.box_tags)
-    all.push_back({4, [flat, at = corners_of(flat)](const Shape& s, double* out) {
-                     const Box& box = s.boxes[flat.part];
-                     const auto axis = glm::length_t(flat.axis);
-                     const double half =
-                         axis == 2 ? (flat.is_far ? box.size.z : 0) : 0.5 * box.size[axis];
-                     for (std::size_t i = 0; i < 4; ++i) {
-                       const double out_of =
-                           glm::dot(at[i] - box.foot, box.axes[axis]) * (flat.is_far ? 1 : -1);
-                       out[i] = (out_of - half - flat.thickness_m) / tag_sigma_m;
-                     }
                    }});
 }
 
 void observe_on_plane(std::size_t plane, const Place& place, std::vector<Observation>& all) {
   all.push_back({1, [plane, place](const Shape& s, double* out) {
                    const Plane& on = s.planes[plane];
-                   out[0] = glm::dot(place_of(s, place, {}) - on.at, on.normal) / flatness_m;
+                   out[0] = glm::dot(place_of(s, place) - on.at, on.normal) / flatness_m;
                  }});
 }
 

@@ -16,7 +16,7 @@ struct MarkResidual {
   double off_px = 0;
 };
 
-// How far a face may be off along its normal, where it is worst (one standard deviation, metres).
+// A face may be off along its normal by this where it is worst (one standard deviation, metres).
 struct FaceAccuracy {
   std::string part, face;
   double sigma_m = 0;

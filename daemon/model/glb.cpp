@@ -14,43 +14,18 @@
 namespace previz::model {
 namespace {
 
-glm::vec3 y_up(const glm::dvec3& v) {
-  return {v.x, v.z, -v.y};
-}
-
-// A solid's triangles share no corners, so that their normals are those of their faces.
-struct Mesh {
-  std::vector<glm::vec3> positions, normals;
-  std::vector<unsigned> indices;  // empty: three vertices after the other make a triangle
-};
-
-Mesh mesh_of(const Solid& solid) {
-  Mesh mesh;
-  for (const Face& face : solid.faces) {
-    const glm::vec3 normal = y_up(normal_of(face));
-    for (std::size_t i = 1; i + 1 < face.outline.size(); ++i)
-      for (const std::size_t k : {std::size_t{0}, i, i + 1}) {
-        mesh.positions.push_back(y_up(face.outline[k]));
-        mesh.normals.push_back(normal);
-      }
-  }
-  return mesh;
-}
-
-Mesh mesh_of(const PlacedScan& scan) {
-  Mesh mesh{scan.mesh.positions, scan.mesh.normals, scan.mesh.indices};
-  for (glm::vec3& p : mesh.positions) p = y_up(p);
-  for (glm::vec3& n : mesh.normals) n = y_up(n);
-  return mesh;
+std::vector<glm::vec3> y_up(std::vector<glm::vec3> vectors) {
+  for (glm::vec3& v : vectors) v = {v.x, v.z, -v.y};
+  return vectors;
 }
 
 // A model that no reader accepts is a fault of what it was made of.
-void insist_on_numbers(const std::string& name, const Mesh& mesh) {
-  for (const auto* vectors : {&mesh.positions, &mesh.normals})
+void insist_on_numbers(const NamedMesh& named) {
+  for (const auto* vectors : {&named.mesh.positions, &named.mesh.normals})
     for (const glm::vec3& v : *vectors)
       if (!std::isfinite(v.x) || !std::isfinite(v.y) || !std::isfinite(v.z))
         throw Error(
-            "\"" + name +
+            "\"" + named.name +
             "\" has no shape: a side of it has no area or lies infinitely far; check its points");
 }
 
@@ -110,37 +85,34 @@ tinygltf::Material matt(const std::string& name, const glm::dvec3& albedo) {
 
 }  // namespace
 
-std::string glb_of(const std::vector<Solid>& solids, const Colours& colours,
-                   const std::vector<PlacedScan>& scans) {
+std::string glb_of(const std::vector<NamedMesh>& meshes, const Colours& colours) {
   tinygltf::Model model;
   model.asset.version = "2.0";
   model.asset.generator = "previzd model";
   model.extensionsUsed = {"KHR_materials_specular"};
   model.buffers.emplace_back();
   tinygltf::Scene scene;
-  const auto add = [&](const std::string& name, const Mesh& mesh) {
-    insist_on_numbers(name, mesh);
-    const auto colour = colours.find(name);
+  for (const NamedMesh& named : meshes) {
+    insist_on_numbers(named);
+    const auto colour = colours.find(named.name);
     model.materials.push_back(
-        matt(name, colour == colours.end() ? glm::dvec3(0.5) : colour->second));
+        matt(named.name, colour == colours.end() ? glm::dvec3(0.5) : colour->second));
     tinygltf::Primitive primitive;
-    primitive.attributes["POSITION"] = add_vectors(mesh.positions, true, model);
-    primitive.attributes["NORMAL"] = add_vectors(mesh.normals, false, model);
-    if (!mesh.indices.empty()) primitive.indices = add_indices(mesh.indices, model);
+    primitive.attributes["POSITION"] = add_vectors(y_up(named.mesh.positions), true, model);
+    primitive.attributes["NORMAL"] = add_vectors(y_up(named.mesh.normals), false, model);
+    primitive.indices = add_indices(named.mesh.indices, model);
     primitive.material = static_cast<int>(model.materials.size()) - 1;
     primitive.mode = TINYGLTF_MODE_TRIANGLES;
-    tinygltf::Mesh its_mesh;
-    its_mesh.name = name;
-    its_mesh.primitives.push_back(primitive);
+    tinygltf::Mesh mesh;
+    mesh.name = named.name;
+    mesh.primitives.push_back(primitive);
     tinygltf::Node node;
-    node.name = name;
+    node.name = named.name;
     node.mesh = static_cast<int>(model.meshes.size());
     scene.nodes.push_back(static_cast<int>(model.nodes.size()));
-    model.meshes.push_back(its_mesh);
+    model.meshes.push_back(mesh);
     model.nodes.push_back(node);
-  };
-  for (const Solid& solid : solids) add(solid.name, mesh_of(solid));
-  for (const PlacedScan& scan : scans) add(scan.name, mesh_of(scan));
+  }
   model.scenes.push_back(scene);
   model.defaultScene = 0;
   std::ostringstream bytes;

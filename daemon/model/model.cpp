@@ -122,8 +122,7 @@ void print_faces(const Fit& fit, std::ostream& out) {
 
 // Returns the colours that the plates show; nothing without a take and its light.
 std::map<std::string, Colour> measured(const ModelOptions& options,
-                                       const std::vector<Solid>& solids,
-                                       const std::vector<PlacedScan>& scans, std::ostream& out) {
+                                       const std::vector<NamedMesh>& meshes, std::ostream& out) {
   if (options.grey) return {};
   if (!calibrate::is_session(options.footage)) {
     out << "colours: all faces are grey, because pictures alone do not show the light; name a "
@@ -132,7 +131,7 @@ std::map<std::string, Colour> measured(const ModelOptions& options,
   }
   const pipeline::Take take = pipeline::open_take(options.footage, options.set_file);
   return measure_colours(
-      take, solids, scans,
+      take, meshes,
       render::open_device(render::options_for(options.device, take.set.quality.hardware_rays)));
 }
 
@@ -227,7 +226,7 @@ void warn_of_others(const set::Set& set, const std::filesystem::path& model, std
                  object.name);
 }
 
-// What the colours are measured of.
+// An adjusted model, of which colours are measured.
 struct Adjusted {
   const Parts& parts;
   const Views& views;
@@ -237,17 +236,19 @@ struct Adjusted {
 
 // Returns the bytes of the model's file, with the tags and the colours of everything.
 std::string coloured_model(const ModelOptions& options, const set::Set& set, const Adjusted& at,
-                           std::vector<Solid> solids, const std::vector<PlacedScan>& scans,
+                           const std::vector<Solid>& solids, const std::vector<NamedMesh>& scans,
                            const ResponseCurve& response, std::ostream& out) {
-  std::map<std::string, Colour> colours = measured(options, solids, scans, out);
+  std::vector<NamedMesh> meshes;
+  for (const Solid& solid : solids) meshes.push_back(mesh_of(solid));
+  meshes.insert(meshes.end(), scans.begin(), scans.end());
+  std::map<std::string, Colour> colours = measured(options, meshes, out);
   colours.merge(tag_colours(set.tracking.family, at.layout, at.parts, at.views, at.shape, solids,
                             response, colours));
-  for (Solid& tag : tag_solids(set.tracking.family, at.layout, at.shape))
-    solids.push_back(std::move(tag));
+  for (const Solid& tag : tag_solids(set.tracking.family, at.layout, at.shape))
+    meshes.push_back(mesh_of(tag));
   std::vector<std::string> names;
-  for (const Solid& solid : solids) names.push_back(solid.name);
-  for (const PlacedScan& scan : scans) names.push_back(scan.name);
-  return glb_of(solids, reported(colours, usual_tag_colours(at.layout), names, out), scans);
+  for (const NamedMesh& mesh : meshes) names.push_back(mesh.name);
+  return glb_of(meshes, reported(colours, usual_tag_colours(at.layout), names, out));
 }
 
 }  // namespace
@@ -275,8 +276,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   const Fit fit = adjust_to_edges(parts, views, start, camera.response);
   print_fit(parts, start.layout, fit, out);
   print_faces(fit, out);
-  const std::vector<PlacedScan> scans =
-      place_scans(parts, start.layout, fit.shape, scan_files, out);
+  const std::vector<NamedMesh> scans = place_scans(parts, start.layout, fit.shape, scan_files, out);
   const std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
   const std::string model = coloured_model(options, set, {parts, views, start.layout, fit.shape},
                                            solids, scans, camera.response, out);

@@ -40,7 +40,7 @@ cv::Point fixed(const glm::dvec2& px) {
 
 void draw_line(cv::Mat3b& picture, const glm::dvec2& a, const glm::dvec2& b,
                const cv::Scalar& colour) {
-  // What is beside or behind the camera has no place in the picture.
+  // A point beside or behind the camera has no place in the picture.
   const double far_px = 2.0 * std::max(picture.cols, picture.rows);
   for (const glm::dvec2& p : {a, b})
     if (!(std::abs(p.x) < far_px && std::abs(p.y) < far_px)) return;
@@ -50,7 +50,7 @@ void draw_line(cv::Mat3b& picture, const glm::dvec2& a, const glm::dvec2& b,
 void draw_edge(cv::Mat3b& picture, const PinholeIntrinsics& lens,
                const tracking::CameraFromWorld& pose, const std::vector<Solid>& solids,
                const glm::dvec3& a, const glm::dvec3& b) {
-  const glm::dvec3 eye = -(glm::transpose(pose.rotation) * pose.translation);
+  const glm::dvec3 eye(tracking::world_from_camera(pose)[3]);
   const auto at = [&](double share) { return a + share * (b - a); };
   const auto px = [&](const glm::dvec3& p) {
     return projected(lens, pose.rotation * p + pose.translation);

@@ -1,5 +1,5 @@
-// What a model of the real scene is made of, and where its points are seen: the file of parts that
-// `previzd model` reads. Plain data.
+// Reads the file of parts: the planes, boxes and other things that a model of the real scene is
+// made of, and the places of their points in pictures.
 #pragma once
 
 #include <array>

@@ -32,7 +32,7 @@ struct Candidate {
   glm::dvec3 eye{0}, forward{0};
 };
 
-// How different two views are: a metre aside counts as much as a turn by half a radian.
+// Returns how different two views are: a metre aside counts as much as a turn by half a radian.
 double distance_between(const Candidate& a, const Candidate& b) {
   return glm::distance(a.eye, b.eye) + 2 * glm::distance(a.forward, b.forward);
 }
@@ -52,8 +52,8 @@ std::vector<Candidate> candidates_of(const std::filesystem::path& footage,
     const auto pose =
         pose_by_tags(detector.detect(*picture->frame, 1), camera.intrinsics, tracking);
     if (!pose) continue;
-    const glm::dmat3 turn = glm::transpose(pose->pose.rotation);
-    candidates.push_back({picture->name, -(turn * pose->pose.translation), turn[2]});
+    const glm::dmat4 place = tracking::world_from_camera(pose->pose);
+    candidates.push_back({picture->name, glm::dvec3(place[3]), glm::dvec3(place[2])});
   }
   if (candidates.empty())
     throw Error(fmt::format("{}: none of the {} pictures shows tags of the set that fit together",

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <glm/vec3.hpp>
+#include <string>
 #include <vector>
 
 namespace previz::model {
@@ -38,6 +39,12 @@ MeshFaults mend(TriangleMesh& mesh);
 struct ShadedMesh {
   std::vector<glm::vec3> positions, normals;  // of a vertex
   std::vector<unsigned> indices;
+};
+
+// A mesh in the world, metres.
+struct NamedMesh {
+  std::string name;
+  ShadedMesh mesh;
 };
 
 // Gives each corner of a triangle the mean normal, by area, of the triangles around the vertex that

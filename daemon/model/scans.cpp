@@ -30,9 +30,7 @@ std::string subject_of(const Parts& parts, const ScanPart& part) {
 }
 
 glm::dvec3 world_place_of(const std::string& point, const Layout& layout, const Shape& shape) {
-  const Place& place = layout.places.at(point);
-  if (place.kind == Place::Kind::box_corner) return corner(shape.boxes[place.part], place.corner);
-  return shape.points.at(place.part);
+  return model::place_of(shape, layout.places.at(point));
 }
 
 glm::dvec3 direction_of(UpAxis up) {
@@ -120,8 +118,8 @@ void insist_on_surface(const std::string& subject, const ScanPart& part, const S
   }
 }
 
-PlacedScan placed_scan(const ScanPart& part, const ScanFile& file, const ScanUnits& units,
-                       const Placement& placed, std::ostream& out) {
+NamedMesh placed_scan(const ScanPart& part, const ScanFile& file, const ScanUnits& units,
+                      const Placement& placed, std::ostream& out) {
   TriangleMesh mesh = file.mesh;
   for (glm::vec3& p : mesh.positions) p = glm::vec3(units.unit_m * glm::dvec3(p));
   weld(mesh);
@@ -136,7 +134,7 @@ PlacedScan placed_scan(const ScanPart& part, const ScanFile& file, const ScanUni
                part.name, before, simple.mesh.triangles(), 1000 * simple.error);
   else
     fmt::print(out, "scan {}: {} triangles, none removed\n", part.name, before);
-  PlacedScan scan{part.name, shaded(simple.mesh)};
+  NamedMesh scan{part.name, shaded(simple.mesh)};
   for (glm::vec3& p : scan.mesh.positions)
     p = glm::vec3(placed.rotation * glm::dvec3(p) + placed.translation);
   for (glm::vec3& n : scan.mesh.normals) n = glm::vec3(placed.rotation * glm::dvec3(n));
@@ -154,9 +152,9 @@ std::vector<ScanFile> read_scans(const Parts& parts) {
   return files;
 }
 
-std::vector<PlacedScan> place_scans(const Parts& parts, const Layout& layout, const Shape& shape,
-                                    const std::vector<ScanFile>& files, std::ostream& out) {
-  std::vector<PlacedScan> scans;
+std::vector<NamedMesh> place_scans(const Parts& parts, const Layout& layout, const Shape& shape,
+                                   const std::vector<ScanFile>& files, std::ostream& out) {
+  std::vector<NamedMesh> scans;
   for (std::size_t i = 0; i < parts.scans.size(); ++i) {
     const ScanPart& part = parts.scans[i];
     const std::string subject = subject_of(parts, part);

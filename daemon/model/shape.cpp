@@ -10,6 +10,13 @@ glm::dvec3 corner(const Box& box, std::size_t index) {
   return box.foot + box.axes * (box.size * glm::dvec3(x, y, index < 4 ? 0 : 1));
 }
 
+Plane side_of(const Box& box, std::size_t axis, bool is_far) {
+  const auto k = static_cast<glm::length_t>(axis);
+  const double out = axis == 2 ? (is_far ? box.size.z : 0) : 0.5 * box.size[k];
+  const glm::dvec3 normal = (is_far ? 1.0 : -1.0) * box.axes[k];
+  return {box.foot + out * normal, normal};
+}
+
 glm::dvec3 rim_point(const Cylinder& cylinder, bool upper, const glm::dvec3& origin,
                      const glm::dvec3& direction) {
   const glm::dvec3 centre = cylinder.foot + (upper ? cylinder.height : 0.0) * cylinder.axis;

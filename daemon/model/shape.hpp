@@ -42,6 +42,10 @@ struct Shape {
 // first edge, from 0 to 1, is along the length.
 glm::dvec3 corner(const Box& box, std::size_t index);
 
+// Returns the plane of one of its sides: the one at the far or the near end of its axis `axis`. The
+// normal looks outwards.
+Plane side_of(const Box& box, std::size_t axis, bool is_far);
+
 // Returns the point of a rim, the upper or the lower one, that is nearest to where this ray meets
 // the rim's plane; the rim's centre if the ray is parallel to it.
 glm::dvec3 rim_point(const Cylinder& cylinder, bool upper, const glm::dvec3& origin,

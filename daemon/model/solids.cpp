@@ -8,16 +8,15 @@
 #include <limits>
 #include <numbers>
 
-#include "daemon/tracking/pose_starts.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::model {
 namespace {
 
 constexpr int cylinder_sides = 48;
-// What is farther behind a wall than this is not at its foot.
+// A point that is farther behind a wall than this is not at its foot.
 constexpr double behind_m = 5e-3;
-// What is nearer by less than this share of the distance hides nothing.
+// A face hides nothing that is beyond it by less than this share of the distance.
 constexpr double hidden_share = 2e-3;
 
 using Points = std::vector<glm::dvec3>;
@@ -82,20 +81,15 @@ class Solids {
   }
 
   glm::dvec3 place_of(const std::string& point) const {
-    const Place& place = layout_.places.at(point);
-    if (place.kind == Place::Kind::box_corner)
-      return corner(shape_.boxes[place.part], place.corner);
-    if (place.kind == Place::Kind::free) return shape_.points[place.part];
-    return shape_.cylinders[place.part].foot;
+    return model::place_of(shape_, layout_.places.at(point));
   }
 
   // Returns what lies or stands on a plane.
   Points things_on(std::size_t index) const {
     Points on_it;
-    for (const FlatTag& flat : layout_.plane_tags)
-      for (std::size_t i = 0; flat.part == index && i < 4; ++i)
-        on_it.emplace_back(flat.tag->world_from_tag *
-                           glm::dvec4(tracking::tag_corner(flat.tag->size_m, i), 1));
+    for (const FlatTag& flat : layout_.tags)
+      if (!flat.is_on_box && flat.part == index)
+        for (const glm::dvec3& p : corners_of(*flat.tag)) on_it.push_back(p);
     for (const std::string& point : points_on(parts_.planes[index]))
       on_it.push_back(place_of(point));
     for (std::size_t i = 0; i < shape_.boxes.size(); ++i)
@@ -116,9 +110,10 @@ class Solids {
     const glm::dvec3 normal = shape_.planes[index].normal;
     if (const auto on = layout_.plane_on[index])
       return glm::cross(shape_.planes[*on].normal, normal);
-    const auto tag = std::ranges::find(layout_.plane_tags, index, &FlatTag::part);
-    return tag == layout_.plane_tags.end() ? glm::dvec3(1, 0, 0)
-                                           : glm::dvec3(tag->tag->world_from_tag[0]);
+    const auto tag = std::ranges::find_if(
+        layout_.tags, [&](const FlatTag& flat) { return !flat.is_on_box && flat.part == index; });
+    return tag == layout_.tags.end() ? glm::dvec3(1, 0, 0)
+                                     : glm::dvec3(tag->tag->world_from_tag[0]);
   }
 
   // A rectangle around all that is on the plane. That of an upright plane begins at what it stands
@@ -307,6 +302,21 @@ glm::dvec3 normal_of(const Face& face) {
   for (std::size_t i = 1; i + 1 < face.outline.size(); ++i)
     sum += glm::cross(face.outline[i] - face.outline[0], face.outline[i + 1] - face.outline[0]);
   return glm::normalize(sum);
+}
+
+NamedMesh mesh_of(const Solid& solid) {
+  NamedMesh result{solid.name, {}};
+  ShadedMesh& mesh = result.mesh;
+  for (const Face& face : solid.faces) {
+    const auto first = static_cast<unsigned>(mesh.positions.size());
+    for (const glm::dvec3& p : face.outline) {
+      mesh.positions.emplace_back(p);
+      mesh.normals.emplace_back(normal_of(face));
+    }
+    for (unsigned i = 1; i + 1 < face.outline.size(); ++i)
+      for (const unsigned k : {0u, i, i + 1}) mesh.indices.push_back(first + k);
+  }
+  return result;
 }
 
 bool is_hidden(const std::vector<Solid>& solids, const glm::dvec3& eye, const glm::dvec3& point) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/model/scan_mesh.hpp"
 #include "daemon/model/start.hpp"
 
 namespace previz::model {
@@ -22,6 +23,9 @@ struct Solid {
 };
 
 glm::dvec3 normal_of(const Face& face);
+
+// Returns the triangles of all faces; faces share no corners, so that the normals are theirs.
+NamedMesh mesh_of(const Solid& solid);
 
 // Returns whether a face lies between an eye and a point, and not just at the point.
 bool is_hidden(const std::vector<Solid>& solids, const glm::dvec3& eye, const glm::dvec3& point);

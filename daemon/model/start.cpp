@@ -10,6 +10,7 @@
 #include <set>
 #include <utility>
 
+#include "daemon/tracking/pose_starts.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::model {
@@ -78,10 +79,8 @@ class Starter {
       : parts_(parts), views_(views), tags_(tags) {
     for (const MarkedView& view : views.views)
       for (const Mark& mark : view.marks) rays_[mark.point].push_back(ray_of(views, view, mark));
-    for (const MarkedView& view : views.views) {
-      const glm::dmat3 turn = glm::transpose(view.pose.pose.rotation);
-      eyes_.push_back(-(turn * view.pose.pose.translation));
-    }
+    for (const MarkedView& view : views.views)
+      eyes_.emplace_back(tracking::world_from_camera(view.pose.pose)[3]);
   }
 
   Start start() {
@@ -143,13 +142,12 @@ class Starter {
     return met ? *met : needed_place_of(point);
   }
 
-  Points corners_of(const set::Tag& tag, double thickness_m) const {
-    Points corners;
-    for (std::size_t i = 0; i < 4; ++i)
-      corners.push_back(
-          glm::dvec3(tag.world_from_tag * glm::dvec4(tracking::tag_corner(tag.size_m, i), 1)) -
-          thickness_m * glm::dvec3(tag.world_from_tag[2]));
-    return corners;
+  // What is below the corners of a tag.
+  static Points below_corners_of(const set::Tag& tag, double thickness_m) {
+    Points below;
+    for (const glm::dvec3& corner : corners_of(tag))
+      below.push_back(corner - thickness_m * glm::dvec3(tag.world_from_tag[2]));
+    return below;
   }
 
   void start_plane(std::size_t index) {
@@ -158,8 +156,8 @@ class Starter {
     glm::dvec3 face(0);
     for (const int id : part.tags) {
       const set::Tag& flat = tag(id, part.name);
-      layout_.plane_tags.push_back({&flat, part.tag_thickness_m, index});
-      for (const glm::dvec3& p : corners_of(flat, part.tag_thickness_m)) on_it.push_back(p);
+      layout_.tags.push_back({&flat, part.tag_thickness_m, index});
+      for (const glm::dvec3& p : below_corners_of(flat, part.tag_thickness_m)) on_it.push_back(p);
       face += glm::dvec3(flat.world_from_tag[2]);
     }
     for (const auto* names : {&part.points, &part.outline})
@@ -318,8 +316,9 @@ class Starter {
   double height_by_tags(const BoxPart& part, const Box& box, const glm::dvec3& ground) const {
     for (const int id : part.tags) {
       const set::Tag& flat = tag(id, part.name);
-      if (side_of(flat, box) == std::pair<std::size_t, bool>(2, true))
-        return glm::dot(mean_of(corners_of(flat, part.tag_thickness_m)) - ground, box.axes[2]);
+      if (side_below(flat, box) == std::pair<std::size_t, bool>(2, true))
+        return glm::dot(mean_of(below_corners_of(flat, part.tag_thickness_m)) - ground,
+                        box.axes[2]);
     }
     refuse(
         fmt::format("box \"{}\" has no corner of its upper side marked and no tag on it; mark a "
@@ -348,16 +347,16 @@ class Starter {
     const glm::dmat4& first = tag(part.tags.front(), part.name).world_from_tag;
     const glm::dvec3 up = on ? shape_.planes[*on].normal : glm::dvec3(first[2]);
     const glm::dvec3 right(first[0]), over(first[1]);
-    // What is upright has no direction on the ground but that of its rounding.
+    // An upright vector has no direction on the ground but that of its rounding.
     const bool is_level = std::abs(glm::dot(right, up)) <= std::abs(glm::dot(over, up));
     box.axes = upright_axes(is_level ? right : over, up);
     std::array<std::optional<double>, 3> low, high;  // where its sides are along its axes
     if (on) low[2] = glm::dot(shape_.planes[*on].at, box.axes[2]);
     for (const int id : part.tags) {
       const set::Tag& flat = tag(id, part.name);
-      const auto [axis, is_far] = side_of(flat, box);
-      const double at =
-          glm::dot(mean_of(corners_of(flat, part.tag_thickness_m)), box.axes[glm::length_t(axis)]);
+      const auto [axis, is_far] = side_below(flat, box);
+      const double at = glm::dot(mean_of(below_corners_of(flat, part.tag_thickness_m)),
+                                 box.axes[glm::length_t(axis)]);
       (is_far ? high : low)[axis] = at;
     }
     const auto known = known_sizes(part, false);
@@ -379,7 +378,7 @@ class Starter {
     box.foot = middle;
   }
 
-  static std::pair<std::size_t, bool> side_of(const set::Tag& tag, const Box& box) {
+  static std::pair<std::size_t, bool> side_below(const set::Tag& tag, const Box& box) {
     const glm::dvec3 out = glm::transpose(box.axes) * glm::dvec3(tag.world_from_tag[2]);
     std::size_t axis = 0;
     for (std::size_t k = 1; k < 3; ++k)
@@ -388,8 +387,8 @@ class Starter {
   }
 
   void bind_to_side(const set::Tag& tag, double thickness_m, std::size_t box) {
-    const auto [axis, is_far] = side_of(tag, shape_.boxes[box]);
-    layout_.box_tags.push_back({&tag, thickness_m, box, axis, is_far});
+    const auto [axis, is_far] = side_below(tag, shape_.boxes[box]);
+    layout_.tags.push_back({&tag, thickness_m, box, true, axis, is_far});
   }
 
   void start_cylinder(const CylinderPart& part) {
@@ -523,6 +522,24 @@ class Starter {
 
 Start first_guess(const Parts& parts, const Views& views, const std::vector<set::Tag>& tags) {
   return Starter(parts, views, tags).start();
+}
+
+glm::dvec3 place_of(const Shape& shape, const Place& place) {
+  if (place.kind == Place::Kind::box_corner) return corner(shape.boxes[place.part], place.corner);
+  return shape.points.at(place.part);
+}
+
+std::array<glm::dvec3, 4> corners_of(const set::Tag& tag) {
+  std::array<glm::dvec3, 4> corners;
+  for (std::size_t i = 0; i < 4; ++i)
+    corners[i] =
+        glm::dvec3(tag.world_from_tag * glm::dvec4(tracking::tag_corner(tag.size_m, i), 1));
+  return corners;
+}
+
+Plane ground_of(const FlatTag& flat, const Shape& shape) {
+  if (!flat.is_on_box) return shape.planes[flat.part];
+  return side_of(shape.boxes[flat.part], flat.axis, flat.is_far);
 }
 
 void settle(const Layout& layout, Shape& shape) {

@@ -15,7 +15,7 @@
 
 namespace previz::model {
 
-// What a named point is: a free point, a corner of a box, or one of those on a cylinder's rim.
+// A named point is a free point, a corner of a box, or one of those on a cylinder's rim.
 struct Place {
   enum class Kind { free, box_corner, upper_rim, lower_rim } kind = Kind::free;
   std::size_t part = 0;    // index of box, cylinder or free point
@@ -27,7 +27,9 @@ struct FlatTag {
   const set::Tag* tag = nullptr;
   double thickness_m = 0;
   std::size_t part = 0;  // index of plane or box
-  // Of a box: which of its axes is the side's normal, and whether it is the far side along it.
+  bool is_on_box = false;
+  // If it is on a box: the box's axis that its side is at right angles to, and whether it is the
+  // side at the far end of that axis.
   std::size_t axis = 0;
   bool is_far = false;
 };
@@ -41,7 +43,7 @@ struct Layout {
   // Whether the box's corners are marked clockwise, seen from above. Its length is then from the
   // first corner to the fourth.
   std::vector<bool> is_clockwise;
-  std::vector<FlatTag> plane_tags, box_tags;
+  std::vector<FlatTag> tags;
 };
 
 struct Start {
@@ -52,6 +54,15 @@ struct Start {
 // Throws previz::Error naming a tag that the set does not have, a point whose rays do not show
 // where it is, and a part whose points, tags and sizes do not determine it.
 Start first_guess(const Parts& parts, const Views& views, const std::vector<set::Tag>& tags);
+
+// Returns where a free point or a corner of a box is: a place that is the same in all pictures.
+glm::dvec3 place_of(const Shape& shape, const Place& place);
+
+// Returns a tag's corners in the world, as its map has them.
+std::array<glm::dvec3, 4> corners_of(const set::Tag& tag);
+
+// Returns the plane that a tag lies on.
+Plane ground_of(const FlatTag& flat, const Shape& shape);
 
 // Moves what stands on a plane onto it, upright.
 void settle(const Layout& layout, Shape& shape);

@@ -14,11 +14,10 @@
 namespace previz::model {
 namespace {
 
-// Light between a tag and what it lies on would be a fault of the model: it is at most so far
-// above.
+// A tag is at least so far above what it lies on, which would hide it.
 constexpr double least_above_m = 5e-5;
 constexpr double least_cell_px = 3;
-// What lies beside the paper is looked at from here to here, over half of the paper's width.
+// The surface beside a paper is looked at so far from its middle, over half of its width.
 constexpr double beside_from = 1.12, beside_to = 1.3;
 constexpr int beside_a_side = 8;
 
@@ -38,16 +37,6 @@ glm::dvec3 in_world(const FlatTag& flat, double x, double y) {
 glm::dvec2 in_tag(const FlatTag& flat, const tracking::TagCells& cells, double row, double column) {
   const double cell = flat.tag->size_m / cells.border;
   return {cell * (column - 0.5 * cells.total), cell * (0.5 * cells.total - row)};
-}
-
-// What a tag lies on.
-Plane ground_of(const FlatTag& flat, bool is_on_box, const Shape& shape) {
-  if (!is_on_box) return shape.planes[flat.part];
-  const Box& box = shape.boxes[flat.part];
-  const auto axis = glm::length_t(flat.axis);
-  const double half = axis == 2 ? (flat.is_far ? box.size.z : 0) : 0.5 * box.size[axis];
-  const glm::dvec3 normal = (flat.is_far ? 1.0 : -1.0) * box.axes[axis];
-  return {box.foot + half * normal, normal};
 }
 
 void add_tag(const FlatTag& flat, const tracking::TagCells& cells, const Plane& ground,
@@ -102,7 +91,7 @@ class Signals {
 
 using Values = std::vector<glm::dvec3>;
 
-// Each channel's.
+// Returns the median of each channel.
 glm::dvec3 median_of(Values values) {
   glm::dvec3 median;
   for (glm::length_t c = 0; c < 3; ++c) {
@@ -113,7 +102,7 @@ glm::dvec3 median_of(Values values) {
   return median;
 }
 
-// What the cells of a tag have in one picture, over what lies beside the tag.
+// The light of the cells of a tag over that of the surface beside it, a value for each picture.
 struct Ratios {
   Values paper, print;
 };
@@ -176,7 +165,7 @@ class TagColours {
   }
 
   bool is_hidden_in(std::size_t view, const FlatTag& flat, const tracking::TagCells& cells) const {
-    const glm::dvec3 eye = -(glm::transpose(poses_[view].rotation) * poses_[view].translation);
+    const glm::dvec3 eye(tracking::world_from_camera(poses_[view])[3]);
     const double end = cells.total;
     for (const auto& [row, column] :
          {std::pair{0.0, 0.0}, {0.0, end}, {end, 0.0}, {end, end}, {end / 2, end / 2}}) {
@@ -199,10 +188,8 @@ class TagColours {
 
 std::vector<Solid> tag_solids(const std::string& family, const Layout& layout, const Shape& shape) {
   std::vector<Solid> solids;
-  for (const FlatTag& flat : layout.plane_tags)
-    add_tag(flat, tracking::tag_cells(family, flat.tag->id), ground_of(flat, false, shape), solids);
-  for (const FlatTag& flat : layout.box_tags)
-    add_tag(flat, tracking::tag_cells(family, flat.tag->id), ground_of(flat, true, shape), solids);
+  for (const FlatTag& flat : layout.tags)
+    add_tag(flat, tracking::tag_cells(family, flat.tag->id), ground_of(flat, shape), solids);
   return solids;
 }
 
@@ -227,19 +214,18 @@ std::map<std::string, Colour> tag_colours(const std::string& family, const Layou
     put(paper_of(flat), ratios.paper);
     put(print_of(flat), ratios.print);
   };
-  for (const FlatTag& flat : layout.plane_tags) add(flat, parts.planes[flat.part].name);
-  for (const FlatTag& flat : layout.box_tags) add(flat, parts.boxes[flat.part].name);
+  for (const FlatTag& flat : layout.tags)
+    add(flat, flat.is_on_box ? parts.boxes[flat.part].name : parts.planes[flat.part].name);
   return colours;
 }
 
 std::map<std::string, glm::dvec3> usual_tag_colours(const Layout& layout) {
   constexpr double paper = 0.8, print = 0.04;  // office paper and toner
   std::map<std::string, glm::dvec3> colours;
-  for (const auto* tags : {&layout.plane_tags, &layout.box_tags})
-    for (const FlatTag& flat : *tags) {
-      colours[paper_of(flat)] = glm::dvec3(paper);
-      colours[print_of(flat)] = glm::dvec3(print);
-    }
+  for (const FlatTag& flat : layout.tags) {
+    colours[paper_of(flat)] = glm::dvec3(paper);
+    colours[print_of(flat)] = glm::dvec3(print);
+  }
   return colours;
 }
 

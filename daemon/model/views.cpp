@@ -100,8 +100,8 @@ Ray ray_of(const Views& views, const MarkedView& view, const Mark& mark) {
     throw Error(
         fmt::format("{}: the lens shows nothing at point \"{}\"; check the lens's distortion",
                     view.name, mark.point));
-  const glm::dmat3 turn = glm::transpose(view.pose.pose.rotation);
-  return {-(turn * view.pose.pose.translation), glm::normalize(turn * glm::dvec3(*at, 1))};
+  const glm::dmat4 camera = tracking::world_from_camera(view.pose.pose);
+  return {glm::dvec3(camera[3]), glm::normalize(glm::dmat3(camera) * glm::dvec3(*at, 1))};
 }
 
 std::optional<tracking::FittedPose> pose_by_tags(

@@ -79,7 +79,7 @@ TEST(ModelEdges, LeadFurtherThanMarks) {
     by_edges += worst_corner(fit);
     EXPECT_GT(fit.edges_off_px.size(), 60u);
     for (const double off : fit.edges_off_px) EXPECT_LT(off, 0.3);
-    // Within three of the standard deviations that are stated of the worst face.
+    // The corners are within three of the standard deviations that are stated of the worst face.
     double stated = 0;
     for (const model::FaceAccuracy& face : fit.faces)
       stated = std::max(stated, face.part == "crate" ? face.sigma_m : 0);

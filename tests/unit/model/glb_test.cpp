@@ -1,6 +1,7 @@
 // The model as a file: our own reader gets back what was written.
 #include "daemon/model/glb.hpp"
 
+#include "daemon/model/solids.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/set/load.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -13,7 +14,7 @@ TEST(ModelGlb, IsReadBackAsItWas) {
   const TemporaryDirectory folder;
   const model::Solid sheet{"sheet", {{"face", {{0, 0, 1}, {2, 0, 1}, {2, 3, 1}, {0, 3, 1}}}}};
   std::ofstream(folder / "model.glb", std::ios::binary)
-      << model::glb_of({sheet}, {{"sheet", {0.2, 0.3, 0.4}}});
+      << model::glb_of({model::mesh_of(sheet)}, {{"sheet", {0.2, 0.3, 0.4}}});
   const set::Set set = set::parse_set(
       "[set]\nname = \"x\"\n[[object]]\nname = \"o\"\nfile = \"model.glb\"\npresence = "
       "\"phantom\"\nnodes = [\"sheet\"]\n",

@@ -27,7 +27,7 @@ model::Views MarkedScene::views(const model::Parts& parts, std::mt19937& random)
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     tracking::FittedPose pose;
     pose.pose = tracking::camera_from_world(cameras[i]);
-    // Of no noise at all nothing can be computed.
+    // A covariance of 0 has no inverse.
     const double sigma = std::max(pose_m, 1e-7);
     for (std::size_t k = 0; k < 6; ++k) pose.covariance[7 * k] = sigma * sigma;
     glm::dvec3 turn, shift;

@@ -52,7 +52,7 @@ std::vector<glm::dvec3> top_of(const std::string& node) {
 
 const std::vector<int> frames = {0, 2, 5};
 
-// What a careful person would mark of the red cube, to a tenth of a pixel.
+// Returns the marks that a careful person would make of the red cube, to a tenth of a pixel.
 std::string marks() {
   model::Parts parts;
   for (const int frame : frames) parts.pictures.push_back({fmt::format("frame {}", frame), {}});
@@ -98,13 +98,8 @@ class ModelCommand : public testing::Test {
   void write_parts(const std::string& text) { std::ofstream(options_.parts_file) << text; }
 
   std::string refusal() {
-    try {
-      std::ostringstream out;
-      model::make_model(options_, out);
-    } catch (const Error& error) {
-      return error.what();
-    }
-    return "";
+    std::ostringstream out;
+    return error_of([&] { model::make_model(options_, out); });
   }
 
   TemporaryDirectory folder_;

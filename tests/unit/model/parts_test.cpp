@@ -24,12 +24,7 @@ c = [170, 260]
 
 // Returns what is said of the marks with these parts behind them.
 std::string refusal_of(const std::string& parts) {
-  try {
-    model::parse_parts(picture_tables + parts, "model.toml");
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
+  return error_of([&] { model::parse_parts(picture_tables + parts, "model.toml"); });
 }
 
 TEST(ModelParts, AreReadWithTheirMarks) {

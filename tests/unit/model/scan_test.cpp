@@ -15,17 +15,7 @@
 namespace previz::test {
 namespace {
 
-template <class Call>
-std::string error_of(const Call& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
-
-// In inches, Z up, moved by a node.
+// This file is in inches, Z up, and its mesh is moved by a node.
 constexpr const char* fbx_text = R"(; FBX 7.4.0 project file
 FBXHeaderExtension:  {
   FBXHeaderVersion: 1003
@@ -109,7 +99,7 @@ TEST_F(ScanRead, EachFormatGivesTheSameMesh) {
 
 TEST_F(ScanRead, GltfAndFbxGiveTheirUnitAndAxis) {
   std::ofstream(folder_ / "scan.glb", std::ios::binary)
-      << model::glb_of({}, {}, {{"lump", model::shaded(lump(6))}});
+      << model::glb_of({{"lump", model::shaded(lump(6))}}, {});
   const model::ScanFile glb = model::read_scan(folder_ / "scan.glb");
   EXPECT_EQ(glb.unit_m, 1.0);
   EXPECT_EQ(glb.up, glm::dvec3(0, 1, 0));
@@ -163,7 +153,7 @@ class Scans : public testing::Test {
   }
 
   // Marks, adjusts and places; what is reported is in report_.
-  std::vector<model::PlacedScan> placed() {
+  std::vector<model::NamedMesh> placed() {
     std::mt19937 random(1);
     parts_.pictures = scene_.pictures(random);
     const model::Views views = scene_.views(parts_, random);
@@ -213,7 +203,7 @@ TEST_F(Scans, BecomeNodesOfTheModel) {
   parts_.scans[0].unit = model::LengthUnit::m;
   parts_.scans[0].error_m = 1e-3;
   for (model::ScanPoint& point : parts_.scans[0].points) point.at /= 1000.0;
-  std::ofstream(folder_ / "model.glb", std::ios::binary) << model::glb_of({}, {}, placed());
+  std::ofstream(folder_ / "model.glb", std::ios::binary) << model::glb_of(placed(), {});
   const scene::Scene scene = scene::load_scene(set::parse_set(
       "[set]\nname = \"x\"\n[[object]]\nname = \"o\"\nfile = \"model.glb\"\npresence = "
       "\"phantom\"\nnodes = [\"lump\"]\n",
@@ -278,9 +268,9 @@ TEST(ScanPlace, PointsOnOneLineAreRefused) {
   EXPECT_THAT(error_of([&] { model::place_scan("statue", points, 1); }), HasSubstr("on one line"));
 }
 
-// By noise of 1 mm in each coordinate, 4 points leave 12 - 6 of 12 degrees of freedom, so the root
-// mean square of their distances is sqrt(3 * 6 / 12) mm on average over trials; its standard error
-// over 400 trials, of a quantity that spreads by 1 / sqrt(2 * 6) of itself, is 1.5 %.
+// With noise of 1 mm in each coordinate, 4 points leave 12 - 6 of 12 degrees of freedom, so the
+// root mean square of their distances is sqrt(3 * 6 / 12) mm on average over trials; its standard
+// error over 400 trials, of a quantity that spreads by 1 / sqrt(2 * 6) of itself, is 1.5 %.
 TEST(ScanPlace, TheDeviationIsThatOfTheNoise) {
   std::mt19937 random(1);
   std::normal_distribution<double> noise(0, 1e-3);
