@@ -85,6 +85,9 @@ void add_render(CLI::App& app, post::RenderOptions& options,
       .add_option("--seconds", options.seconds,
                   "Add samples for this many seconds per frame (default: quality.seconds)")
       ->check(CLI::Range(0.0, 86400.0));
+  add_choice(command, "--hide-tags,!--show-tags", options.hides_tags,
+             "Remove the printed tags from the pictures, or leave them in (default: as it was "
+             "recorded, or tags.hide)");
   command.add_option("--seed", options.seed, "Random seed (default: the set file's)");
   command
       .add_option_function<std::string>(

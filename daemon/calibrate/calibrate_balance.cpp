@@ -72,7 +72,7 @@ std::string suggestion(const SurfaceRatio& surface, const KnownSurface& known,
 }
 
 void print_balance(const SurfacePixels& seen, const Balance& balance, std::ostream& out) {
-  fmt::print(out, "{} frames, {} pixels of diffuse real surfaces\n", seen.frames,
+  fmt::print(out, "{} frames, {} pixels of diffuse real surfaces\n", seen.world_from_cameras.size(),
              seen.pixels.size());
   for (const SurfaceRatio& surface : balance.surfaces)
     fmt::print(out, "  {}: camera / model {:.3f} {:.3f} {:.3f} (+- {}), {} pixels in {} tiles{}\n",

@@ -17,7 +17,7 @@ constexpr double settled_change = 2e-3;
 constexpr double least_albedo = 0.005, most_albedo = 0.98;
 
 // Adds a mesh in the world, of a matt material of its name.
-void add(const NamedMesh& named, scene::Scene& scene) {
+void add(const NamedMesh& named, const glm::dvec3& albedo, scene::Scene& scene) {
   const ShadedMesh& from = named.mesh;
   scene::Mesh mesh;
   mesh.name = named.name;
@@ -27,7 +27,7 @@ void add(const NamedMesh& named, scene::Scene& scene) {
     mesh.triangles.emplace_back(from.indices[i], from.indices[i + 1], from.indices[i + 2]);
   scene::Material matt;
   matt.name = named.name;
-  matt.base_color = glm::vec3(0.5f);
+  matt.base_color = glm::vec3(albedo);
   matt.specular = 0;
   const auto index = static_cast<std::uint32_t>(scene.meshes.size());
   scene.instances.push_back({.name = named.name, .mesh = index, .material = index});
@@ -35,13 +35,17 @@ void add(const NamedMesh& named, scene::Scene& scene) {
   scene.materials.push_back(std::move(matt));
 }
 
-// The set's lamps and the model.
-scene::Scene scene_of(const pipeline::Take& take, const std::vector<NamedMesh>& meshes) {
+// The set's lamps and the model, grey where it has no colour.
+scene::Scene scene_of(const pipeline::Take& take, const std::vector<NamedMesh>& meshes,
+                      const Colours& colours) {
   set::Set lamps_only = take.set;
   lamps_only.objects.clear();
   lamps_only.surfaces.clear();
   scene::Scene scene = scene::load_scene(lamps_only);
-  for (const NamedMesh& mesh : meshes) add(mesh, scene);
+  for (const NamedMesh& mesh : meshes) {
+    const auto colour = colours.find(mesh.name);
+    add(mesh, colour == colours.end() ? glm::dvec3(0.5) : colour->second, scene);
+  }
   return scene;
 }
 
@@ -50,7 +54,7 @@ scene::Scene scene_of(const pipeline::Take& take, const std::vector<NamedMesh>& 
 std::map<std::string, Colour> measure_colours(const pipeline::Take& take,
                                               const std::vector<NamedMesh>& meshes,
                                               const std::shared_ptr<render::Device>& device) {
-  scene::Scene scene = scene_of(take, meshes);
+  scene::Scene scene = scene_of(take, meshes, {});
   std::map<std::string, Colour> colours;
   for (int round = 0; round < most_rounds; ++round) {
     const calibrate::SurfacePixels seen = calibrate::probe_surfaces(take, scene, device, {});
@@ -71,6 +75,15 @@ std::map<std::string, Colour> measure_colours(const pipeline::Take& take,
     if (most_change < settled_change) break;
   }
   return colours;
+}
+
+calibrate::SurfacePixels compare_surfaces(const pipeline::Take& take,
+                                          const std::vector<NamedMesh>& meshes,
+                                          const Colours& colours, int width,
+                                          const std::shared_ptr<render::Device>& device) {
+  calibrate::ProbeOptions options;
+  options.width = width;
+  return calibrate::probe_surfaces(take, scene_of(take, meshes, colours), device, options);
 }
 
 }  // namespace previz::model

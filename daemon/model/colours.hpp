@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "daemon/calibrate/sensor/surface_pixels.hpp"
+#include "daemon/model/glb.hpp"
 #include "daemon/model/scan_mesh.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/render/gpu.hpp"
@@ -27,5 +29,12 @@ struct Colour {
 std::map<std::string, Colour> measure_colours(const pipeline::Take& take,
                                               const std::vector<NamedMesh>& meshes,
                                               const std::shared_ptr<render::Device>& device);
+
+// Renders the model in its colours by the take's light, `width` pixels across, and returns what it
+// and the plates have in pixels that show one surface. Throws as measure_colours().
+calibrate::SurfacePixels compare_surfaces(const pipeline::Take& take,
+                                          const std::vector<NamedMesh>& meshes,
+                                          const Colours& colours, int width,
+                                          const std::shared_ptr<render::Device>& device);
 
 }  // namespace previz::model

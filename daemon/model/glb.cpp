@@ -95,11 +95,13 @@ std::string glb_of(const std::vector<NamedMesh>& meshes, const Colours& colours)
   for (const NamedMesh& named : meshes) {
     insist_on_numbers(named);
     const auto colour = colours.find(named.name);
-    model.materials.push_back(
-        matt(named.name, colour == colours.end() ? glm::dvec3(0.5) : colour->second));
+    const bool has_albedos = !named.albedos.empty();
+    const glm::dvec3 own = colour == colours.end() ? glm::dvec3(0.5) : colour->second;
+    model.materials.push_back(matt(named.name, has_albedos ? glm::dvec3(1) : own));
     tinygltf::Primitive primitive;
     primitive.attributes["POSITION"] = add_vectors(y_up(named.mesh.positions), true, model);
     primitive.attributes["NORMAL"] = add_vectors(y_up(named.mesh.normals), false, model);
+    if (has_albedos) primitive.attributes["COLOR_0"] = add_vectors(named.albedos, false, model);
     primitive.indices = add_indices(named.mesh.indices, model);
     primitive.material = static_cast<int>(model.materials.size()) - 1;
     primitive.mode = TINYGLTF_MODE_TRIANGLES;

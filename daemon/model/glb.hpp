@@ -13,9 +13,9 @@ namespace previz::model {
 // Diffuse albedo by the name of a mesh, linear Rec. 709; grey of 0.5 for those not listed.
 using Colours = std::map<std::string, glm::dvec3>;
 
-// Returns the file's bytes: a node, a mesh and a matt material for each mesh, named as it is. glTF
-// is Y up: (x, y, z) of the world is (x, z, -y) there. Throws previz::Error naming a mesh that has
-// a vertex without a place.
+// Returns the file's bytes: a node, a mesh and a matt material for each mesh, named as it is; a
+// mesh with albedos of its vertices has them as COLOR_0. glTF is Y up: (x, y, z) of the world is
+// (x, z, -y) there. Throws previz::Error naming a mesh that has a vertex without a place.
 std::string glb_of(const std::vector<NamedMesh>& meshes, const Colours& colours);
 
 }  // namespace previz::model

@@ -20,6 +20,7 @@
 #include "daemon/model/solids.hpp"
 #include "daemon/model/start.hpp"
 #include "daemon/model/tag_papers.hpp"
+#include "daemon/model/under_tags.hpp"
 #include "daemon/model/views.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/set/file_edit.hpp"
@@ -120,19 +121,24 @@ void print_faces(const Fit& fit, std::ostream& out) {
   }
 }
 
-// Returns the colours that the plates show; nothing without a take and its light.
-std::map<std::string, Colour> measured(const ModelOptions& options,
-                                       const std::vector<NamedMesh>& meshes, std::ostream& out) {
+// A take whose light shows the colours of things, and the device that renders by it.
+struct LitTake {
+  pipeline::Take take;
+  std::shared_ptr<render::Device> device;
+};
+
+// Returns nothing if no colours are wanted or nothing shows the light.
+std::optional<LitTake> lit_take(const ModelOptions& options, std::ostream& out) {
   if (options.grey) return {};
   if (!calibrate::is_session(options.footage)) {
     out << "colours: all faces are grey, because pictures alone do not show the light; name a "
            "session in their place to measure the colours\n";
     return {};
   }
-  const pipeline::Take take = pipeline::open_take(options.footage, options.set_file);
-  return measure_colours(
-      take, meshes,
-      render::open_device(render::options_for(options.device, take.set.quality.hardware_rays)));
+  pipeline::Take take = pipeline::open_take(options.footage, options.set_file);
+  const render::DeviceOptions wanted =
+      render::options_for(options.device, take.set.quality.hardware_rays);
+  return LitTake{std::move(take), render::open_device(wanted)};
 }
 
 void print_colour(const std::string& name, const Colour& colour, std::ostream& out) {
@@ -234,6 +240,30 @@ struct Adjusted {
   const Shape& shape;
 };
 
+// Pictures in which the surroundings of tags are looked at are so wide, as far as the camera's are.
+constexpr int around_tags_px = 480;
+
+// Adds what is shown in place of tags that are hidden.
+void add_under_tags(const LitTake& lit, const TaggedModel& model, std::vector<NamedMesh>& meshes,
+                    std::ostream& out) {
+  if (model.layout.tags.empty()) return;
+  const calibrate::SurfacePixels seen =
+      compare_surfaces(lit.take, meshes, model.colours, around_tags_px, lit.device);
+  for (UnderTag& under : under_tags(model, seen, lit.take.observer.intrinsics)) {
+    if (under.mesh.mesh.positions.empty()) {
+      fmt::print(out,
+                 "  tag {}: no plate shows enough of what is around it; if tags are hidden, its "
+                 "place has the colour of the whole surface\n",
+                 under.id);
+      continue;
+    }
+    fmt::print(out, "  under tag {}: continued from {} pixels around it\n", under.id, under.pixels);
+    // Seen from far away it coincides with what it lies on, and the first of the two is what is
+    // hit.
+    meshes.insert(meshes.begin(), std::move(under.mesh));
+  }
+}
+
 // Returns the bytes of the model's file, with the tags and the colours of everything.
 std::string coloured_model(const ModelOptions& options, const set::Set& set, const Adjusted& at,
                            const std::vector<Solid>& solids, const std::vector<NamedMesh>& scans,
@@ -241,14 +271,20 @@ std::string coloured_model(const ModelOptions& options, const set::Set& set, con
   std::vector<NamedMesh> meshes;
   for (const Solid& solid : solids) meshes.push_back(mesh_of(solid));
   meshes.insert(meshes.end(), scans.begin(), scans.end());
-  std::map<std::string, Colour> colours = measured(options, meshes, out);
-  colours.merge(tag_colours(set.tracking.family, at.layout, at.parts, at.views, at.shape, solids,
-                            response, colours));
-  for (const Solid& tag : tag_solids(set.tracking.family, at.layout, at.shape))
+  const std::optional<LitTake> lit = lit_take(options, out);
+  std::map<std::string, Colour> colours;
+  if (lit) colours = measure_colours(lit->take, meshes, lit->device);
+  colours.merge(
+      tag_colours(set.tracking.family, at.layout, at.views, at.shape, solids, response, colours));
+  for (const Solid& tag : tag_solids(set.tracking.family, at.layout, at.parts, at.shape))
     meshes.push_back(mesh_of(tag));
   std::vector<std::string> names;
   for (const NamedMesh& mesh : meshes) names.push_back(mesh.name);
-  return glb_of(meshes, reported(colours, usual_tag_colours(at.layout), names, out));
+  const Colours albedos = reported(colours, usual_tag_colours(at.layout), names, out);
+  if (lit)
+    add_under_tags(*lit, {set.tracking.family, at.parts, at.layout, at.shape, solids, albedos},
+                   meshes, out);
+  return glb_of(meshes, albedos);
 }
 
 }  // namespace

@@ -79,12 +79,17 @@ struct Draft {
   std::list<Given> scan_points;  // of each scan
 };
 
+constexpr const char* tag_paper_about =
+    "Width and height of that paper, with the tag in the middle. Default: it ends where the tag's "
+    "white cells end.";
+
 // clang-format off
 Keys plane_keys(PlanePart& p) {
   return {
       {"name", &p.name, {}, "Name of the plane.", required("\"table\"")},
       {"tags", &p.tags, ids, "Tags that lie flat on it.", optional("[0, 1, 2]")},
       {"tag_thickness_m", &p.tag_thickness_m, thin, "Thickness of their paper or board."},
+      {"tag_paper_m", &p.tag_paper_m, length, tag_paper_about, optional("[0.21, 0.297]")},
       {"points", &p.points, {}, "Points that lie on it.", optional("[\"a\", \"b\", \"c\"]")},
       {"outline", &p.outline, {}, "Points at its corners, in order around. Default: a rectangle around everything on it.", optional("[\"a\", \"b\", \"c\", \"d\"]")},
       {"margin_m", &p.margin_m, units::m.within(0, 1000), "How far that rectangle extends beyond what is on the plane."},
@@ -102,6 +107,7 @@ Keys box_keys(BoxPart& b) {
       {"bottom", &b.bottom, {}, "Points at the corners below them.", optional("[\"e\", \"f\", \"\", \"\"]")},
       {"tags", &b.tags, ids, "Tags that lie flat on its sides.", optional("[7]")},
       {"tag_thickness_m", &b.tag_thickness_m, thin, "Thickness of their paper or board."},
+      {"tag_paper_m", &b.tag_paper_m, length, tag_paper_about, optional("[0.1, 0.1]")},
       {"length_m", &b.length_m, length, "Distance of the first two corners, if it is known; of a box with tags only, its size along the first tag's right or up, whichever is more level.", optional("0.3")},
       {"width_m", &b.width_m, length, "Distance of the second and the third corner, or at a right angle to that of the tag.", optional("0.2")},
       {"height_m", &b.height_m, length, "Height; of a box with tags only that stands on nothing, along the first tag's normal.", optional("0.1")},

@@ -28,8 +28,10 @@ struct MarkedPicture {
 // A flat surface: a table, a floor, a wall. It is where its tags and points lie.
 struct PlanePart {
   std::string name = {};
-  std::vector<int> tags = {};            // that lie flat on it
-  double tag_thickness_m = 1e-4;         // of their paper or board
+  std::vector<int> tags = {};     // that lie flat on it
+  double tag_thickness_m = 1e-4;  // of their paper or board
+  // Its width and height, with the tag in the middle; absent: it ends where the tag does.
+  std::optional<std::array<double, 2>> tag_paper_m = {};
   std::vector<std::string> points = {};  // that lie on it
   // Points at its corners, in order around; empty: a rectangle around all that is on it.
   std::vector<std::string> outline = {};
@@ -49,6 +51,7 @@ struct BoxPart {
   std::vector<std::string> top, bottom;  // empty or four; bottom i is below top i
   std::vector<int> tags;                 // that lie flat on its sides
   double tag_thickness_m = 1e-4;
+  std::optional<std::array<double, 2>> tag_paper_m = {};
   // Known sizes: from the first corner to the second, from there to the third, and up.
   std::optional<double> length_m, width_m, height_m;
 };

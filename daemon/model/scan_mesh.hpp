@@ -45,6 +45,7 @@ struct ShadedMesh {
 struct NamedMesh {
   std::string name;
   ShadedMesh mesh;
+  std::vector<glm::vec3> albedos = {};  // of its vertices; empty: it has one of its own
 };
 
 // Gives each corner of a triangle the mean normal, by area, of the triangles around the vertex that

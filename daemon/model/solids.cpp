@@ -45,12 +45,7 @@ bool hides(const Face& face, const glm::dvec3& eye, const glm::dvec3& point) {
   if (from == to) return false;
   const double t = from / (from - to);
   if (!(t > 0 && t < 1 - hidden_share)) return false;
-  const glm::dvec3 at = eye + t * (point - eye);
-  for (std::size_t i = 0; i < face.outline.size(); ++i) {
-    const glm::dvec3 &a = face.outline[i], &b = face.outline[(i + 1) % face.outline.size()];
-    if (glm::dot(glm::cross(b - a, at - a), normal) < 0) return false;
-  }
-  return true;
+  return is_in(face, eye + t * (point - eye));
 }
 
 class Solids {
@@ -302,6 +297,15 @@ glm::dvec3 normal_of(const Face& face) {
   for (std::size_t i = 1; i + 1 < face.outline.size(); ++i)
     sum += glm::cross(face.outline[i] - face.outline[0], face.outline[i + 1] - face.outline[0]);
   return glm::normalize(sum);
+}
+
+bool is_in(const Face& face, const glm::dvec3& point) {
+  const glm::dvec3 normal = normal_of(face);
+  for (std::size_t i = 0; i < face.outline.size(); ++i) {
+    const glm::dvec3 &a = face.outline[i], &b = face.outline[(i + 1) % face.outline.size()];
+    if (glm::dot(glm::cross(b - a, point - a), normal) < 0) return false;
+  }
+  return true;
 }
 
 NamedMesh mesh_of(const Solid& solid) {

@@ -24,6 +24,9 @@ struct Solid {
 
 glm::dvec3 normal_of(const Face& face);
 
+// Returns whether a point of a face's plane is within its outline.
+bool is_in(const Face& face, const glm::dvec3& point);
+
 // Returns the triangles of all faces; faces share no corners, so that the normals are theirs.
 NamedMesh mesh_of(const Solid& solid);
 

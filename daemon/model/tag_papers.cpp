@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "daemon/lighting/response.hpp"
-#include "daemon/tracking/tag_family.hpp"
 #include "drivers/plate.hpp"
 
 namespace previz::model {
@@ -39,13 +38,33 @@ glm::dvec2 in_tag(const FlatTag& flat, const tracking::TagCells& cells, double r
   return {cell * (column - 0.5 * cells.total), cell * (0.5 * cells.total - row)};
 }
 
+// Returns half of the width of a tag with its white border.
+double half_tag(const FlatTag& flat, const tracking::TagCells& cells) {
+  return 0.5 * cells.total * flat.tag->size_m / cells.border;
+}
+
+// Adds what the paper has around the tag, which is `inner` from its middle.
+template <class Above>
+void add_border(const glm::dvec2& half, double inner, const Above& above, Solid& paper) {
+  const auto add = [&](const glm::dvec2& low, const glm::dvec2& high) {
+    if (high.x - low.x > 1e-9 && high.y - low.y > 1e-9)
+      paper.faces.push_back({"face",
+                             {above({low.x, low.y}), above({high.x, low.y}),
+                              above({high.x, high.y}), above({low.x, high.y})}});
+  };
+  add({-half.x, -half.y}, {half.x, -inner});
+  add({-half.x, inner}, {half.x, half.y});
+  add({-half.x, -inner}, {-inner, inner});
+  add({inner, -inner}, {half.x, inner});
+}
+
 void add_tag(const FlatTag& flat, const tracking::TagCells& cells, const Plane& ground,
-             std::vector<Solid>& solids) {
+             const glm::dvec2& half_paper_m, std::vector<Solid>& solids) {
+  const auto above_m = [&](const glm::dvec2& at) {
+    return above_ground(flat, ground, at, std::max(flat.thickness_m, least_above_m));
+  };
   const auto above = [&](double row, double column) {
-    const glm::dvec2 at = in_tag(flat, cells, row, column);
-    const glm::dvec3 p = in_world(flat, at.x, at.y);
-    const double height = std::max(flat.thickness_m, least_above_m);
-    return p + (height - glm::dot(p - ground.at, ground.normal)) * ground.normal;
+    return above_m(in_tag(flat, cells, row, column));
   };
   Solid paper{paper_of(flat), {}}, print{print_of(flat), {}};
   for (int row = 0; row < cells.total; ++row)
@@ -59,6 +78,7 @@ void add_tag(const FlatTag& flat, const tracking::TagCells& cells, const Plane& 
                {above(row + 1, column), above(row + 1, end), above(row, end), above(row, column)}});
       column = end;
     }
+  add_border(half_paper_m, half_tag(flat, cells), above_m, paper);
   solids.push_back(std::move(paper));
   solids.push_back(std::move(print));
 }
@@ -186,22 +206,51 @@ class TagColours {
 
 }  // namespace
 
-std::vector<Solid> tag_solids(const std::string& family, const Layout& layout, const Shape& shape) {
+glm::dvec3 above_ground(const FlatTag& flat, const Plane& ground, const glm::dvec2& in_tag,
+                        double height_m) {
+  const glm::dvec3 p = in_world(flat, in_tag.x, in_tag.y);
+  return p + (height_m - glm::dot(p - ground.at, ground.normal)) * ground.normal;
+}
+
+FaceBelow face_below(const FlatTag& flat, const Plane& ground, const std::vector<Solid>& solids) {
+  constexpr double same_m = 1e-3, same_cosine = 1 - 1e-6;
+  const glm::dvec3 middle = above_ground(flat, ground, glm::dvec2(0), 0);
+  for (const Solid& solid : solids)
+    for (const Face& face : solid.faces)
+      if (glm::dot(normal_of(face), ground.normal) > same_cosine &&
+          std::abs(glm::dot(face.outline[0] - ground.at, ground.normal)) < same_m &&
+          is_in(face, middle))
+        return {&solid, &face};
+  return {};
+}
+
+glm::dvec2 half_paper(const FlatTag& flat, const tracking::TagCells& cells, const Parts& parts) {
+  const auto& paper =
+      flat.is_on_box ? parts.boxes[flat.part].tag_paper_m : parts.planes[flat.part].tag_paper_m;
+  const glm::dvec2 least(half_tag(flat, cells));
+  return paper ? glm::max(least, 0.5 * glm::dvec2((*paper)[0], (*paper)[1])) : least;
+}
+
+std::vector<Solid> tag_solids(const std::string& family, const Layout& layout, const Parts& parts,
+                              const Shape& shape) {
   std::vector<Solid> solids;
-  for (const FlatTag& flat : layout.tags)
-    add_tag(flat, tracking::tag_cells(family, flat.tag->id), ground_of(flat, shape), solids);
+  for (const FlatTag& flat : layout.tags) {
+    const tracking::TagCells cells = tracking::tag_cells(family, flat.tag->id);
+    add_tag(flat, cells, ground_of(flat, shape), half_paper(flat, cells, parts), solids);
+  }
   return solids;
 }
 
 std::map<std::string, Colour> tag_colours(const std::string& family, const Layout& layout,
-                                          const Parts& parts, const Views& views,
-                                          const Shape& shape, const std::vector<Solid>& solids,
+                                          const Views& views, const Shape& shape,
+                                          const std::vector<Solid>& solids,
                                           const ResponseCurve& response,
                                           const std::map<std::string, Colour>& surfaces) {
   const TagColours all(family, views, shape, solids, response);
   std::map<std::string, Colour> colours;
-  const auto add = [&](const FlatTag& flat, const std::string& ground) {
-    const auto surface = surfaces.find(ground);
+  const auto add = [&](const FlatTag& flat) {
+    const FaceBelow below = face_below(flat, ground_of(flat, shape), solids);
+    const auto surface = below.solid ? surfaces.find(below.solid->name) : surfaces.end();
     if (surface == surfaces.end()) return;
     const Ratios ratios = all.of(flat);
     const auto put = [&](const std::string& name, const Values& values) {
@@ -214,8 +263,7 @@ std::map<std::string, Colour> tag_colours(const std::string& family, const Layou
     put(paper_of(flat), ratios.paper);
     put(print_of(flat), ratios.print);
   };
-  for (const FlatTag& flat : layout.tags)
-    add(flat, flat.is_on_box ? parts.boxes[flat.part].name : parts.planes[flat.part].name);
+  for (const FlatTag& flat : layout.tags) add(flat);
   return colours;
 }
 

@@ -61,6 +61,7 @@ void relight(const LightEdit& edit, session::LightState& light) {
 
 session::SceneState scene_state(const set::Set& set, const Edits& edits, const Motion& motion) {
   session::SceneState state;
+  state.hides_tags = edits.hides_tags;
   if (std::ranges::any_of(set.objects, [](const auto& o) { return !o.animation.empty(); }))
     state.animation_s = motion.animation_s;
   for (const set::Object& object : set.objects) {
@@ -157,6 +158,7 @@ session::LightState& state_of_edited(const std::string& name, const LightEdit& e
 }  // namespace
 
 session::SceneState with_edits(session::SceneState state, const set::Set& set, const Edits& edits) {
+  if (edits.hides_tags) state.hides_tags = edits.hides_tags;
   for (const auto& [name, edit] : edits.objects) {
     const auto object = std::ranges::find(set.objects, name, &set::Object::name);
     if (object == set.objects.end()) continue;

@@ -44,8 +44,17 @@ struct LightEdit {
 struct Edits {
   std::map<std::string, ObjectEdit> objects;
   std::map<std::string, LightEdit> lights;
+  std::optional<bool> hides_tags = {};  // absent: as the set has it
 
   friend bool operator==(const Edits&, const Edits&) = default;
+};
+
+// What a frame of a take was recorded with, that buttons go on from in its review.
+struct RecordedLook {
+  std::map<std::string, std::string> variants = {};  // by object
+  std::optional<bool> hides_tags = {};               // absent: as the set has it
+
+  friend bool operator==(const RecordedLook&, const RecordedLook&) = default;
 };
 
 // Returns the object's transform: the edit applied to `world_from_file`, which says where the

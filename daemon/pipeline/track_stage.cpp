@@ -77,6 +77,7 @@ void TrackStage::place(Shot& shot, const session::TrackRecord* record) const {
   for (const auto& [name, where] : record->scene.objects) shot.scene.objects[name] = where;
   for (const auto& [name, light] : record->scene.lights) shot.scene.lights[name] = light;
   shot.scene.variants = record->scene.variants;
+  shot.scene.hides_tags = record->scene.hides_tags;
 }
 
 }  // namespace previz::pipeline

@@ -40,7 +40,8 @@ double now_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-void override_set(set::Set& set, const RenderOptions& options) {
+void override_take(pipeline::Take& take, const RenderOptions& options) {
+  set::Set& set = take.set;
   if (options.samples) set.quality.samples = *options.samples;
   if (options.adaptive) set.quality.adaptive = *options.adaptive;
   if (options.denoise) set.quality.denoise = *options.denoise;
@@ -48,6 +49,10 @@ void override_set(set::Set& set, const RenderOptions& options) {
   if (options.error) set.quality.error = *options.error;
   if (options.seconds) set.quality.seconds = *options.seconds;
   if (options.seed) set.estimation.seed = *options.seed;
+  if (options.hides_tags) {
+    set.hides_tags = *options.hides_tags;
+    for (session::TrackRecord& record : take.session.track) record.scene.hides_tags.reset();
+  }
   if (options.estimator) set.estimation.estimator = *options.estimator;
   if (options.directory) set.output.directory = *options.directory;
   if (options.exr) set.output.exr = *options.exr;
@@ -72,17 +77,18 @@ int neighbours_of(const set::Quality& quality) {
 // Returns everything that decides what the pictures look like, as JSON that RenderDirectory
 // compares.
 std::string settings_of(const pipeline::Take& take, const set::Set& set,
-                        const std::optional<set::Overlay>& with, double scale) {
+                        const std::optional<set::Overlay>& with, const RenderOptions& options) {
   nlohmann::ordered_json json;
   json["software"] = "previzd " PREVIZ_VERSION;
   json["session"] = take.session.info.name;
   json["session_start_ns"] = take.observer_stream->records().front().timestamp_ns;
-  json["scale"] = scale;
+  json["scale"] = options.scale;
   json["samples"] = set.quality.samples;
   json["adaptive"] = set.quality.adaptive;
   json["denoise"] = set.quality.denoise;
   // Where it is unused the pictures are those of a previzd that did not know it.
   if (const int neighbours = neighbours_of(set.quality)) json["neighbours"] = neighbours;
+  if (options.hides_tags) json["hides_tags"] = *options.hides_tags;
   json["error"] = set.quality.error;
   json["seconds"] = set.quality.seconds;
   json["seed"] = set.estimation.seed;
@@ -371,14 +377,14 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
   if (options.with) with = set::read_overlay(*options.with);
   pipeline::Take take =
       pipeline::open_take(options.session, options.set_file, options.any_paths, {}, with);
-  override_set(take.set, options);
+  override_take(take, options);
   check_directory(take.set, options);
   if (!options.directory)
     take.set.output.directory = render_folder(options.session, take.session.info.take.has_value(),
                                               take.set.output.directory);
   const set::Set& set = take.set;
   const FrameRange range = range_of(options, take);
-  RenderDirectory directory(set.output, settings_of(take, set, with, options.scale), options.force,
+  RenderDirectory directory(set.output, settings_of(take, set, with, options), options.force,
                             clock_of(take), range, options.stop);
 
   RenderReport report;

@@ -40,6 +40,7 @@ struct RenderOptions {
   std::optional<double> seconds;      // quality.seconds
   std::optional<std::uint32_t> seed;  // estimation.seed
   std::optional<set::Estimator> estimator;
+  std::optional<bool> hides_tags;  // [tags] hide, whatever was recorded
   // For the pictures of this take; absent: by output.directory, render_folder().
   std::optional<std::filesystem::path> directory;
   std::optional<bool> exr, png, video;

@@ -81,10 +81,10 @@ bool can_be_hit(const scene::Mesh& mesh) {
   });
 }
 
-// An object that is in neither world for now, because its carrier is lost, counts too: no pipeline
-// is compiled anew when it comes back.
+// An object that is in neither world for now, because its carrier is lost, counts too, and so does
+// a tag that a button can hide: no pipeline is compiled anew for them.
 bool is_not_in_both(const scene::Instance& instance) {
-  return instance.presence != scene::world_both;
+  return instance.presence != scene::world_both || instance.tag != scene::TagPart::none;
 }
 
 bool lamps_shine(const Scene& scene) {

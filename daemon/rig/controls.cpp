@@ -39,7 +39,10 @@ Controls::Controls(const set::Set& set, pipeline::Edits edits, const scene::Scen
       fps_(set.quality.fps),
       set_samples_(set.quality.samples),
       is_animated_(std::ranges::any_of(
-          set.objects, [](const set::Object& object) { return !object.animation.empty(); })) {
+          set.objects, [](const set::Object& object) { return !object.animation.empty(); })),
+      has_tags_(std::ranges::find(scene.instances, scene::TagPart::printed,
+                                  &scene::Instance::tag) != scene.instances.end()),
+      hides_tags_(set.hides_tags) {
   for (const set::Object& object : set.objects)
     if (object.presence == set::Presence::virtual_object) objects_.push_back(object.name);
   for (const scene::Variants& variants : scene.variants) {
@@ -320,8 +323,8 @@ Outcome Controls::apply(const set::ScaleObject& effect) {
 std::string Controls::variant_shown(const std::string& object) const {
   const Looks& looks = looks_.at(object);
   std::string shown = looks.as_set;
-  const auto recorded = recorded_variants_.find(object);
-  if (look_.of_take && recorded != recorded_variants_.end()) shown = recorded->second;
+  const auto recorded = recorded_.variants.find(object);
+  if (look_.of_take && recorded != recorded_.variants.end()) shown = recorded->second;
   const auto edit = edits().objects.find(object);
   if (edit != edits().objects.end() && edit->second.variant) shown = *edit->second.variant;
   return shown.empty() ? looks.own : shown;
@@ -351,6 +354,17 @@ Outcome Controls::apply(const set::ResetObject&) {
       selected_object() + " is back as the " + (look_.of_take ? "take" : "set file") + " has it",
       false,
       {}};
+}
+
+Outcome Controls::apply(const set::ToggleTags&) {
+  if (!has_tags_)
+    return {"no phantom of this set has printed tags; previzd model makes one", true, {}};
+  const bool without = look_.of_take && recorded_.hides_tags ? *recorded_.hides_tags : hides_tags_;
+  std::optional<bool>& hides = edits().hides_tags;
+  const bool wanted = !hides.value_or(without);
+  hides.reset();
+  if (wanted != without) hides = wanted;
+  return {wanted ? "tags hidden" : "tags shown", false, {}};
 }
 
 Outcome Controls::apply(const set::PlayAnimations&) {

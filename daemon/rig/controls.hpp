@@ -76,10 +76,8 @@ class Controls {
   // the set's own, under names that stay theirs as long as they are changed.
   void use_found(std::vector<pipeline::FoundLamp> found);
 
-  // Takes the variants, by object, that the frame of the take in review was recorded with.
-  void use_recorded(std::map<std::string, std::string> variants) {
-    recorded_variants_ = std::move(variants);
-  }
+  // Takes what the frame of the take in review was recorded with.
+  void use_recorded(pipeline::RecordedLook recorded) { recorded_ = std::move(recorded); }
 
   // Takes the samples per pixel that hold the set's frame rate, from which the buttons go on; 0:
   // not known.
@@ -120,6 +118,7 @@ class Controls {
   Outcome apply(const set::ScaleObject& effect);
   Outcome apply(const set::ChangeVariant& effect);
   Outcome apply(const set::ResetObject& effect);
+  Outcome apply(const set::ToggleTags& effect);
   Outcome apply(const set::PlayAnimations& effect);
   Outcome apply(const set::HoldAnimations& effect);
   Outcome apply(const set::SelectLight& effect);
@@ -148,10 +147,12 @@ class Controls {
 
   std::vector<std::string> objects_;  // names of the virtual objects
   std::map<std::string, Looks> looks_;
-  std::map<std::string, std::string> recorded_variants_;
+  pipeline::RecordedLook recorded_;
   std::vector<std::string> set_lights_;
   std::vector<pipeline::FoundLamp> found_;
   const bool is_animated_;
+  const bool has_tags_;    // a phantom has printed tags
+  const bool hides_tags_;  // as the set has it
   std::size_t object_ = 0;
   // The selected lamp, which stays so while it is not found in the light; empty: the first there
   // is.

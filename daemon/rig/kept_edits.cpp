@@ -67,6 +67,12 @@ void put_lamp(const char* tables, std::size_t index, double gain_mixed, const gl
     file.put(tables, index, "tint", printed(tint * pipeline::tint(edit)));
 }
 
+void put_tags(bool hidden, set::FileEdit& file) {
+  const char* value = hidden ? "true" : "false";
+  if (file.count("tags") > 0) return file.put("tags", 0, "hide", value);
+  file.append(fmt::format("[tags]\nhide = {}\n", value));
+}
+
 // A cone that holds the lamp, its blurred edge and what it may be off by from frame to frame.
 std::string captured_table(const std::string& name, const pipeline::LightEdit& edit) {
   const double cone_deg = std::min(60.0, 1.2 * edit.found_radius_rad * per_degree + 1.5);
@@ -81,6 +87,7 @@ std::string captured_table(const std::string& name, const pipeline::LightEdit& e
 
 std::string with_edits(const std::string& text, const set::Set& set, const pipeline::Edits& edits) {
   set::FileEdit file(text);
+  if (edits.hides_tags) put_tags(*edits.hides_tags, file);
   for (std::size_t i = 0; i < set.objects.size(); ++i)
     if (const auto edit = edits.objects.find(set.objects[i].name); edit != edits.objects.end())
       put_object(i, set.objects[i], edit->second, file);

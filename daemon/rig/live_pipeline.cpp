@@ -41,7 +41,7 @@ struct LivePipeline::Impl {
   const ObserverCalibration calibration;
   pipeline::Mailbox<Shot> seen, tracked, reviewed, rendered;
   pipeline::Newest<std::vector<pipeline::FoundLamp>> found{{}};
-  pipeline::Newest<std::map<std::string, std::string>> recorded_variants{{}};
+  pipeline::Newest<pipeline::RecordedLook> recorded_look{{}};
   pipeline::Newest<set::PreviewStep> governed{{.samples = 0, .denoise = {}}};
   pipeline::Newest<std::optional<PassTimes>> pass_times{std::nullopt};
   pipeline::BoundedQueue<Shot> snapshots{4};  // closed by the render thread, or at a stop
@@ -72,7 +72,7 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
       tracking({parts.set, parts.cameras, parts.recorder, parts.look, light, parts.kept},
                calibration),
       render(parts.set, parts.look, parts.inbox, parts.kept.metrics, parts.kept.reports,
-             {tracked, reviewed, snapshots, found, governed, recorded_variants, pass_times},
+             {tracked, reviewed, snapshots, found, governed, recorded_look, pass_times},
              parts.wants, stop_source.get_token()),
       graphics({parts.set, parts.scene, parts.device, parts.renderer, render, rendered, parts.kept},
                calibration, stop_source.get_token()),
@@ -190,8 +190,8 @@ set::PreviewStep LivePipeline::governed() const {
   return *impl_->governed.get();
 }
 
-std::map<std::string, std::string> LivePipeline::recorded_variants() const {
-  return *impl_->recorded_variants.get();
+pipeline::RecordedLook LivePipeline::recorded_look() const {
+  return *impl_->recorded_look.get();
 }
 
 std::optional<PassTimes> LivePipeline::pass_times() const {

@@ -68,8 +68,8 @@ class LivePipeline {
   // Returns the step that holds quality.fps, with the samples per pixel; 0 samples if no picture
   // was held to it yet.
   set::PreviewStep governed() const;
-  // Returns the variants, by object, that the last picture of a take in review was recorded with.
-  std::map<std::string, std::string> recorded_variants() const;
+  // Returns what the last picture of a take in review was recorded with.
+  pipeline::RecordedLook recorded_look() const;
   // Returns what each pass takes, while Look::pass_times asks for it and pictures are rendered.
   std::optional<PassTimes> pass_times() const;
 

@@ -258,8 +258,9 @@ void LiveRender::start(const Look& look, Shot shot) {
   if (snapshot && shot.track.pose) shot.shown_pose.reset();
   // The crew's changes go on top of what was recorded, never in its place.
   std::optional<session::SceneState> recorded;
-  if (look.of_take && shot.scene.variants != *channels_.recorded_variants.get())
-    channels_.recorded_variants.set(shot.scene.variants);
+  if (pipeline::RecordedLook was{shot.scene.variants, shot.scene.hides_tags};
+      look.of_take && was != *channels_.recorded_look.get())
+    channels_.recorded_look.set(std::move(was));
   if (look.of_take)
     recorded = std::exchange(shot.scene, pipeline::with_edits(shot.scene, set_, look.take_edits));
   counting_failure(look.of_take, [&] {

@@ -31,8 +31,8 @@ class LiveRender {
     pipeline::BoundedQueue<pipeline::Shot>& snapshots;          // output, with layers
     pipeline::Newest<std::vector<pipeline::FoundLamp>>& found;  // output, of the last light
     pipeline::Newest<set::PreviewStep>& governed;               // output, as the rate is held
-    // Output: the variants, by object, that the last reviewed frame was recorded with.
-    pipeline::Newest<std::map<std::string, std::string>>& recorded_variants;
+    // Output: what the last reviewed frame was recorded with.
+    pipeline::Newest<pipeline::RecordedLook>& recorded_look;
     // Output: what each pass takes, while the overlay shows it.
     pipeline::Newest<std::optional<PassTimes>>& pass_times;
   };

@@ -214,7 +214,7 @@ void Rig::close_take() {
 // Gives the controls what is known of the shown picture alone.
 void Rig::know_picture() {
   controls_.use_found(pipeline_.found_lamps());
-  controls_.use_recorded(pipeline_.recorded_variants());
+  controls_.use_recorded(pipeline_.recorded_look());
   controls_.use_governed(pipeline_.governed().samples);
 }
 

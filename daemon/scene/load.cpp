@@ -54,6 +54,7 @@ Scene load_scene(const set::Set& set) {
     file->add(object, static_cast<std::uint32_t>(i));
     scene.light_objects.resize(scene.lights.size(), static_cast<std::uint32_t>(i));
   }
+  hide_tags(scene.instances, set.hides_tags);
   for (const set::Surface& surface : set.surfaces) apply(surface, set.file.string(), scene);
   scene.lights.insert(scene.lights.end(), set.lights.begin(), set.lights.end());
   scene.light_objects.resize(scene.lights.size(), no_object);

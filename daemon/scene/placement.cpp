@@ -89,6 +89,7 @@ session::LightState state_of(const set::Light& light) {
 
 Placement place(const Scene& scene, const set::Set& set, const session::SceneState& state) {
   Placement placement{scene.instances, scene.lights, {}, {}};
+  if (state.hides_tags) hide_tags(placement.instances, *state.hides_tags);
   for (const Deformation& deformation : scene.deformations)
     placement.shapes.push_back(shape_at_rest(deformation));
   if (state.animation_s)

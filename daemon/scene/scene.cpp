@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <regex>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,21 @@ bool deform_alike(const Deformation& a, const Deformation& b) {
 }
 
 }  // namespace
+
+TagPart tag_part(const std::string& node) {
+  static const std::regex pattern("(under[ _])?tag[ _]?[0-9]+([ ._].*)?", std::regex::icase);
+  std::smatch match;
+  if (!std::regex_match(node, match, pattern)) return TagPart::none;
+  return match[1].matched ? TagPart::under : TagPart::printed;
+}
+
+void hide_tags(std::vector<Instance>& instances, bool hidden) {
+  for (Instance& instance : instances)
+    if (instance.tag == TagPart::printed)
+      instance.presence = hidden ? world_real : world_both;
+    else if (instance.tag == TagPart::under)
+      instance.presence = hidden ? world_mixed : 0;
+}
 
 const Variants* variants_of(const Scene& scene, std::size_t object) {
   const auto found = std::ranges::find(scene.variants, object, &Variants::object);

@@ -43,6 +43,18 @@ struct Mesh {
   Undeformed undeformed;              // empty: the mesh keeps its shape
 };
 
+// What a part of a phantom has to do with printed tags, which can be hidden (set::Set::hides_tags).
+// The names of glTF nodes say so: "tag 3", "tag 3 paper" and "tag3" are `printed`, "under tag 3" is
+// `under` it.
+enum class TagPart {
+  none,
+  printed,  // paper or print: in both worlds; if tags are hidden, in the real one only
+  under     // what is shown in its place: in neither world; if tags are hidden, in the mixed one
+};
+
+// Returns what the node of this name is if its object is a phantom.
+TagPart tag_part(const std::string& node);
+
 // world_from_object is finite and invertible. A negative determinant reverses orientation, but the
 // front stays where it was in object space (glTF 2.0, 3.7.4): shading and geometric normals go
 // through the inverse transpose; a geometric normal computed as a cross product of world space
@@ -54,7 +66,12 @@ struct Instance {
   std::uint32_t presence = world_both;
   std::uint32_t object = 0;  // index of the set's [[object]] that the instance came from
   glm::dmat4 world_from_object{1.0};
+  TagPart tag = TagPart::none;
 };
+
+// Puts printed tags, and what is under them, into the worlds that they are in when tags are shown
+// or hidden.
+void hide_tags(std::vector<Instance>& instances, bool hidden);
 
 inline constexpr std::uint32_t no_texture = 0xffffffffu;
 inline constexpr std::uint32_t no_object = 0xffffffffu;

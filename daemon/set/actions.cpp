@@ -48,6 +48,7 @@ constexpr Action action_table[] = {
     {"next_variant", "Show the selected object in its next material variant.", ChangeVariant{1}},
     {"previous_variant", "Show the selected object in its previous material variant.", ChangeVariant{-1}},
     {"reset_object", "Reset the selected object to its place and variant in the set file.", ResetObject{}},
+    {"tags", "Hide the printed tags in the picture, or show them again.", ToggleTags{}},
     {"play", "Play the objects' animations from their beginning.", PlayAnimations{}},
     {"hold", "Pause the objects' animations; press again to continue.", HoldAnimations{}},
     {"next_light", "Select the next lamp of the set.", SelectLight{1}},

@@ -57,6 +57,7 @@ struct ChangeVariant {
   int next = 1;  // moves along the variants of the selected object's materials
 };
 struct ResetObject {};
+struct ToggleTags {};      // hides the printed tags in the picture, or shows them
 struct PlayAnimations {};  // starts them from the beginning
 struct HoldAnimations {};  // pauses them, or lets them go on
 struct SelectLight {
@@ -77,8 +78,8 @@ using Effect =
     std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits, OtherSet,
                  ChangeSamples, HoldRate, ToggleAccumulation, NextEstimator, NextLightMode,
                  NextView, ToggleOsd, TogglePassTimes, SelectObject, MoveObject, TurnObject,
-                 ScaleObject, ChangeVariant, ResetObject, PlayAnimations, HoldAnimations,
-                 SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
+                 ScaleObject, ChangeVariant, ResetObject, ToggleTags, PlayAnimations,
+                 HoldAnimations, SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
 
 struct Action {
   const char* name;

@@ -77,9 +77,19 @@ class Reader {
       }
       return;
     }
+    const std::string other = repeated ? "" : repeated_like(child.path);
     problems_.add(at, child.path,
                   (repeated ? "is not a list of tables" : "is not a table") +
-                      std::string("; allowed: keys under ") + header);
+                      std::string("; allowed: keys under ") + header +
+                      (other.empty() ? "" : "; did you mean [[" + other + "]]?"));
+  }
+
+  // Returns the name of the tables in double brackets that is nearest to a name.
+  std::string repeated_like(const std::string& path) const {
+    std::vector<std::string> repeated;
+    for (const Section& section : sections_)
+      if (section.kind == Section::Kind::repeated) repeated.push_back(section.path);
+    return nearest(path, repeated);
   }
 
   void unknown(const std::string& full, const std::string& key, const std::string& path,

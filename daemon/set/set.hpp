@@ -321,6 +321,9 @@ struct Set {
   Observer observer;
   LightCamera light_camera;
   Tracking tracking;
+  // [tags] hide: printed tags are left out of the mixed world, as far as phantoms have them
+  // (scene::TagPart).
+  bool hides_tags = false;
   std::vector<Object> objects;
   std::vector<Surface> surfaces;
   std::vector<Light> lights;

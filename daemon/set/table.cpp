@@ -230,6 +230,12 @@ Keys captured_lamp_keys(CapturedLamp& l) {
   };
 }
 
+Keys tags_keys(Set& s) {
+  return {
+      {"hide", &s.hides_tags, plain, "Whether printed tags are removed from the picture, with their light, shadows and reflections. What is known of them are the nodes of phantoms that are named \"tag 3\" or \"tag 3 paper\"; in their place the picture shows the nodes \"under tag 3\", or whatever phantom is below. `previzd model` makes both."},
+  };
+}
+
 Keys lighting_keys(Draft& d) {
   auto& l = d.set.lighting;
   return {
@@ -409,6 +415,7 @@ std::vector<Section> sections(Draft& d) {
       once("light_camera.response", optional, "How its sensor turns light into picture values.", [&d] { return calibration_keys(d.light_camera, "response"); }),
       once("light_camera.pose", optional, "The light camera's pose.", [&d] { return calibration_keys(d.light_camera, "pose"); }),
       once("tracking", always, "How the film camera's pose is found, from printed AprilTags.", [&d] { return tracking_keys(d.set.tracking); }),
+      once("tags", always, "The printed tags in the picture.", [&d] { return tags_keys(d.set); }),
       many("tag", "A printed tag; one table for each. Its pose is given in one of three forms.", d.tags, tag_keys),
       many("object", "A piece of geometry, real or virtual; one table for each.", d.objects, object_keys),
       many("surface", "The colour of a real surface, where it is known better than by the model; one table for each.", d.surfaces, [](SurfaceDraft& s) { return surface_keys(s.surface); }),

@@ -184,6 +184,7 @@ TrackRecord parse_track_line(const Json& json) {
   get_members(json, "variants", record.scene.variants);
   get_members(json, "carriers", record.carriers);
   if (json.contains("animation_s")) get(json.at("animation_s"), record.scene.animation_s.emplace());
+  if (json.contains("hides_tags")) get(json.at("hides_tags"), record.scene.hides_tags.emplace());
   if (json.contains("captured_light"))
     record.captured_light = captured_light_of(json.at("captured_light"));
   if (!record.tracked) return record;
@@ -266,6 +267,7 @@ std::string to_line(const TrackRecord& record) {
   for (const auto& [name, carrier] : record.carriers) json["carriers"][name] = json_of(carrier);
   if (record.scene.animation_s)
     json["animation_s"] = finite(*record.scene.animation_s, "animation_s");
+  if (record.scene.hides_tags) json["hides_tags"] = *record.scene.hides_tags;
   if (record.captured_light) json["captured_light"] = to_json(*record.captured_light);
   return json.dump();
 }

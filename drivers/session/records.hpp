@@ -89,7 +89,8 @@ struct SceneState {
   std::map<std::string, std::optional<LightState>> lights;
   // The variant of its materials that an object is shown in; "" is its file as it is without one.
   std::map<std::string, std::string> variants = {};
-  std::optional<double> animation_s;  // time in the animations; absent: nothing is animated
+  std::optional<double> animation_s;    // time in the animations; absent: nothing is animated
+  std::optional<bool> hides_tags = {};  // absent: as the set file has it
 
   friend bool operator==(const SceneState&, const SceneState&) = default;
 };

@@ -20,6 +20,7 @@
 #include "tests/truth/truth_render.hpp"
 #include "tests/truth/truth_set.hpp"
 #include "tests/truth/truth_take.hpp"
+#include "tests/truth/untagged.hpp"
 
 namespace previz::truth {
 namespace {
@@ -39,6 +40,7 @@ struct Arguments {
   int still = 0;  // frames with the camera at rest; 0: it moves as the set says
   std::optional<int> samples;
   bool made = false;  // the phantom is made of the set's own pictures
+  fs::path phantom;   // a file in place of the set's own; empty: that
 };
 
 struct JudgedFrame {
@@ -46,6 +48,7 @@ struct JudgedFrame {
   post::FinishedFrame record;
   std::vector<std::string> violations;
   std::optional<Chance> chance;
+  std::optional<UntaggedMeasures> untagged;
 };
 
 JudgedFrame judge_frame(const TruthSet& set, int frame, const Arguments& arguments,
@@ -58,7 +61,10 @@ JudgedFrame judge_frame(const TruthSet& set, int frame, const Arguments& argumen
   out.chance = rendered.chance;
   EstimatedFrame estimate = std::move(rendered.estimate);
 
-  const TruthFrame truth = load_truth_frame(set, frame);
+  const bool without_tags = arguments.render.hides_tags;
+  const TruthFrame truth =
+      without_tags ? load_untagged_frame(set, frame) : load_truth_frame(set, frame);
+  if (without_tags) out.untagged = compare_untagged(set, frame, estimate.composite);
   if (arguments.render.denoise) estimate = as_composited(truth.plate, std::move(estimate));
   out.measures = compare(truth, estimate);
   output::write_png(directory / (frame_name(frame) + "_compare.png"),
@@ -89,6 +95,10 @@ ordered_json to_json(const TruthSet& set, int frame, const JudgedFrame& judged) 
   json["diff_blocks"] = m.diff_blocks;
   json["virtual_blocks"] = m.virtual_blocks;
   json["edge_blocks"] = m.edge_blocks;
+  if (judged.untagged) {
+    json["e_tags"] = judged.untagged->e_tags;
+    json["outline"] = judged.untagged->outline;
+  }
   json["samples"] = judged.record.samples;
   json["seconds"] = judged.record.render_s;
   json["dropped_samples"] =
@@ -126,6 +136,10 @@ void print_row(const std::string& set, int frame, const JudgedFrame& judged) {
     std::printf("    by chance: e_diff %.4f, e_virt %.4f; biases: diff %+.5f, virt %+.5f\n",
                 judged.chance->e_diff / std::sqrt(2), judged.chance->e_virtual / std::sqrt(2),
                 m.bias_diff, m.bias_virtual);
+  if (judged.untagged)
+    std::printf("    hidden tags: e_tags %.4f over %d pixels of %d tags; outline at most %.4f\n",
+                judged.untagged->e_tags, judged.untagged->pixels, judged.untagged->tags,
+                judged.untagged->outline);
   for (const std::string& line : judged.violations) std::printf("    BOUND %s\n", line.c_str());
   std::fflush(stdout);
 }
@@ -203,6 +217,7 @@ bool run_set(const fs::path& path, const Arguments& arguments) {
   fs::remove_all(directory / "render");
   fs::create_directories(directory);
   if (arguments.expose != 1) expose_longer(set, arguments.expose, directory / "plates");
+  if (!arguments.phantom.empty()) set.phantom = arguments.phantom;
   write_take(set, arguments.take, directory / "session");
   if (arguments.made) {
     set.phantom = make_phantom(set, directory, arguments.render.device, std::cout);
@@ -212,7 +227,9 @@ bool run_set(const fs::path& path, const Arguments& arguments) {
 
   const auto add_take = [&](ordered_json& metrics) {
     metrics["light"] = arguments.take.light == LightFrom::truth ? "truth" : "captured";
-    metrics["phantom"] = arguments.made ? "made" : "truth";
+    metrics["phantom"] = arguments.made              ? "made"
+                         : arguments.phantom.empty() ? "truth"
+                                                     : arguments.phantom.filename().string();
     metrics["pose"] = arguments.take.pose == PoseFrom::truth ? "truth" : "tracked";
   };
   if (arguments.live) {
@@ -226,6 +243,8 @@ bool run_set(const fs::path& path, const Arguments& arguments) {
   double seconds = 0;
   bool held = true;
   for (const int frame : frames) {
+    if (arguments.render.hides_tags && !has_untagged(set, frame))
+      throw Error(path.string() + ": has no truth without tags of frame " + std::to_string(frame));
     const JudgedFrame judged = judge_frame(set, frame, arguments, directory);
     print_row(set.name, frame, judged);
     metrics["frames"][frame_name(frame)] = to_json(set, frame, judged);
@@ -261,15 +280,23 @@ int main(int argc, char** argv) {
       ->transform(CLI::Transformer(poses, CLI::ignore_case))
       ->type_name("truth|tracked");
   app.add_option_function<std::string>(
-         "--phantom", [&](const std::string& from) { arguments.made = from == "made"; },
-         "truth: the set's own; made: by previzd model from marks in its pictures")
-      ->check(CLI::IsMember({"truth", "made"}));
+         "--phantom",
+         [&](const std::string& from) {
+           arguments.made = from == "made";
+           if (from != "made" && from != "truth") arguments.phantom = from;
+         },
+         "truth: the set's own; made: by previzd model from marks in its pictures; or a .glb file "
+         "in place of the set's own")
+      ->check(CLI::IsMember({"truth", "made"}) | CLI::ExistingFile);
   app.add_option("--spp", arguments.samples, "samples per pixel [256; with --live 1]")
       ->check(CLI::Range(1, 1000000));
   CLI::Option* const live =
       app.add_flag("--live", arguments.live,
                    "play the sequence from its first frame as live would show it, and judge the "
                    "pictures at the truth frames, denoised");
+  app.add_flag("--hide-tags", arguments.render.hides_tags,
+               "take the printed tags out of the picture, and compare with the truth without them")
+      ->excludes(live);
   app.add_flag("!--no-history", arguments.history, "every frame stands alone")->needs(live);
   app.add_option("--still", arguments.still,
                  "with --live, show the last of the frames so many times, the camera at rest")

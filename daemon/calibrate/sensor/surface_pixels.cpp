@@ -148,9 +148,8 @@ class Probe {
       if (!shot.light) continue;
       worlds_.set_environment(shot.light->lighting.environment, take_.set.lighting.sampling);
       add(shot);
-      ++found_.frames;
     }
-    if (found_.frames == 0)
+    if (found_.world_from_cameras.empty())
       throw Error(take_.session.directory.string() +
                   ": no frame has both a pose and light: nothing to balance");
     return std::move(found_);
@@ -182,6 +181,9 @@ class Probe {
     const auto at = [&](int x, int y) {
       return std::size_t(y) * std::size_t(plate.width) + std::size_t(x);
     };
+    const auto frame = static_cast<std::uint32_t>(found_.world_from_cameras.size());
+    const glm::dvec2 pixel_size(double(full.width) / plate.width,
+                                double(full.height) / plate.height);
     for (int y = 1; y + 1 < plate.height; ++y)
       for (int x = 1; x + 1 < plate.width; ++x) {
         const std::uint32_t surface = surface_of(identity[at(x, y)]);
@@ -191,7 +193,9 @@ class Probe {
                            surface == surface_of(identity[at(x, y + 1)]);
         if (!alone || blind[at(x, y)]) continue;
         SurfacePixel pixel{.surface = surface - 1,
-                           .tile = tile(plate, x, y),
+                           .tile = tile(plate, frame, x, y),
+                           .frame = frame,
+                           .px = (glm::dvec2(x, y) + 0.5) * pixel_size - 0.5,
                            .plate = {},
                            .rendered = glm::dvec3(real[at(x, y)])};
         for (int c = 0; c < 3; ++c)
@@ -199,11 +203,12 @@ class Probe {
               response.inverse()[plate.samples[3 * at(x, y) + std::size_t(c)]] / exposure;
         found_.pixels.push_back(pixel);
       }
+    found_.world_from_cameras.push_back(shot.track.pose->world_from_camera);
   }
 
-  std::uint32_t tile(const Plate& plate, int x, int y) const {
+  static std::uint32_t tile(const Plate& plate, std::uint32_t frame, int x, int y) {
     const int column = x * tiles_a_side / plate.width, row = y * tiles_a_side / plate.height;
-    return std::uint32_t((found_.frames * tiles_a_side + row) * tiles_a_side + column);
+    return (frame * tiles_a_side + std::uint32_t(row)) * tiles_a_side + std::uint32_t(column);
   }
 
   const pipeline::Take& take_;

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <memory>
 #include <string>
@@ -17,6 +19,8 @@ namespace previz::calibrate {
 struct SurfacePixel {
   std::uint32_t surface = 0;  // index into SurfacePixels::surfaces
   std::uint32_t tile = 0;     // a sixteenth of one picture; pixels of a tile err together
+  std::uint32_t frame = 0;    // index into SurfacePixels::world_from_cameras
+  glm::dvec2 px{0};           // its centre, in pixels of the film camera's picture
   glm::dvec3 plate{0};        // linear Rec. 709 radiance of the camera's picture
   glm::dvec3 rendered{0};     // from the real world's model under the light camera's light
 };
@@ -30,7 +34,7 @@ struct KnownSurface {
 struct SurfacePixels {
   std::vector<KnownSurface> surfaces;
   std::vector<SurfacePixel> pixels;
-  int frames = 0;
+  std::vector<glm::dmat4> world_from_cameras;  // of each frame that was looked at
   std::vector<std::string> notes;
 };
 

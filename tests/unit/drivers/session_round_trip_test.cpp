@@ -132,6 +132,7 @@ TEST(Session, WhatWasMovedAndRelitComesBackBitForBit) {
       LightState{{0.1, 0.2, 0.3}, {0, 0, -1}, {0, 1, 0}, 1.0 / 7, {1.1, 1, 0.9}};
   record.scene.lights["torch"] = std::nullopt;
   record.scene.variants = {{"card", "a \"b\""}, {"vase", ""}};
+  record.scene.hides_tags = false;
   record.scene.animation_s = 1.0 / 3;
   CarrierState& stick = record.carriers["stick"];
   stick.world_from_carrier = glm::dmat4(1.0 / 7);

@@ -9,6 +9,7 @@
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/plate.hpp"
+#include "drivers/session/files.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -265,6 +266,28 @@ TEST_F(RenderSession, ASecondRunSkipsWhatIsFinishedAndOtherSamplesAreRefused) {
   EXPECT_THROW(render(options), Error);
   options.force = true;
   EXPECT_EQ(render(options).found_finished, 0u);
+}
+
+// The floor counts as a printed tag, which was hidden while the take was recorded.
+TEST_F(RenderSession, TagsAreHiddenAsTheyWereRecordedUnlessTheOptionSaysOtherwise) {
+  const auto edit = [&](const std::filesystem::path& file, const std::string& from,
+                        const std::string& to) {
+    std::string text = session::read_file(file);
+    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+      text.replace(at, from.size(), to);
+    std::ofstream(file) << text;
+  };
+  write_take(false);
+  edit(directory_ / "floor.gltf", "\"square\"", "\"tag 1\"");
+  edit(directory_ / "session/track.jsonl", "\"tracked\"", "\"hides_tags\":true,\"tracked\"");
+  RenderOptions options = of_frames(1, 1);
+  options.set_file = directory_ / "set.toml";
+  const auto covered = [&] { return layers_of(options).mask[18 * 48 + 24]; };
+  EXPECT_EQ(covered(), 1);
+  options.hides_tags = false;
+  EXPECT_THAT(test::error_of([&] { render(options); }), HasSubstr("hides_tags"));
+  options.directory = directory_ / "shown";
+  EXPECT_EQ(covered(), 0);
 }
 
 // 24 x 18 of the 48 x 36 pixels: to look at a take quickly. It is another picture, not the same.

@@ -136,6 +136,51 @@ TEST(Controls, StepsThroughTheVariantsOfTheSelectedObject) {
   EXPECT_EQ(shown("vase"), "blue");
 }
 
+scene::Scene tagged() {
+  scene::Scene scene;
+  scene.instances.resize(1);
+  scene.instances[0].tag = scene::TagPart::printed;
+  return scene;
+}
+
+TEST(Controls, HidesTagsAndShowsThemAgain) {
+  Desk desk{stage(), tagged()};
+  EXPECT_EQ(desk("tags").said, "tags hidden");
+  EXPECT_EQ(desk.scene().hides_tags, true);
+  EXPECT_EQ(desk("tags").said, "tags shown");
+  EXPECT_EQ(desk.controls.look().edits, pipeline::Edits{}) << "as the set has it";
+  set::Set hiding = stage();
+  hiding.hides_tags = true;
+  Desk other{hiding, tagged()};
+  EXPECT_EQ(other("tags").said, "tags shown");
+  EXPECT_EQ(other.scene().hides_tags, false);
+}
+
+TEST(Controls, TagsThatNoPhantomHasCannotBeHidden) {
+  const Outcome outcome = Desk()("tags");
+  EXPECT_TRUE(outcome.refused);
+  EXPECT_EQ(outcome.said, "no phantom of this set has printed tags; previzd model makes one");
+}
+
+TEST(Controls, InAReviewTagsAreHiddenFromWhatTheTakeHas) {
+  Desk desk{stage(), tagged()};
+  desk.controls.happened(Event::good_frame);
+  desk.controls.happened(Event::take_finished);
+  desk("review");
+  ASSERT_TRUE(desk.controls.look().of_take);
+  desk.controls.use_recorded({.hides_tags = true});
+  EXPECT_EQ(desk("tags").said, "tags shown");
+  session::SceneState recorded;
+  recorded.hides_tags = true;
+  const auto now = [&] {
+    return pipeline::with_edits(recorded, desk.set, desk.controls.look().take_edits).hides_tags;
+  };
+  EXPECT_EQ(now(), false);
+  EXPECT_EQ(desk("tags").said, "tags hidden");
+  EXPECT_EQ(now(), true);
+  EXPECT_EQ(desk.scene().hides_tags, std::nullopt) << "the live picture's";
+}
+
 TEST(Controls, AnObjectWithoutVariantsHasNoNext) {
   Desk desk;
   const Outcome outcome = desk("next_variant");
@@ -159,7 +204,7 @@ TEST(Controls, InAReviewVariantsAreSteppedFromThoseOfTheTake) {
   EXPECT_EQ(desk("previous_variant").said, "vase: variant \"blue\" (3 of 3)")
       << "the set's was red";
   desk("reset_object");
-  controls.use_recorded({{"vase", "green"}});
+  controls.use_recorded({.variants = {{"vase", "green"}}});
   EXPECT_EQ(desk("next_variant").said, "vase: variant \"blue\" (3 of 3)");
   session::SceneState recorded;
   recorded.variants["vase"] = "green";

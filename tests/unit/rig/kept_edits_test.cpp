@@ -129,6 +129,16 @@ TEST_F(KeptEdits, AVariantIsWrittenAlone) {
   EXPECT_EQ(after.objects[1].variant, "in \"gold\"");
 }
 
+TEST_F(KeptEdits, HiddenTagsAreWrittenIntoTheTableThatTheSetHasOrANewOne) {
+  pipeline::Edits edits;
+  edits.hides_tags = true;
+  const std::string hidden = kept(edits);
+  EXPECT_EQ(hidden, std::string(stage) + "\n[tags]\nhide = true\n");
+  EXPECT_TRUE(parse(hidden).hides_tags);
+  edits.hides_tags = false;
+  EXPECT_FALSE(parse(with_edits(hidden, parse(hidden), edits)).hides_tags);
+}
+
 TEST_F(KeptEdits, ALampIsAsItWasShown) {
   pipeline::Edits edits;
   for (const char* name : {"key", "window"}) {

@@ -69,6 +69,39 @@ TEST(Placement, AnObjectWhereTheSetHasItIsBitForBitWhereItWas) {
   EXPECT_EQ(placement.instances[1].world_from_object, stage.scene.instances[1].world_from_object);
 }
 
+TEST(TagParts, AreToldByTheNamesOfNodes) {
+  for (const char* name : {"tag 3", "tag 3 paper", "tag 12 print", "tag0", "Tag_7", "tag 3.001"})
+    EXPECT_EQ(tag_part(name), TagPart::printed) << name;
+  for (const char* name : {"under tag 3", "under_tag_3", "Under tag 3.001"})
+    EXPECT_EQ(tag_part(name), TagPart::under) << name;
+  for (const char* name : {"", "tag", "tag cube", "price tag 3", "tag 3a", "stage 3", "under tag"})
+    EXPECT_EQ(tag_part(name), TagPart::none) << name;
+}
+
+TEST(Placement, HidesTagsAndShowsWhatIsUnderThem) {
+  Stage stage;
+  stage.scene.instances[1].tag = TagPart::printed;
+  stage.scene.instances[2].tag = TagPart::under;
+  hide_tags(stage.scene.instances, false);
+  const auto presences = [&](std::optional<bool> hides) {
+    stage.state.hides_tags = hides;
+    std::vector<std::uint32_t> all;
+    for (const Instance& instance : stage.placed().instances) all.push_back(instance.presence);
+    return all;
+  };
+  const std::vector<std::uint32_t> shown{world_both, world_both, 0},
+      hidden{world_both, world_real, world_mixed};
+  EXPECT_EQ(presences({}), shown) << "as the set has it";
+  EXPECT_EQ(presences(true), hidden);
+  EXPECT_EQ(presences(false), shown);
+  hide_tags(stage.scene.instances, true);
+  EXPECT_EQ(presences({}), hidden);
+  EXPECT_EQ(presences(false), shown);
+  stage.state.objects["torch"] = std::nullopt;
+  EXPECT_EQ(presences(true), (std::vector<std::uint32_t>{world_both, 0, 0}))
+      << "what is nowhere is not brought back";
+}
+
 // Of a carrier that was not found yet: back at once when it is.
 TEST(Placement, WhatIsNowhereIsInNeitherWorld) {
   Stage stage;

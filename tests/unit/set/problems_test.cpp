@@ -61,7 +61,7 @@ const Mistake unknown[] = {
     {"[quality]\nsample = 4\n", "2:1: quality.sample: ", "did you mean samples?"},
     {"[quality]\n  smaples = 4\n", "2:3: quality.smaples: ", "did you mean samples?"},
     {"[qualitty]\nsamples = 4\n", "1:2: qualitty: unknown table", "did you mean quality?"},
-    {"[[tags]]\nid = 4\n", "1:3: tags: ", "did you mean tag?"},
+    {"[[tags]]\nid = 4\n", "1:3: tags: ", "did you mean [[tag]]?"},
     {"[observer.lense]\n", "1:11: observer.lense: ", "did you mean lens?"},
     {"[observer.lens]\nfocal_length=35\nfocal_length_mm=35\nf_number=2.0\nfocus_distance_m=1.0\n"
      "[observer.intrinsics]\n" PINHOLE,

@@ -20,7 +20,7 @@ SurfacePixels make_pixels(const std::vector<double>& wrong, const glm::dvec3& sc
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0, 1);
   SurfacePixels seen;
-  seen.frames = 3;
+  seen.world_from_cameras.resize(3);
   for (std::uint32_t s = 0; s < wrong.size(); ++s) {
     seen.surfaces.push_back({"surface " + std::to_string(s), glm::dvec3(0.3)});
     for (std::uint32_t tile = 0; tile < 12; ++tile) {

@@ -1,0 +1,208 @@
+#include "daemon/model/under_tags.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/common.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/matrix.hpp>
+#include <optional>
+
+#include "daemon/model/tag_papers.hpp"
+#include "daemon/tracking/tag_family.hpp"
+#include "drivers/calibration/pinhole.hpp"
+
+namespace previz::model {
+namespace {
+
+// The ring that is looked at is between these distances from the edge of the paper, in halves of
+// the tag's width.
+constexpr double ring_from = 0.06, ring_to = 0.7;
+// The square ends half a cell beyond the paper. A tag is not found any more where its edge is
+// blurred over a whole cell.
+constexpr double margin_cells = 0.5;
+// Pixels count by 1 / (distance^2 + near^2)^2: those within about `near` of a point are averaged.
+// It is in halves of the tag's width, too.
+constexpr double near = 0.15;
+// Slopes are held back by this share, so that pixels on one side of the paper alone, which do not
+// show the slope across, leave it at none.
+constexpr double held_slope = 0.02;
+constexpr std::size_t least_pixels = 24;
+// A pixel whose ratio is off the median of all by more than this factor shows something else.
+constexpr double most_off = 1.4;
+constexpr int steps = 16;  // squares in a row
+// Its height, for each metre that it is away from the world's origin, and at least for one: a
+// hundred times what single precision leaves. At the height of the paper it would cast a shadow,
+// a thin line along its edge, although there is nothing to cast one.
+constexpr double height_m = 1e-5;
+
+struct RingPixel {
+  glm::dvec2 at{0};  // metres, in the tag's axes
+  glm::dvec3 plate{0}, rendered{0};
+};
+
+double ratio_of(const RingPixel& pixel) {
+  return pixel.plate.g / pixel.rendered.g;
+}
+
+// Drops pixels that show something that the model does not have.
+void drop_others(std::vector<RingPixel>& ring) {
+  std::erase_if(ring, [](const RingPixel& pixel) { return !(pixel.rendered.g > 0); });
+  if (ring.empty()) return;
+  const auto middle = ring.begin() + static_cast<std::ptrdiff_t>(ring.size() / 2);
+  std::ranges::nth_element(ring, middle, {}, ratio_of);
+  const double median = ratio_of(*middle);
+  std::erase_if(ring, [&](const RingPixel& pixel) {
+    const double off = ratio_of(pixel) / median;
+    return off > most_off || off < 1 / most_off;
+  });
+}
+
+// A tag's paper, and what it lies on.
+struct Paper {
+  const FlatTag& flat;
+  Plane ground;
+  const Face& face;   // in that plane
+  glm::dvec2 half_m;  // of its width and height
+  double unit_m;      // half of the tag's width
+};
+
+class Ground {
+ public:
+  explicit Ground(const Paper& paper)
+      : plane_(paper.ground),
+        face_(paper.face),
+        tag_from_world_(glm::inverse(paper.flat.tag->world_from_tag)) {}
+
+  // Returns where a ray meets the face, in the tag's axes; nothing where it does not.
+  std::optional<glm::dvec2> meets(const glm::dvec3& origin, const glm::dvec3& direction) const {
+    const double slope = glm::dot(direction, plane_.normal);
+    const double distance = glm::dot(plane_.at - origin, plane_.normal) / slope;
+    if (!(slope < 0) || !(distance > 0)) return {};
+    const glm::dvec3 at = origin + distance * direction;
+    if (!is_in(face_, at)) return {};
+    return glm::dvec2(tag_from_world_ * glm::dvec4(at, 1));
+  }
+
+ private:
+  Plane plane_;
+  const Face& face_;
+  glm::dmat4 tag_from_world_;
+};
+
+std::vector<RingPixel> ring_around(const Paper& paper, const calibrate::SurfacePixels& seen,
+                                   std::size_t surface, const PinholeIntrinsics& lens) {
+  const Ground ground(paper);
+  std::vector<RingPixel> ring;
+  for (const calibrate::SurfacePixel& pixel : seen.pixels) {
+    if (pixel.surface != surface) continue;
+    const auto direction = undistort(lens, pixel.px);
+    if (!direction) continue;
+    const glm::dmat4& camera = seen.world_from_cameras[pixel.frame];
+    const auto at =
+        ground.meets(glm::dvec3(camera[3]), glm::dmat3(camera) * glm::dvec3(*direction, 1));
+    if (!at) continue;
+    const glm::dvec2 off = (glm::abs(*at) - paper.half_m) / paper.unit_m;
+    const double outside = std::max(off.x, off.y);
+    if (outside >= ring_from && outside <= ring_to)
+      ring.push_back({*at, pixel.plate, pixel.rendered});
+  }
+  drop_others(ring);
+  return ring;
+}
+
+// Returns what the plates have over what is rendered, at a point: the value there of the plane that
+// fits the pixels' ratios best.
+glm::dvec3 ratio_at(const glm::dvec2& at, const std::vector<RingPixel>& ring, double unit_m) {
+  // How the ratio changes with the place, for each channel: value, along x, along y.
+  std::array<glm::dmat3, 3> squares{glm::dmat3(0), glm::dmat3(0), glm::dmat3(0)};
+  std::array<glm::dvec3, 3> products{};
+  for (const RingPixel& pixel : ring) {
+    const glm::dvec2 off = (pixel.at - at) / unit_m;
+    const double weight = std::pow(glm::dot(off, off) + near * near, -2);
+    const glm::dvec3 terms(1, off);
+    for (glm::length_t c = 0; c < 3; ++c) {
+      const double rendered = pixel.rendered[c];
+      squares[std::size_t(c)] += weight * rendered * rendered * glm::outerProduct(terms, terms);
+      products[std::size_t(c)] += weight * rendered * pixel.plate[c] * terms;
+    }
+  }
+  glm::dvec3 ratio;
+  for (glm::length_t c = 0; c < 3; ++c) {
+    glm::dmat3& square = squares[std::size_t(c)];
+    const double held = held_slope * (square[1][1] + square[2][2]);
+    square[1][1] += held;
+    square[2][2] += held;
+    ratio[c] = (glm::inverse(square) * products[std::size_t(c)])[0];
+  }
+  return ratio;
+}
+
+// Returns a point of the face: this one, or where the line from `middle` to it leaves the face.
+glm::dvec3 held_in(const Face& face, const glm::dvec3& middle, const glm::dvec3& point) {
+  if (is_in(face, point)) return point;
+  double in = 0, out = 1;
+  for (int i = 0; i < 40; ++i) {
+    const double half = 0.5 * (in + out);
+    (is_in(face, glm::mix(middle, point, half)) ? in : out) = half;
+  }
+  return glm::mix(middle, point, in);
+}
+
+// Adds the vertices row by row, and squares between them. `margin_m` is beyond the paper.
+void add_ground(const Paper& paper, double margin_m, const glm::dvec3& albedo,
+                const std::vector<RingPixel>& ring, NamedMesh& named) {
+  const auto& world_from_tag = paper.flat.tag->world_from_tag;
+  const double height = height_m * std::max(1.0, glm::length(glm::dvec3(world_from_tag[3])));
+  const glm::dvec3 middle = above_ground(paper.flat, paper.ground, glm::dvec2(0), 0);
+  for (int row = 0; row <= steps; ++row)
+    for (int column = 0; column <= steps; ++column) {
+      const glm::dvec2 at =
+          (paper.half_m + margin_m) * (2.0 * glm::dvec2(column, row) / double(steps) - 1.0);
+      const glm::dvec3 below = above_ground(paper.flat, paper.ground, at, 0);
+      named.mesh.positions.emplace_back(held_in(paper.face, middle, below) +
+                                        height * paper.ground.normal);
+      named.mesh.normals.emplace_back(paper.ground.normal);
+      named.albedos.emplace_back(glm::clamp(albedo * ratio_at(at, ring, paper.unit_m), 0.0, 1.0));
+    }
+  constexpr unsigned across = steps + 1;
+  for (unsigned row = 0; row < steps; ++row)
+    for (unsigned column = 0; column < steps; ++column) {
+      const unsigned a = row * across + column, b = a + 1, c = b + across, d = a + across;
+      for (const unsigned corner : {a, b, c, a, c, d}) named.mesh.indices.push_back(corner);
+    }
+}
+
+}  // namespace
+
+std::vector<UnderTag> under_tags(const TaggedModel& model, const calibrate::SurfacePixels& seen,
+                                 const PinholeIntrinsics& lens) {
+  std::vector<UnderTag> all;
+  for (const FlatTag& flat : model.layout.tags) {
+    UnderTag& under = all.emplace_back();
+    under.id = flat.tag->id;
+    under.mesh.name = fmt::format("under tag {}", under.id);
+    const Plane ground = ground_of(flat, model.shape);
+    const FaceBelow below = face_below(flat, ground, model.solids);
+    if (!below.face) continue;
+    const auto surface =
+        std::ranges::find(seen.surfaces, below.solid->name, &calibrate::KnownSurface::material);
+    const auto albedo = model.colours.find(below.solid->name);
+    if (surface == seen.surfaces.end() || albedo == model.colours.end()) continue;
+    const tracking::TagCells cells = tracking::tag_cells(model.family, under.id);
+    const double cell_m = flat.tag->size_m / cells.border;
+    const Paper paper{flat, ground, *below.face, half_paper(flat, cells, model.parts),
+                      0.5 * cells.total * cell_m};
+    const auto ring =
+        ring_around(paper, seen, static_cast<std::size_t>(surface - seen.surfaces.begin()), lens);
+    under.pixels = ring.size();
+    if (ring.size() < least_pixels) continue;
+    add_ground(paper, margin_cells * cell_m, albedo->second, ring, under.mesh);
+  }
+  return all;
+}
+
+}  // namespace previz::model

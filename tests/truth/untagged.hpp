@@ -1,0 +1,28 @@
+// How well printed tags are taken out of the picture (docs: README.md, "Tags that are hidden").
+#pragma once
+
+#include <vector>
+
+#include "tests/truth/truth_set.hpp"
+
+namespace previz::truth {
+
+// Returns whether the set has the truth of a frame without its printed tags.
+bool has_untagged(const TruthSet& set, int frame);
+
+// Returns the truth of a frame whose mixed world has no printed tags; they count as covered, as the
+// renderer has them, so `mask` is 1 there. Throws previz::Error naming the file.
+TruthFrame load_untagged_frame(const TruthSet& set, int frame);
+
+struct UntaggedMeasures {
+  // Of the composite where tags were: rms of its error over the rms of what hiding them changes.
+  double e_tags = 0;
+  // The largest step that shows a tag's outline: how much brighter the composite is than the truth
+  // just inside of it, less how much just outside, of the truth's brightness.
+  double outline = 0;
+  int pixels = 0, tags = 0;
+};
+UntaggedMeasures compare_untagged(const TruthSet& set, int frame,
+                                  const std::vector<glm::vec3>& composite);
+
+}  // namespace previz::truth
