@@ -5,31 +5,11 @@
 #include <glm/geometric.hpp>
 #include <optional>
 
-#include "daemon/tracking/edge.hpp"
+#include "daemon/fit/light_edge.hpp"
 #include "daemon/tracking/photometry.hpp"
 
 namespace previz::model {
 namespace {
-
-constexpr double longest_px = 40, shortest_px = 12;
-// So much of an edge is left out at either end, where other edges meet it.
-constexpr double corner_px = 4;
-// The areas beside an edge must be plain so far.
-constexpr double depth_px = 4;
-// An edge is found in a wrong place where the areas beside it are not plain: the largest residual
-// of a fit, rms over the contrast.
-constexpr double most_noise = 0.1;
-
-// Returns where a pinhole shows a point of the camera's axes; nothing behind it.
-std::optional<glm::dvec2> on_pinhole(const PinholeIntrinsics& lens, const glm::dvec3& p) {
-  if (!(p.z > 0)) return {};
-  return glm::dvec2(lens.fx * p.x / p.z + lens.cx, lens.fy * p.y / p.z + lens.cy);
-}
-
-bool is_in_picture(const PinholeIntrinsics& lens, const glm::dvec2& px) {
-  return px.x > depth_px && px.y > depth_px && px.x < lens.width - 1 - depth_px &&
-         px.y < lens.height - 1 - depth_px;
-}
 
 // Returns whether walls may end this plane. Which of its corners is which then depends on where
 // they are.
@@ -90,43 +70,34 @@ class Finder {
   void find_pieces(std::size_t s, std::size_t f, std::size_t e,
                    std::vector<EdgePiece>& pieces) const {
     const auto [a, b] = ends(solids_[s].faces[f], e);
-    const auto pa = on_pinhole(views_.lens, pose_.rotation * a + pose_.translation);
-    const auto pb = on_pinhole(views_.lens, pose_.rotation * b + pose_.translation);
+    const auto pa = on_pinhole(a), pb = on_pinhole(b);
     if (!pa || !pb) return;
-    const double length = glm::distance(*pa, *pb);
-    if (length < shortest_px + 2 * corner_px) return;
     // Shares of the edge in the world are not those in the picture; over one piece they nearly are.
-    const int count = static_cast<int>(std::ceil((length - 2 * corner_px) / longest_px));
-    const double margin = corner_px / length, each = (1 - 2 * margin) / count;
-    for (int i = 0; i < count; ++i) {
-      EdgePiece piece{view_, s, f, e, margin + i * each, margin + (i + 1) * each, {}, {}, 0};
-      if (find_light(piece, a + piece.from * (b - a), a + piece.to * (b - a)))
+    for (const fit::Share& share : fit::cut(glm::distance(*pa, *pb), fit::corner_px)) {
+      EdgePiece piece{view_, s, f, e, share.from, share.to, {}, {}, 0};
+      if (find_light(piece, a + share.from * (b - a), a + share.to * (b - a)))
         pieces.push_back(piece);
     }
   }
 
+  std::optional<glm::dvec2> on_pinhole(const glm::dvec3& p) const {
+    return fit::on_pinhole(views_.lens, pose_.rotation * p + pose_.translation);
+  }
+
   bool find_light(EdgePiece& piece, const glm::dvec3& a, const glm::dvec3& b) const {
-    const auto pa = on_pinhole(views_.lens, pose_.rotation * a + pose_.translation);
-    const auto pb = on_pinhole(views_.lens, pose_.rotation * b + pose_.translation);
-    if (!pa || !pb || !is_in_picture(views_.lens, *pa) || !is_in_picture(views_.lens, *pb))
+    const auto pa = on_pinhole(a), pb = on_pinhole(b);
+    if (!pa || !pb || !fit::pixel_of(views_.lens, *pa) || !fit::pixel_of(views_.lens, *pb))
       return false;
-    if (glm::distance(*pa, *pb) < shortest_px) return false;
+    if (glm::distance(*pa, *pb) < fit::shortest_px) return false;
     for (const double share : {0.02, 0.5, 0.98})
       if (is_hidden(solids_, eye_, a + share * (b - a))) return false;
-    const glm::dvec2 along = glm::normalize(*pb - *pa), across(-along.y, along.x);
     const Frame& frame = *views_.views[view_].frame;
     const auto luminance = [&](int x, int y) { return photometry_.luminance(frame, x, y); };
-    std::optional<tracking::EdgeFit> best;
-    for (const double side : {-1.0, 1.0}) {
-      const tracking::EdgeGuess guess{*pa, *pb, *pa + side * depth_px * across, depth_px, depth_px};
-      const char* why = nullptr;
-      const auto fit = tracking::fit_edge(luminance, views_.lens, guess, &why);
-      if (fit && (!best || fit->noise / fit->contrast < best->noise / best->contrast)) best = fit;
-    }
-    if (!best || best->noise > most_noise * best->contrast) return false;
-    piece.a = best->a;
-    piece.b = best->b;
-    piece.variance_px2 = std::max(best->var_a, best->var_b);
+    const auto light = fit::find_light(luminance, views_.lens, *pa, *pb);
+    if (!light) return false;
+    piece.a = light->a;
+    piece.b = light->b;
+    piece.variance_px2 = std::max(light->var_a, light->var_b);
     return true;
   }
 
@@ -161,7 +132,7 @@ glm::dvec2 edge_off(const EdgePiece& piece, const Views& views, const Shape& sha
   const glm::dvec2 along = glm::normalize(piece.b - piece.a);
   const auto off = [&](double share) {
     const auto px =
-        on_pinhole(views.lens, pose.rotation * (a + share * (b - a)) + pose.translation);
+        fit::on_pinhole(views.lens, pose.rotation * (a + share * (b - a)) + pose.translation);
     if (!px) return std::numeric_limits<double>::quiet_NaN();
     return along.x * (*px - piece.a).y - along.y * (*px - piece.a).x;
   };

@@ -1,0 +1,51 @@
+// Says how far the edges of a model are from those of pictures.
+#pragma once
+
+#include <cstddef>
+#include <glm/mat4x4.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/fit/real_model.hpp"
+#include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::fit {
+
+// Edges of light are looked for within this distance, and found to a little more.
+inline constexpr double reach_px = 8;
+// Fewer pieces of edges than this give no figure.
+inline constexpr std::size_t least_pieces = 8;
+
+struct Figure {
+  struct Off {
+    double median_px = 0;  // >= 0, across the edges
+    double most_px = 0;    // 90 % of the pieces are nearer
+  };
+  std::size_t frames = 0;     // pictures looked at
+  std::size_t looked_at = 0;  // pieces of edges of 12 to 40 px in all of them
+  std::size_t found = 0;      // of these, pieces where the picture has an edge of light
+  std::optional<Off> off;     // absent: too few were found
+  std::string why;            // the reason then, in plain words
+};
+
+class Measurement {
+ public:
+  // Both must outlive this.
+  Measurement(const RealModel& model, const ObserverCalibration& camera)
+      : model_(model), camera_(camera) {}
+
+  // The frame is of the size that the camera is calibrated for.
+  void look(const Frame& frame, const glm::dmat4& world_from_camera);
+
+  Figure figure() const;
+
+ private:
+  const RealModel& model_;
+  const ObserverCalibration& camera_;
+  std::size_t frames_ = 0, looked_at_ = 0;
+  std::vector<double> off_px_;  // of the pieces that were found
+};
+
+}  // namespace previz::fit

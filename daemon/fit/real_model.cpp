@@ -1,0 +1,83 @@
+#include "daemon/fit/real_model.hpp"
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <utility>
+
+#include "daemon/fit/feature_edges.hpp"
+
+namespace previz::fit {
+namespace {
+
+// Surfaces touch that are as near as this.
+constexpr double touch_m = 2e-3;
+
+bool stands_still(const scene::Instance& instance, const set::Set& set) {
+  const set::Object& object = set.objects[instance.object];
+  return object.carrier.empty() && object.animation.empty();
+}
+
+bool has_edges(const scene::Material& material) {
+  return material.alpha_mode == scene::AlphaMode::opaque && !scene::transmits(material);
+}
+
+void append(const scene::Scene& scene, const scene::Instance& instance,
+            lighting::Triangles& triangles) {
+  const scene::Mesh& mesh = scene.meshes[instance.mesh];
+  for (const glm::uvec3& triangle : mesh.triangles)
+    for (int k = 0; k < 3; ++k)
+      triangles.push_back(instance.world_from_object * glm::dvec4(mesh.positions[triangle[k]], 1));
+}
+
+glm::dvec3 middle_of(const lighting::Triangles& triangles) {
+  glm::dvec3 low = triangles[0], high = low;
+  for (const glm::dvec3& p : triangles) low = glm::min(low, p), high = glm::max(high, p);
+  return 0.5 * (low + high);
+}
+
+// Looks beside the face that leads `into` the body, past its edge, whether a surface is there. The
+// look begins on the side that is away from the other face, which leads `other`.
+bool meets_surface(const lighting::Room& surface, const glm::dvec3& edge, const glm::dvec3& into,
+                   const glm::dvec3& other) {
+  const glm::dvec3 beside = edge + 0.5 * touch_m * (into - other);
+  return !surface.sees(beside, beside - 1.5 * touch_m * into);
+}
+
+bool is_touched(const lighting::Room& surface, const FeatureEdge& edge) {
+  if (edge.into.size() > 2) return true;
+  for (const double share : {0.1, 0.5, 0.9}) {
+    const glm::dvec3 at = edge.a + share * (edge.b - edge.a);
+    const glm::dvec3& into = edge.into[0];
+    if (edge.into.size() == 2) {
+      if (meets_surface(surface, at, into, edge.into[1]) ||
+          meets_surface(surface, at, edge.into[1], into))
+        return true;
+      continue;
+    }
+    const glm::dvec3 normal = glm::normalize(glm::cross(edge.b - edge.a, into));
+    if (meets_surface(surface, at, into, normal) || meets_surface(surface, at, into, -normal))
+      return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+RealModel::RealModel(const scene::Scene& scene, const set::Set& set) {
+  lighting::Triangles all, opaque;
+  for (const scene::Instance& instance : scene.instances) {
+    if (!(instance.presence & scene::world_real) || !stands_still(instance, set)) continue;
+    append(scene, instance, all);
+    if (has_edges(scene.materials[instance.material])) append(scene, instance, opaque);
+  }
+  if (all.empty()) return;
+  surface_.emplace(all, middle_of(all));
+  for (const FeatureEdge& edge : feature_edges(opaque))
+    edges_.push_back({edge.a, edge.b, is_touched(*surface_, edge)});
+}
+
+bool RealModel::is_seen(const glm::dvec3& eye, const glm::dvec3& point) const {
+  return !surface_ || surface_->sees(eye, point);
+}
+
+}  // namespace previz::fit

@@ -1,0 +1,41 @@
+// Holds what a set says about the real scene, as edges and as a surface that hides them.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <optional>
+#include <vector>
+
+#include "daemon/lighting/room.hpp"
+#include "daemon/scene/scene.hpp"
+#include "daemon/set/set.hpp"
+
+namespace previz::fit {
+
+struct ModelEdge {
+  glm::dvec3 a{0}, b{0};  // world, metres
+  // Something of the model touches it: a shadow begins there, which moves the edge of light by half
+  // a pixel and more.
+  bool is_touched = false;
+};
+
+// The parts of a scene that exist in the real world and stand still: phantoms and removed objects
+// that no carrier and no animation moves. What is cut out by alpha, or lets light through, hides
+// edges but has none.
+class RealModel {
+ public:
+  // `scene` is load_scene(set); it is not kept.
+  RealModel(const scene::Scene& scene, const set::Set& set);
+
+  // These are the edges of feature_edges().
+  const std::vector<ModelEdge>& edges() const { return edges_; }
+
+  // Returns whether the model does not hide a point of an edge from an eye, to one part in a
+  // thousand of the distance.
+  bool is_seen(const glm::dvec3& eye, const glm::dvec3& point) const;
+
+ private:
+  std::optional<lighting::Room> surface_;  // absent: nothing is real
+  std::vector<ModelEdge> edges_;
+};
+
+}  // namespace previz::fit

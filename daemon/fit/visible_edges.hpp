@@ -1,0 +1,29 @@
+// Finds the parts of a model's edges that a camera sees.
+#pragma once
+
+#include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
+#include <vector>
+
+#include "daemon/fit/real_model.hpp"
+#include "drivers/calibration.hpp"
+
+namespace previz::fit {
+
+struct Segment {
+  glm::dvec2 a{0}, b{0};
+};
+
+// Returns the edges that the model does not hide as segments in pixels of the picture, to draw over
+// it; none is longer than 40 px, so that they follow the lens's distortion. An edge ends where it
+// is hidden to 4 px.
+std::vector<Segment> visible_segments(const RealModel& model, const PinholeIntrinsics& lens,
+                                      const glm::dmat4& world_from_camera);
+
+// Returns the pieces of 12 to 40 px, on the pinhole plane (tracking::EdgeGuess), in which an edge
+// of light can be looked for: those of visible edges that nothing touches, and that are farther
+// than 8 px from every other visible edge.
+std::vector<Segment> measurable_pieces(const RealModel& model, const PinholeIntrinsics& lens,
+                                       const glm::dmat4& world_from_camera);
+
+}  // namespace previz::fit
