@@ -10,6 +10,7 @@
 #include "daemon/output/check.hpp"
 #include "daemon/pipeline/check.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/post/check_model.hpp"
 #include "daemon/render/check.hpp"
 #include "daemon/scene/check.hpp"
 #include "daemon/set/check.hpp"
@@ -22,11 +23,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-set::CheckedSet open(const fs::path& set_or_session, set::Findings& findings) {
+// `take_opened` becomes the take, if it is one.
+set::CheckedSet open(const fs::path& set_or_session, set::Findings& findings,
+                     std::optional<pipeline::Take>& take_opened) {
   set::CheckedSet checked;
   if (fs::is_directory(set_or_session)) {
-    auto take = pipeline::open_take(set_or_session, std::nullopt);
-    checked.set = std::move(take.set);
+    const auto& take = take_opened.emplace(pipeline::open_take(set_or_session, std::nullopt));
+    checked.set = take.set;
     checked.set.observer.calibration = take.observer;
     checked.set.light_camera.calibration = take.light;
     checked.has_track = !take.session.track.empty();
@@ -83,7 +86,8 @@ void describe(const set::CheckedSet& checked, const scene::Scene& scene, std::os
 int check_set(const fs::path& set_or_session, std::ostream& out) {
   set::Findings findings;
   set::CheckedSet checked;
-  findings.attempt([&] { checked = open(set_or_session, findings); });
+  std::optional<pipeline::Take> take;
+  findings.attempt([&] { checked = open(set_or_session, findings, take); });
   if (!findings.problems.empty()) return refuse(findings.problems, out);
 
   const std::optional<scene::Scene> scene = scene::check(checked, findings);
@@ -97,6 +101,11 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
   set::remark_on_cameras(checked, findings);
   scene::remark_on(*scene, checked.set, findings);
   describe(checked, *scene, out);
+  if (take) {
+    const fit::Figure figure = fit_of_model(*take, *scene);
+    describe_fit(figure, take->set, out);
+    remark_on_fit(figure, take->set, findings);
+  }
   if (!findings.remarks.empty()) out << "\nworth checking\n";
   for (const std::string& remark : findings.remarks) out << "  " << remark << '\n';
   return 0;

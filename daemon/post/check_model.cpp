@@ -1,0 +1,84 @@
+#include "daemon/post/check_model.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <ostream>
+
+#include "daemon/pipeline/track_stage.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::post {
+namespace {
+
+constexpr std::size_t frames_looked_at = 5;
+// A model that is farther off than this casts shadows that a viewer sees beside their things.
+constexpr double most_px = 2;
+
+bool has_real(const set::Set& set) {
+  return std::ranges::any_of(set.objects, [](const set::Object& object) {
+    return object.presence != set::Presence::virtual_object;
+  });
+}
+
+std::string pieces(std::size_t count) {
+  return set::plural(count, "piece") + (count == 1 ? " of an edge" : " of edges");
+}
+
+constexpr const char* what_to_do =
+    "Look where it is off (`previzd model --overlay`), and measure the phantom's place again or, "
+    "if "
+    "all of it is off, the map of tags (`previzd calibrate tags`)";
+
+}  // namespace
+
+fit::Figure fit_of_model(const pipeline::Take& take, const scene::Scene& scene) {
+  const fit::RealModel model(scene, take.set);
+  fit::Measurement measurement(model, take.observer);
+  if (model.edges().empty()) return measurement.figure();
+  pipeline::TrackStage track(take.set, take.observer, take.session.track, pipeline::start_of(take));
+  const std::size_t frames = take.observer_stream->records().size();
+  const std::size_t looked_at = std::min(frames_looked_at, frames);
+  for (std::size_t i = 0; i < looked_at; ++i) {
+    pipeline::Shot shot;
+    shot.index = (2 * i + 1) * frames / (2 * looked_at);
+    try {
+      shot.frame = take.observer_stream->read(shot.index);
+    } catch (const Error&) {
+      continue;
+    }
+    track(shot);
+    if (shot.track.pose) measurement.look(*shot.frame, shot.track.pose->world_from_camera);
+  }
+  return measurement.figure();
+}
+
+void describe_fit(const fit::Figure& figure, const set::Set& set, std::ostream& out) {
+  if (!has_real(set)) return;
+  out << "\nmodel: ";
+  if (figure.off)
+    out << fmt::format("{} in {} are {:.2f} px off in the median, {:.2f} px in 90 %",
+                       pieces(figure.found), set::plural(figure.frames, "frame"),
+                       figure.off->median_px, figure.off->most_px);
+  else
+    out << fmt::format("no figure for how far it is off: {} ({} found, {} looked for, in {})",
+                       figure.why, pieces(figure.found), figure.looked_at,
+                       set::plural(figure.frames, "frame"));
+  out << '\n';
+}
+
+void remark_on_fit(const fit::Figure& figure, const set::Set& set, set::Findings& findings) {
+  if (!has_real(set)) return;
+  if (figure.off && figure.off->median_px > most_px)
+    findings.remarks.push_back(fmt::format(
+        "the model of what is real is {:.1f} px beside the pictures' edges: shadows and what is "
+        "hidden will be as far off. {}",
+        figure.off->median_px, what_to_do));
+  else if (!figure.off && figure.looked_at >= fit::least_pieces)
+    findings.remarks.push_back(fmt::format(
+        "the pictures show {} of {} of the model within {:.0f} px: it may be far off, or differ by "
+        "too little light from what is behind it. {}",
+        figure.found, pieces(figure.looked_at), fit::reach_px, what_to_do));
+}
+
+}  // namespace previz::post
