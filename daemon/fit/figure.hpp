@@ -13,8 +13,8 @@
 
 namespace previz::fit {
 
-// Edges of light are looked for within this distance, and found to a little more.
-inline constexpr double reach_px = 8;
+// Edges of light are looked for within this distance.
+inline constexpr double reach_px = 12;
 // Fewer pieces of edges than this give no figure.
 inline constexpr std::size_t least_pieces = 8;
 
@@ -22,6 +22,10 @@ struct Figure {
   struct Off {
     double median_px = 0;  // >= 0, across the edges
     double most_px = 0;    // 90 % of the pieces are nearer
+    // By how much the model would have to be moved in the picture to lie on most of the edges: the
+    // median of the frames, to half a pixel. An edge that lies along the way is not off, so that
+    // the figures above can be much smaller.
+    double shift_px = 0;
   };
   std::size_t frames = 0;     // pictures looked at
   std::size_t looked_at = 0;  // pieces of edges of 12 to 40 px in all of them
@@ -45,7 +49,8 @@ class Measurement {
   const RealModel& model_;
   const ObserverCalibration& camera_;
   std::size_t frames_ = 0, looked_at_ = 0;
-  std::vector<double> off_px_;  // of the pieces that were found
+  std::vector<double> off_px_;    // of the pieces that were found
+  std::vector<double> shift_px_;  // of the frames in which some were
 };
 
 }  // namespace previz::fit

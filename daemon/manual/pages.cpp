@@ -57,6 +57,7 @@ previzd calibrate from cameras.txt --as observer: Turns a fisheye lens that COLM
 previzd calibrate tags walk --set desk.toml --size 80mm --write: Finds the tags' positions, from a walk past all of them with the film camera, and writes them to the set file.
 previzd model walk --set desk.toml --parts real.toml --write: Makes the phantom of the real scene from the walk's tags and the points marked in real.toml, and adds it to the set file.
 previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.
+previzd check takes/12A_take003: Does the same for a take and its own set, and measures in five of its frames how many pixels the edges of phantoms and removed objects are from those of the pictures. Where that is more than 2 px it says what to look at.
 previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the rest.
 previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Run again, it continues where it stopped.
 previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.

@@ -57,8 +57,8 @@ void describe_fit(const fit::Figure& figure, const set::Set& set, std::ostream& 
   if (!has_real(set)) return;
   out << "\nmodel: ";
   if (figure.off)
-    out << fmt::format("{} in {} are {:.2f} px off in the median, {:.2f} px in 90 %",
-                       pieces(figure.found), set::plural(figure.frames, "frame"),
+    out << fmt::format("{} of {} in {} are {:.2f} px off in the median, {:.2f} px in 90 %",
+                       figure.found, pieces(figure.looked_at), set::plural(figure.frames, "frame"),
                        figure.off->median_px, figure.off->most_px);
   else
     out << fmt::format("no figure for how far it is off: {} ({} found, {} looked for, in {})",
@@ -69,16 +69,18 @@ void describe_fit(const fit::Figure& figure, const set::Set& set, std::ostream& 
 
 void remark_on_fit(const fit::Figure& figure, const set::Set& set, set::Findings& findings) {
   if (!has_real(set)) return;
-  if (figure.off && figure.off->median_px > most_px)
+  const double off_px = figure.off ? std::max(figure.off->median_px, figure.off->shift_px) : 0;
+  if (off_px > most_px)
     findings.remarks.push_back(fmt::format(
-        "the model of what is real is {:.1f} px beside the pictures' edges: shadows and what is "
-        "hidden will be as far off. {}",
-        figure.off->median_px, what_to_do));
+        "the model of what is real is {:.1f} px beside the pictures' edges, so that shadows and "
+        "what hides virtual objects are as far off. {}",
+        off_px, what_to_do));
   else if (!figure.off && figure.looked_at >= fit::least_pieces)
-    findings.remarks.push_back(fmt::format(
-        "the pictures show {} of {} of the model within {:.0f} px: it may be far off, or differ by "
-        "too little light from what is behind it. {}",
-        figure.found, pieces(figure.looked_at), fit::reach_px, what_to_do));
+    findings.remarks.push_back(
+        fmt::format("the pictures have edges at {} of {} of the model, within {:.0f} px: it may be "
+                    "farther off, "
+                    "or be as bright as what is behind it. {}",
+                    figure.found, pieces(figure.looked_at), fit::reach_px, what_to_do));
 }
 
 }  // namespace previz::post

@@ -1,0 +1,118 @@
+// What `previzd check` says of a take in which a card is real, and drawn exactly.
+#include "daemon/post/check.hpp"
+#include "drivers/session/session.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
+#include "tests/support/tracking_synthetic.hpp"
+
+namespace previz::post::check_model_test {
+
+constexpr double focal_px = 800, half_side_m = 0.15;
+constexpr int frames = 5;
+
+// A card of 0.3 m, seen from a metre above.
+Frame picture_of_card(double card_light) {
+  test::LinearPicture light{640, 480, std::vector<double>(std::size_t{640} * 480, 0.3)};
+  constexpr double half = focal_px * half_side_m;
+  add_polygon(light,
+              {{319.5 - half, 239.5 - half},
+               {319.5 + half, 239.5 - half},
+               {319.5 + half, 239.5 + half},
+               {319.5 - half, 239.5 + half}},
+              card_light - 0.3);
+  std::mt19937 random(1);
+  return expose(light, test::Sensor{}, random);
+}
+
+class CheckModel : public testing::Test {
+ protected:
+  // Frame `lost` has no pose.
+  void write_take(const std::string& object, double card_light = 0.7, int lost = -1) {
+    const std::filesystem::path card = directory_ / "card.gltf";
+    test::write_square(card, 2 * half_side_m, 0);
+    session::SessionInfo info;
+    info.set_text =
+        "[set]\nname = 'card'\n[tracking]\nenabled = false\n[[object]]\nname = 'card'\n"
+        "file = 'card.gltf'\n" +
+        object;
+    info.observer.emplace();
+    info.observer->intrinsics = test::plain_lens(640, 480, focal_px);
+    session::SessionWriter writer(take_, info);
+    writer.add_asset("card.gltf", card);
+    Frame light;
+    light.source = "light";
+    light.width = light.height = 16;
+    light.bytes.resize(frame_bytes(light.format, light.width, light.height));
+    writer.write(light);
+    Frame frame = picture_of_card(card_light);
+    frame.source = "observer";
+    for (int i = 0; i < frames; ++i) {
+      frame.timestamp_ns = 1'000'000 + i * test::small_take_interval_ns;
+      writer.write(frame);
+      session::TrackRecord record;
+      record.frame = static_cast<std::uint64_t>(i);
+      record.timestamp_ns = frame.timestamp_ns;
+      record.tracked = i != lost;
+      record.world_from_camera = {{1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}, {0, 0, 1, 1}};
+      writer.write(record);
+    }
+    writer.close();
+  }
+
+  std::string checked() {
+    std::ostringstream out;
+    EXPECT_EQ(check_set(take_, out), 0) << out.str();
+    return out.str();
+  }
+
+  // A phantom that is so many pixels right of the card, and as many below it.
+  static std::string phantom(double off_px) {
+    return "presence = 'phantom'\nposition_m = [" + std::to_string(off_px / focal_px) + ", " +
+           std::to_string(-off_px / focal_px) + ", 0.0]\n";
+  }
+
+  test::TemporaryDirectory directory_;
+  const std::filesystem::path take_ = directory_ / "take";
+};
+
+// The sides of the card are 240 px long: six pieces each.
+TEST_F(CheckModel, SaysHowFarItIsFromThePictures) {
+  write_take(phantom(0));
+  const std::string said = checked();
+  EXPECT_THAT(said, HasSubstr("\nmodel: 120 of 120 pieces of edges in 5 frames are 0.0"));
+  EXPECT_THAT(said, HasSubstr(" px off in the median, 0.0"));
+  EXPECT_THAT(said, Not(HasSubstr("beside the pictures' edges")));
+}
+
+TEST_F(CheckModel, SaysWhatToDoIfItIsOff) {
+  write_take(phantom(3));
+  const std::string said = checked();
+  EXPECT_THAT(said, HasSubstr("are 3.00 px off in the median, 3.0"));
+  EXPECT_THAT(said, HasSubstr("worth checking"));
+  // 3 px to the right and 3 px down are 4.2.
+  EXPECT_THAT(said, HasSubstr("the model of what is real is 4.2 px beside the pictures' edges"));
+  EXPECT_THAT(said, HasSubstr("`previzd model --overlay`"));
+  EXPECT_THAT(said, HasSubstr("`previzd calibrate tags`"));
+}
+
+TEST_F(CheckModel, SaysWhatToDoIfThePicturesDoNotShowIt) {
+  write_take(phantom(0), 0.3);
+  const std::string said = checked();
+  EXPECT_THAT(said, HasSubstr("model: no figure for how far it is off: the pictures have edges of "
+                              "light at too few of the model's (0 pieces"));
+  EXPECT_THAT(said, HasSubstr("the pictures have edges at 0 of 120 pieces of edges of the model"));
+}
+
+TEST_F(CheckModel, LeavesOutFramesThatAreLostOrCannotBeRead) {
+  write_take(phantom(0), 0.7, 1);
+  test::make_unreadable(take_, 3);
+  EXPECT_THAT(checked(), HasSubstr("model: 72 of 72 pieces of edges in 3 frames"));
+}
+
+TEST_F(CheckModel, SaysNothingWhereNothingIsReal) {
+  write_take("presence = 'virtual'\n");
+  EXPECT_THAT(checked(), Not(HasSubstr("model:")));
+}
+
+}  // namespace previz::post::check_model_test
