@@ -29,7 +29,8 @@ struct SampledEdge {
   std::vector<Sample> samples;  // at even distances on the pinhole plane
 };
 
-// Cuts off what is behind a plane through the camera, or farther than `from` in front of none.
+// Cuts a line to where it is `from` or more in front of a plane through the camera; returns false
+// where nothing is left.
 bool clip(glm::dvec3& a, glm::dvec3& b, const glm::dvec3& normal, double from) {
   const double da = glm::dot(a, normal) - from, db = glm::dot(b, normal) - from;
   if (da < 0 && db < 0) return false;
@@ -75,7 +76,9 @@ class Camera {
     if (!clip_to_picture(lens_, a, b)) return seen;
     const auto pa = on_pinhole(lens_, a), pb = on_pinhole(lens_, b);
     if (!pa || !pb) return seen;
-    const int steps = std::max(1, int(std::ceil(glm::distance(*pa, *pb) / step_px)));
+    const double length = glm::distance(*pa, *pb);
+    if (length < step_px) return seen;
+    const int steps = int(std::ceil(length / step_px));
     for (int i = 0; i <= steps; ++i) {
       const double share = double(i) / steps;
       // A share of the line in the picture is this share of it in space.

@@ -16,7 +16,7 @@ struct Segment {
 
 // Returns the edges that the model does not hide as segments in pixels of the picture, to draw over
 // it; none is longer than 40 px, so that they follow the lens's distortion. An edge ends where it
-// is hidden to 4 px.
+// is hidden to 4 px, and one that is shorter than that is left out.
 std::vector<Segment> visible_segments(const RealModel& model, const PinholeIntrinsics& lens,
                                       const glm::dmat4& world_from_camera);
 

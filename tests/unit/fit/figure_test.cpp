@@ -87,19 +87,31 @@ TEST(ModelFigure, IsTheDistanceThatTheModelIsMoved) {
   }
 }
 
-// A stripe beside the card is nearer to a model that is off than the card's own edge there, but the
-// other edges do not agree with it.
+// A stripe of 10 px along most of an edge of the card. It begins so far outside the edge, or inside
+// where the number is negative.
+std::pair<std::vector<glm::dvec3>, double> stripe(std::size_t edge, double outside_px) {
+  const auto corners = card(0);
+  const glm::dvec3 &a = corners[edge], &b = corners[(edge + 1) % 4];
+  const glm::dvec3 middle = 0.5 * (corners[0] + corners[2]);
+  const glm::dvec3 px = glm::normalize(0.5 * (a + b) - middle) / 1200.0;
+  const glm::dvec3 from = a + 0.15 * (b - a), to = a + 0.85 * (b - a);
+  const double end_px = outside_px + (outside_px < 0 ? -10 : 10);
+  // Lights are added: the card's is 0.35 above the table's.
+  const double light = outside_px < 0 ? -0.3 : 0.05;
+  return {{from + outside_px * px, to + outside_px * px, to + end_px * px, from + end_px * px},
+          light};
+}
+
+// The model is 5 px beside the card, and 2 or 4 px beside a stripe. The stripes do not agree on a
+// shift; the card's edges do.
 TEST(ModelFigure, IsNotThatOfOtherEdgesNearby) {
   const auto drawn = card(0);
-  auto faces =
-      std::vector<std::pair<std::vector<glm::dvec3>, double>>{{{drawn.begin(), drawn.end()}, 0.7}};
-  // It is 10 px wide and begins 9 px outside an edge.
-  const glm::dvec3 out = glm::normalize(drawn[0] + drawn[1] - drawn[2] - drawn[3]) / 1200.0;
-  faces.push_back(
-      {{drawn[0] + 9. * out, drawn[1] + 9. * out, drawn[1] + 19. * out, drawn[0] + 19. * out},
-       0.05});
-  const Figure figure =
-      figure_of(RealScene({test::sheet(card(-5 * std::sqrt(2)))}), picture(faces));
+  const Frame frame = picture({{{drawn.begin(), drawn.end()}, 0.7},
+                               stripe(0, 9),
+                               stripe(1, -9),
+                               stripe(2, -7),
+                               stripe(3, 7)});
+  const Figure figure = figure_of(RealScene({test::sheet(card(-5 * std::sqrt(2)))}), frame);
   ASSERT_TRUE(figure.off) << figure.why;
   EXPECT_NEAR(figure.off->median_px, 5, 0.05);
   EXPECT_NEAR(figure.off->most_px, 5, 0.1);
