@@ -12,34 +12,41 @@
 namespace previz::fit {
 namespace {
 
-constexpr double weld_m = 2e-5;
+constexpr double weld_m = 2e-5, cell_m = 10 * weld_m;
 constexpr double cos_fold = 0.86602540378443865;      // of 30 degrees
 constexpr double cos_straight = 0.99984769515639123;  // of 1 degree
 
-// Gives corners numbers, the same to those that are within weld_m. The grid's cells are as wide, so
-// that whatever is that near lies in the same cell or beside it.
+// Gives corners numbers, the same to those that are within weld_m. The grid's cells are much wider,
+// so that whatever is that near mostly lies in the same cell.
 class Welder {
  public:
   std::uint32_t number_of(const glm::dvec3& p) {
-    std::array<std::int64_t, 3> cell{};
-    for (int k = 0; k < 3; ++k) cell[std::size_t(k)] = std::int64_t(std::floor(p[k] / weld_m));
-    for (std::int64_t x = -1; x <= 1; ++x)
-      for (std::int64_t y = -1; y <= 1; ++y)
-        for (std::int64_t z = -1; z <= 1; ++z)
-          if (const auto near = find(key(cell[0] + x, cell[1] + y, cell[2] + z), p)) return *near;
+    const Cell low = cell_of(p - weld_m), high = cell_of(p + weld_m);
+    for (std::int64_t x = low[0]; x <= high[0]; ++x)
+      for (std::int64_t y = low[1]; y <= high[1]; ++y)
+        for (std::int64_t z = low[2]; z <= high[2]; ++z)
+          if (const auto near = find(key({x, y, z}), p)) return *near;
     const auto number = static_cast<std::uint32_t>(places_.size());
     places_.push_back(p);
-    cells_.emplace(key(cell[0], cell[1], cell[2]), number);
+    cells_.emplace(key(cell_of(p)), number);
     return number;
   }
 
   const std::vector<glm::dvec3>& places() const { return places_; }
 
  private:
+  using Cell = std::array<std::int64_t, 3>;
+
+  static Cell cell_of(const glm::dvec3& p) {
+    Cell cell{};
+    for (int k = 0; k < 3; ++k) cell[std::size_t(k)] = std::int64_t(std::floor(p[k] / cell_m));
+    return cell;
+  }
+
   // Different cells may have one key: the distance decides.
-  static std::uint64_t key(std::int64_t x, std::int64_t y, std::int64_t z) {
-    return std::uint64_t(x) * 73856093u ^ std::uint64_t(y) * 19349663u ^
-           std::uint64_t(z) * 83492791u;
+  static std::uint64_t key(const Cell& cell) {
+    return std::uint64_t(cell[0]) * 73856093u ^ std::uint64_t(cell[1]) * 19349663u ^
+           std::uint64_t(cell[2]) * 83492791u;
   }
 
   std::optional<std::uint32_t> find(std::uint64_t key, const glm::dvec3& p) const {
