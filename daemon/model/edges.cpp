@@ -1,11 +1,13 @@
 #include "daemon/model/edges.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <optional>
 
 #include "daemon/fit/light_edge.hpp"
+#include "daemon/model/tag_papers.hpp"
 #include "daemon/tracking/photometry.hpp"
 
 namespace previz::model {
@@ -29,12 +31,42 @@ bool has_edges(const Parts& parts, const std::string& name, const std::string& f
   return std::ranges::find(parts.cylinders, name, &CylinderPart::name) == parts.cylinders.end();
 }
 
+// Edges this near a tag's paper are those of the paper, or are moved by them: the depth that is
+// looked at, and the reach.
+constexpr double near_paper_px = fit::depth_px + 2;
+
+using Quad = std::array<glm::dvec3, 4>;
+
+// Returns the corners of the papers of all tags, in the world.
+std::vector<Quad> papers_of(const Parts& parts, const Layout& layout, const Views& views,
+                            const Shape& shape) {
+  std::vector<Quad> papers;
+  for (const FlatTag& flat : layout.tags) {
+    const glm::dvec2 half =
+        half_paper(flat, tracking::tag_cells(views.family, flat.tag->id), parts);
+    const Plane ground = ground_of(flat, shape);
+    const auto corner = [&](double x, double y) {
+      return above_ground(flat, ground, half * glm::dvec2(x, y), flat.thickness_m);
+    };
+    papers.push_back({corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)});
+  }
+  return papers;
+}
+
+double distance_px(const glm::dvec2& point, const glm::dvec2& a, const glm::dvec2& b) {
+  const glm::dvec2 along = b - a;
+  const double share =
+      std::clamp(glm::dot(point - a, along) / std::max(glm::dot(along, along), 1e-12), 0.0, 1.0);
+  return glm::distance(point, a + share * along);
+}
+
 class Finder {
  public:
-  Finder(const Views& views, const std::vector<Solid>& solids, std::size_t view,
-         const tracking::CameraFromWorld& pose, const ResponseCurve& response)
+  Finder(const Views& views, const std::vector<Solid>& solids, const std::vector<Quad>& papers,
+         std::size_t view, const tracking::CameraFromWorld& pose, const ResponseCurve& response)
       : views_(views),
         solids_(solids),
+        papers_(papers),
         view_(view),
         pose_(pose),
         eye_(tracking::world_from_camera(pose)[3]),
@@ -84,13 +116,23 @@ class Finder {
     return fit::on_pinhole(views_.lens, pose_.rotation * p + pose_.translation);
   }
 
+  bool is_near_paper(const glm::dvec2& point) const {
+    for (const Quad& paper : papers_)
+      for (std::size_t i = 0; i < paper.size(); ++i) {
+        const auto a = on_pinhole(paper[i]), b = on_pinhole(paper[(i + 1) % paper.size()]);
+        if (a && b && distance_px(point, *a, *b) < near_paper_px) return true;
+      }
+    return false;
+  }
+
   bool find_light(EdgePiece& piece, const glm::dvec3& a, const glm::dvec3& b) const {
     const auto pa = on_pinhole(a), pb = on_pinhole(b);
     if (!pa || !pb || !fit::pixel_of(views_.lens, *pa) || !fit::pixel_of(views_.lens, *pb))
       return false;
     if (glm::distance(*pa, *pb) < fit::shortest_px) return false;
     for (const double share : {0.02, 0.5, 0.98})
-      if (is_hidden(solids_, eye_, a + share * (b - a))) return false;
+      if (is_hidden(solids_, eye_, a + share * (b - a)) || is_near_paper(*pa + share * (*pb - *pa)))
+        return false;
     const Frame& frame = *views_.views[view_].frame;
     const auto luminance = [&](int x, int y) { return photometry_.luminance(frame, x, y); };
     const auto light = fit::find_light(luminance, views_.lens, *pa, *pb);
@@ -103,6 +145,7 @@ class Finder {
 
   const Views& views_;
   const std::vector<Solid>& solids_;
+  const std::vector<Quad>& papers_;
   std::size_t view_;
   tracking::CameraFromWorld pose_;
   glm::dvec3 eye_;
@@ -114,10 +157,12 @@ class Finder {
 std::vector<EdgePiece> find_edges(const Parts& parts, const Layout& layout, const Views& views,
                                   const Shape& shape, const ResponseCurve& response) {
   const std::vector<Solid> solids = solids_of(parts, layout, shape);
+  const std::vector<Quad> papers = papers_of(parts, layout, views, shape);
   std::vector<EdgePiece> pieces;
   for (std::size_t v = 0; v < views.views.size(); ++v)
     if (views.views[v].frame)
-      Finder(views, solids, v, adjusted_pose(views.views[v], shape.cameras_off[v]), response)
+      Finder(views, solids, papers, v, adjusted_pose(views.views[v], shape.cameras_off[v]),
+             response)
           .find(parts, pieces);
   return pieces;
 }

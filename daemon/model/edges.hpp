@@ -22,7 +22,8 @@ struct EdgePiece {
 
 // Looks for every edge of the boxes, of planes with an outline and of rooms that the model itself
 // does not hide, in pieces of at most 40 px, less what is near a corner. An edge that differs by
-// too little light, that something else covers, or that is more than 2 px away is not found.
+// too little light, that something else covers, or that is more than 2 px away is not found, nor is
+// one beside a tag: the border of its white paper would be taken for it.
 std::vector<EdgePiece> find_edges(const Parts& parts, const Layout& layout, const Views& views,
                                   const Shape& shape, const ResponseCurve& response);
 

@@ -409,6 +409,16 @@ class Checker {
       add(given, "walls", "has a plane twice, or the floor; allowed: 4 different planes");
     plane(given, "floor", r.floor);
     for (const std::string& wall : r.walls) plane(given, "walls", wall);
+    for (const auto& [of, side] : draft_.planes) {
+      if (!different.contains(side.name)) continue;
+      for (const auto& [key, is_empty] :
+           {std::pair("edges", side.edges.empty()), {"outline", side.outline.empty()}})
+        if (!is_empty)
+          add(of, key,
+              fmt::format("\"{}\" is a side of room \"{}\" and ends where the room's other sides "
+                          "are; remove {}",
+                          side.name, r.name, key));
+    }
   }
 
   void check(const Given& given, const Given& points_given, const ScanPart& s) {

@@ -59,7 +59,7 @@ tracking::FittedPose pose_of(const std::vector<tracking::TagDetection>& detectio
 
 Views find_views(calibrate::PictureSource& source, const ObserverCalibration& camera,
                  const set::Tracking& tracking, const Parts& parts) {
-  Views views{camera.intrinsics, std::vector<MarkedView>(parts.pictures.size())};
+  Views views{camera.intrinsics, tracking.family, std::vector<MarkedView>(parts.pictures.size())};
   tracking::TagDetector detector({tracking.family, tracking.min_margin, tracking.max_hamming},
                                  camera.intrinsics, camera.response);
   std::size_t found = 0;

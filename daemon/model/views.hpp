@@ -26,7 +26,8 @@ struct MarkedView {
 
 struct Views {
   PinholeIntrinsics lens;
-  std::vector<MarkedView> views;  // as the parts list them
+  std::string family = "tag36h11";  // of the tags
+  std::vector<MarkedView> views;    // as the parts list them
 };
 
 // A ray from a camera into the world; the direction has length 1.

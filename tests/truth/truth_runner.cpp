@@ -69,7 +69,10 @@ JudgedFrame judge_frame(const TruthSet& set, int frame, const Arguments& argumen
   out.measures = compare(truth, estimate);
   output::write_png(directory / (frame_name(frame) + "_compare.png"),
                     comparison_sheet(truth, estimate));
-  if (arguments.bounds) out.violations = violations(out.measures, bounds_named(*arguments.bounds));
+  if (out.untagged && arguments.bounds)
+    out.violations = violations(*out.untagged);
+  else if (arguments.bounds)
+    out.violations = violations(out.measures, bounds_named(*arguments.bounds));
   return out;
 }
 
@@ -295,7 +298,7 @@ int main(int argc, char** argv) {
                    "play the sequence from its first frame as live would show it, and judge the "
                    "pictures at the truth frames, denoised");
   app.add_flag("--hide-tags", arguments.render.hides_tags,
-               "take the printed tags out of the picture, and compare with the truth without them")
+               "hide the printed tags, compare with the truth without them, and judge that alone")
       ->excludes(live);
   app.add_flag("!--no-history", arguments.history, "every frame stands alone")->needs(live);
   app.add_option("--still", arguments.still,

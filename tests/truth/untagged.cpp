@@ -1,5 +1,7 @@
 #include "tests/truth/untagged.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -105,6 +107,16 @@ TruthFrame load_untagged_frame(const TruthSet& set, int frame) {
   for (std::size_t i = 0; i < paper.size(); ++i)
     truth.mask[i] = std::max(truth.mask[i], paper[i].x);
   return truth;
+}
+
+std::vector<std::string> violations(const UntaggedMeasures& measures) {
+  constexpr double most_e_tags = 0.08, most_outline = 0.01;
+  std::vector<std::string> lines;
+  if (!(measures.e_tags <= most_e_tags))
+    lines.push_back(fmt::format("e_tags {:.4f}, at most {}", measures.e_tags, most_e_tags));
+  if (!(measures.outline <= most_outline))
+    lines.push_back(fmt::format("outline {:.4f}, at most {}", measures.outline, most_outline));
+  return lines;
 }
 
 UntaggedMeasures compare_untagged(const TruthSet& set, int frame,

@@ -113,6 +113,25 @@ TEST(ModelEdges, OfAnOutlineThatAWallMayCutAreLeftOut) {
   }
 }
 
+// A paper beside the crate has a border that is brighter than any edge of the crate.
+TEST(ModelEdges, BesideAPaperAreNotLookedFor) {
+  const Drawn drawn(6);
+  model::Start start = drawn.start;
+  const auto count = [&] {
+    return model::find_edges(drawn.parts, start.layout, drawn.views, start.shape, ResponseCurve{})
+        .size();
+  };
+  start.shape.boxes = {crate};
+  const std::size_t all = count();
+  set::Tag beside = flat_tag(7, 0.08, {0, 0, 0}, 0.5);
+  const glm::dvec3 side = crate.foot - (0.5 * crate.size.y + 0.052) * crate.axes[1];
+  beside.world_from_tag[3] = glm::dvec4(side, 1);
+  start.layout.tags.push_back({&beside, 0, 0});
+  const std::size_t without_some = count();
+  EXPECT_LT(without_some, all);
+  EXPECT_GT(without_some, all / 2);
+}
+
 TEST(ModelEdges, AreThoseThatTheModelDoesNotHide) {
   const Drawn drawn(4);
   model::Start start = drawn.start;

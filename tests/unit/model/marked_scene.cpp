@@ -23,7 +23,7 @@ std::vector<model::MarkedPicture> MarkedScene::pictures(std::mt19937& random) co
 
 model::Views MarkedScene::views(const model::Parts& parts, std::mt19937& random) const {
   std::normal_distribution<double> noise(0, 1);
-  model::Views views{lens, {}};
+  model::Views views{.lens = lens, .views = {}};
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     tracking::FittedPose pose;
     pose.pose = tracking::camera_from_world(cameras[i]);

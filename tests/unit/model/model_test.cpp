@@ -139,6 +139,31 @@ TEST_F(ModelCommand, MakesAPhantomAndAddsItToTheSet) {
   EXPECT_EQ(set::load_set(*options_.set_file).objects.size(), set.objects.size());
 }
 
+// Checks which worlds the made tags are in, and that what is under them has the table's colour, but
+// for its grain.
+void expect_tags(set::Set made, bool hides) {
+  made.hides_tags = hides;
+  const scene::Scene scene = scene::load_scene(made);
+  const auto table = std::ranges::find(scene.materials, "table", &scene::Material::name);
+  ASSERT_NE(table, scene.materials.end());
+  int under = 0, printed = 0;
+  for (const scene::Instance& instance : scene.instances) {
+    if (instance.tag == scene::TagPart::printed) {
+      ++printed;
+      EXPECT_EQ(instance.presence, hides ? scene::world_real : scene::world_both);
+    }
+    if (instance.tag != scene::TagPart::under) continue;
+    ++under;
+    EXPECT_EQ(instance.presence, hides ? scene::world_mixed : 0u);
+    glm::vec3 mean(0);
+    const scene::Mesh& mesh = scene.meshes[instance.mesh];
+    for (const glm::vec4& color : mesh.colors) mean += glm::vec3(color) / float(mesh.colors.size());
+    for (glm::length_t c = 0; c < 3; ++c) EXPECT_NEAR(mean[c] / table->base_color[c], 1, 0.3);
+  }
+  EXPECT_EQ(under, 3);
+  EXPECT_EQ(printed, 6);
+}
+
 // The red cube is matt. What the comparison does not know, of which the light that the fisheye
 // cannot see and the grain of the table are most, is below a tenth.
 TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
@@ -161,41 +186,8 @@ TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
     EXPECT_NEAR(colour_in(found, "tag 0 paper")[c], 0.79, 0.08);
     EXPECT_NEAR(colour_in(found, "tag 0 print")[c], 0.04, 0.01);
   }
-}
-
-// The table under a tag has the table's colour, and is in the picture when the set hides tags.
-TEST_F(ModelCommand, HasWhatIsUnderItsTags) {
-  options_.grey = false;
-  write_parts(marks() + parts_text);
-  std::ostringstream out;
-  model::make_model(options_, out);
   EXPECT_THAT(out.str(), HasSubstr("under tag 2: continued from"));
-  set::Set made = set::load_set(*options_.set_file);
-  std::erase_if(made.objects, [](const set::Object& o) { return o.name != "real"; });
-  for (const bool hides : {false, true}) {
-    made.hides_tags = hides;
-    const scene::Scene scene = scene::load_scene(made);
-    const auto table = std::ranges::find(scene.materials, "table", &scene::Material::name);
-    ASSERT_NE(table, scene.materials.end());
-    int under = 0, printed = 0;
-    for (const scene::Instance& instance : scene.instances) {
-      if (instance.tag == scene::TagPart::printed) {
-        ++printed;
-        EXPECT_EQ(instance.presence, hides ? scene::world_real : scene::world_both);
-      }
-      if (instance.tag != scene::TagPart::under) continue;
-      ++under;
-      EXPECT_EQ(instance.presence, hides ? scene::world_mixed : 0u);
-      glm::vec3 mean(0);
-      const scene::Mesh& mesh = scene.meshes[instance.mesh];
-      for (const glm::vec4& color : mesh.colors)
-        mean += glm::vec3(color) / float(mesh.colors.size());
-      // The table has a grain.
-      for (glm::length_t c = 0; c < 3; ++c) EXPECT_NEAR(mean[c] / table->base_color[c], 1, 0.3);
-    }
-    EXPECT_EQ(under, 3);
-    EXPECT_EQ(printed, 6);
-  }
+  for (const bool hides : {false, true}) expect_tags(made, hides);
 }
 
 TEST_F(ModelCommand, PlacesAScanByItsPoints) {

@@ -141,6 +141,12 @@ TEST(ModelParts, MistakesAreNamedWithTheirLine) {
        "[[plane]]\nname = \"s\"\ntags = [3]\n[[room]]\nname = \"r\"\nfloor = \"t\"\nwalls = "
        "[\"t\", \"n\", \"e\", \"s\"]\nheight_m = 2\n",
        "room.walls: has a plane twice, or the floor"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\nedges = [[\"a\", \"b\"]]\n[[plane]]\nname = "
+       "\"n\"\ntags = [1]\n[[plane]]\nname = \"e\"\ntags = [2]\n"
+       "[[plane]]\nname = \"s\"\ntags = [3]\n[[plane]]\nname = \"w\"\ntags = [4]\n"
+       "[[room]]\nname = \"r\"\nfloor = \"t\"\nwalls = [\"n\", \"e\", \"s\", \"w\"]\n"
+       "height_m = 2\n",
+       "plane.edges: \"t\" is a side of room \"r\" and ends where the room's other sides are"},
   };
   for (const auto& mistake : mistakes)
     EXPECT_THAT(refusal_of(mistake.parts), HasSubstr(mistake.words)) << mistake.parts;
