@@ -190,6 +190,29 @@ TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
   for (const bool hides : {false, true}) expect_tags(made, hides);
 }
 
+// The marks that somebody made by eye, as the demo's README shows them.
+TEST_F(ModelCommand, MakesTheDemosThings) {
+  options_.parts_file = folder_ / "demo/real.toml";
+  options_.write = false;
+  std::ostringstream out;
+  model::make_model(options_, out);
+  set::Set made = set::load_set(*options_.set_file);
+  for (const auto& [node, truth] : {std::pair("red cube", "cube_red"),
+                                    {"yellow cube", "cube_yellow"},
+                                    {"blue cube", "cube_blue"}}) {
+    made.objects.resize(1);
+    made.objects[0].file = folder_ / "demo/real.glb";
+    made.objects[0].nodes = {node};
+    const scene::Scene scene = scene::load_scene(made);
+    for (const glm::dvec3& p : corners_of(truth)) {
+      double nearest = 1;
+      for (const glm::vec3& vertex : scene.meshes.at(0).positions)
+        nearest = std::min(nearest, glm::distance(p, glm::dvec3(vertex.x, -vertex.z, vertex.y)));
+      EXPECT_LT(nearest, 1.5e-3) << node;
+    }
+  }
+}
+
 TEST_F(ModelCommand, PlacesAScanByItsPoints) {
   const std::vector<glm::dvec3> top = top_of("cube_red");
   std::ofstream obj(folder_ / "demo/cube.obj");
