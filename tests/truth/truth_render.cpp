@@ -24,7 +24,6 @@ RenderedFrame render_truth_frame(const TruthSet& set, int frame, const RenderSet
   options.adaptive = settings.adaptive;
   options.denoise = settings.denoise;
   options.neighbours = settings.neighbours;
-  if (settings.hides_tags) options.hides_tags = true;
   options.seed = settings.seed;
   options.directory = directory / "render";
   options.exr = options.png = true;

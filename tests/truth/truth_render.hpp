@@ -15,7 +15,6 @@ namespace previz::truth {
 struct RenderSettings {
   int samples = 256;
   bool adaptive = false, denoise = false;
-  bool hides_tags = false;
   bool reference = false;  // by the reference CPU tracer
   int neighbours = 0;      // with denoise: frames on each side that a picture is averaged with
   std::optional<std::uint32_t> seed = {};  // absent: the set file's

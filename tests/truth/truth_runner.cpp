@@ -51,6 +51,12 @@ struct JudgedFrame {
   std::optional<UntaggedMeasures> untagged;
 };
 
+// A set with tags may be played without them, to look at the pictures.
+TruthFrame truth_of(const TruthSet& set, int frame, const Arguments& arguments) {
+  return arguments.take.hides_tags && has_untagged(set, frame) ? load_untagged_frame(set, frame)
+                                                               : load_truth_frame(set, frame);
+}
+
 JudgedFrame judge_frame(const TruthSet& set, int frame, const Arguments& arguments,
                         const fs::path& directory) {
   RenderedFrame rendered = arguments.render.reference
@@ -61,9 +67,8 @@ JudgedFrame judge_frame(const TruthSet& set, int frame, const Arguments& argumen
   out.chance = rendered.chance;
   EstimatedFrame estimate = std::move(rendered.estimate);
 
-  const bool without_tags = arguments.render.hides_tags;
-  const TruthFrame truth =
-      without_tags ? load_untagged_frame(set, frame) : load_truth_frame(set, frame);
+  const bool without_tags = arguments.take.hides_tags;
+  const TruthFrame truth = truth_of(set, frame, arguments);
   if (without_tags) out.untagged = compare_untagged(set, frame, estimate.composite);
   if (arguments.render.denoise) estimate = as_composited(truth.plate, std::move(estimate));
   out.measures = compare(truth, estimate);
@@ -180,7 +185,7 @@ ordered_json play(const TruthSet& set, const std::vector<int>& frames, const Arg
     const auto found = truths.find(shown.index);
     if (found == truths.end() || !shown.is_last) return;
     const int frame = found->second;
-    const TruthFrame truth = load_truth_frame(set, frame);
+    const TruthFrame truth = truth_of(set, frame, arguments);
     const EstimatedFrame estimate = as_shown(truth, shown.picture);
     JudgedFrame judged;
     judged.measures = compare(truth, estimate);
@@ -246,7 +251,7 @@ bool run_set(const fs::path& path, const Arguments& arguments) {
   double seconds = 0;
   bool held = true;
   for (const int frame : frames) {
-    if (arguments.render.hides_tags && !has_untagged(set, frame))
+    if (arguments.take.hides_tags && !has_untagged(set, frame))
       throw Error(path.string() + ": has no truth without tags of frame " + std::to_string(frame));
     const JudgedFrame judged = judge_frame(set, frame, arguments, directory);
     print_row(set.name, frame, judged);
@@ -297,9 +302,8 @@ int main(int argc, char** argv) {
       app.add_flag("--live", arguments.live,
                    "play the sequence from its first frame as live would show it, and judge the "
                    "pictures at the truth frames, denoised");
-  app.add_flag("--hide-tags", arguments.render.hides_tags,
-               "hide the printed tags, compare with the truth without them, and judge that alone")
-      ->excludes(live);
+  app.add_flag("--hide-tags", arguments.take.hides_tags,
+               "hide the printed tags, compare with the truth without them, and judge that alone");
   app.add_flag("!--no-history", arguments.history, "every frame stands alone")->needs(live);
   app.add_option("--still", arguments.still,
                  "with --live, show the last of the frames so many times, the camera at rest")

@@ -116,6 +116,7 @@ std::string set_file_text(const TruthSet& set, const TakeOptions& options) {
     out << "environment = " << quoted(as_written(set.environment)) << "\n";
   }
   for (const std::string& line : options.lighting) out << line << "\n";
+  if (options.hides_tags) out << "\n[tags]\nhide = true\n";
   out << "\n[estimator]\nmax_depth = 16\n";
   for (const std::string& line : options.estimator) out << line << "\n";
   return out.str();

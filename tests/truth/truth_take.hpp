@@ -18,6 +18,7 @@ struct TakeOptions {
   PoseFrom pose = PoseFrom::truth;
   // Lines for the set file's sections, "key = value".
   std::vector<std::string> lighting = {}, estimator = {};
+  bool hides_tags = false;
 };
 
 // The set file: calibration is the session's, objects and environment its assets. Truth was
