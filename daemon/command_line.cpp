@@ -207,6 +207,11 @@ void add_model(CLI::App& app, model::ModelOptions& options) {
                 "Add the model to the set file; keeps the old file beside it")
       ->excludes(pictures);
   command.add_flag("--grey", options.grey, "Do not measure the colours of its faces");
+  command
+      .add_flag("--tags-only", options.tags_only,
+                "The model is the printed tags alone, with what is under them: for a set whose "
+                "phantom is made elsewhere and whose tags are to be hidden")
+      ->excludes(pictures);
   add_device_options(command, options.device);
 }
 

@@ -284,6 +284,10 @@ std::string coloured_model(const ModelOptions& options, const set::Set& set, con
   if (lit)
     add_under_tags(*lit, {set.tracking.family, at.parts, at.layout, at.shape, solids, albedos},
                    meshes, out);
+  if (options.tags_only)
+    std::erase_if(meshes, [](const NamedMesh& mesh) {
+      return scene::named_tag(mesh.name).part == scene::TagPart::none;
+    });
   return glb_of(meshes, albedos);
 }
 
@@ -309,6 +313,9 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   const auto source = calibrate::open_source(options.footage, "observer");
   const Views views = find_views(*source, camera, set.tracking, parts);
   const Start start = first_guess(parts, views, set.tracking.tags);
+  if (options.tags_only && start.layout.tags.empty())
+    throw Error(parts.file.string() +
+                ": no tag lies on a part; list tags in a [[plane]] or a [[box]]");
   const Fit fit = adjust_to_edges(parts, views, start, camera.response);
   print_fit(parts, start.layout, fit, out);
   print_faces(fit, out);
@@ -321,7 +328,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   fmt::print(out, "model: {}\n", file.string());
   if (options.overlay) write_overlays(views, fit.shape, solids, *options.overlay);
   if (options.overlay && !scans.empty()) out << "scans are not drawn over the pictures\n";
-  warn_of_others(set, file, out);
+  if (!options.tags_only) warn_of_others(set, file, out);
   if (edited) {
     const auto old = set::keep_beside(*options.set_file);
     session::replace_file(*options.set_file, *edited);

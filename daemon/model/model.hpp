@@ -20,6 +20,7 @@ struct ModelOptions {
       overlay;                   // pictures with the model over them, into this folder
   bool write = false;            // add the model to the set file
   bool grey = false;             // do not measure colours
+  bool tags_only = false;        // the model is the tags alone, with what is under them
   render::DeviceOptions device;  // that colours are measured on
 };
 

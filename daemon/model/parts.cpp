@@ -9,6 +9,7 @@
 #include <map>
 #include <set>
 
+#include "daemon/scene/scene.hpp"
 #include "daemon/set/read_tables.hpp"
 #include "drivers/error.hpp"
 
@@ -237,6 +238,10 @@ class Checker {
     if (name.empty()) return add(given, "name", "is empty; allowed: a name");
     if (!names_.insert(name).second)
       add(given, "name", '"' + name + "\" is used twice; allowed: a name for each part");
+    if (scene::named_tag(name).part != scene::TagPart::none)
+      add(given, "name",
+          '"' + name +
+              "\" is how printed tags are named, which can be hidden; allowed: another name");
   }
 
   void check_names() {

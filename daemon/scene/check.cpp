@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <numbers>
 #include <ostream>
+#include <set>
+#include <string>
+#include <vector>
 
 #include "daemon/scene/load.hpp"
 #include "daemon/set/names.hpp"
@@ -32,7 +35,32 @@ std::optional<Scene> check(const set::CheckedSet& checked, set::Findings& findin
   }
 }
 
+namespace {
+
+// Names the tags that stay in the picture although tags are to be hidden.
+void remark_on_tags(const Scene& scene, const set::Set& set, set::Findings& findings) {
+  if (!set.hides_tags) return;
+  std::set<int> known;
+  for (const Instance& instance : scene.instances)
+    if (instance.tag == TagPart::printed) known.insert(named_tag(instance.name).id);
+  std::string missing;
+  const auto look_for = [&](const std::vector<set::Tag>& tags) {
+    for (const set::Tag& tag : tags)
+      if (!known.contains(tag.id))
+        missing += (missing.empty() ? "" : ", ") + std::to_string(tag.id);
+  };
+  look_for(set.tracking.tags);
+  for (const set::Carrier& carrier : set.tracking.carriers) look_for(carrier.tags);
+  if (!missing.empty())
+    findings.remarks.push_back(
+        "tags.hide is true, but these tags are in no phantom and stay in the picture: " + missing +
+        "; `previzd model --tags-only` makes a phantom of them");
+}
+
+}  // namespace
+
 void remark_on(const Scene& scene, const set::Set& set, set::Findings& findings) {
+  remark_on_tags(scene, set, findings);
   for (const auto& note : scene.notes) findings.remarks.push_back(note);
   const auto has = [&](set::Presence presence) {
     return std::ranges::find(set.objects, presence, &set::Object::presence) != set.objects.end();

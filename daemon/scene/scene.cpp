@@ -36,11 +36,13 @@ bool deform_alike(const Deformation& a, const Deformation& b) {
 
 }  // namespace
 
-TagPart tag_part(const std::string& node) {
-  static const std::regex pattern("(under[ _])?tag[ _]?[0-9]+([ ._].*)?", std::regex::icase);
+NamedTag named_tag(const std::string& node) {
+  // Families have at most some ten thousand tags.
+  static const std::regex pattern("(under[ _])?tag[ _]?([0-9]{1,5})([ ._].*)?", std::regex::icase);
+  constexpr std::size_t longest = 200;  // of a name that a person gives
   std::smatch match;
-  if (!std::regex_match(node, match, pattern)) return TagPart::none;
-  return match[1].matched ? TagPart::under : TagPart::printed;
+  if (node.size() > longest || !std::regex_match(node, match, pattern)) return {};
+  return {match[1].matched ? TagPart::under : TagPart::printed, std::stoi(match[2])};
 }
 
 void hide_tags(std::vector<Instance>& instances, bool hidden) {

@@ -52,8 +52,12 @@ enum class TagPart {
   under     // what is shown in its place: in neither world; if tags are hidden, in the mixed one
 };
 
-// Returns what the node of this name is if its object is a phantom.
-TagPart tag_part(const std::string& node);
+// Returns what the node of this name is if its object is a phantom, and the tag's id.
+struct NamedTag {
+  TagPart part = TagPart::none;
+  int id = -1;
+};
+NamedTag named_tag(const std::string& node);
 
 // world_from_object is finite and invertible. A negative determinant reverses orientation, but the
 // front stays where it was in object space (glTF 2.0, 3.7.4): shading and geometric normals go

@@ -190,6 +190,24 @@ TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
   for (const bool hides : {false, true}) expect_tags(made, hides);
 }
 
+// For a phantom of another program, which needs no marks.
+TEST_F(ModelCommand, MakesTheTagsAlone) {
+  options_.tags_only = true;
+  write_parts(marks() + parts_text);
+  std::ostringstream out;
+  model::make_model(options_, out);
+  EXPECT_THAT(out.str(), Not(HasSubstr("beside this model")));
+  set::Set made = set::load_set(*options_.set_file);
+  std::erase_if(made.objects, [](const set::Object& o) { return o.name != "real"; });
+  const scene::Scene scene = scene::load_scene(made);
+  EXPECT_EQ(scene.instances.size(), 6u);
+  for (const scene::Instance& instance : scene.instances)
+    EXPECT_EQ(instance.tag, scene::TagPart::printed);
+  write_parts(marks() +
+              "[[box]]\nname = \"red\"\nheight_m = 0.09\ntop = [\"t1\", \"t2\", \"t3\", \"t4\"]\n");
+  EXPECT_THAT(refusal(), HasSubstr("no tag lies on a part"));
+}
+
 // The marks that somebody made by eye, as the demo's README shows them.
 TEST_F(ModelCommand, MakesTheDemosThings) {
   options_.parts_file = folder_ / "demo/real.toml";

@@ -392,4 +392,20 @@ TEST_F(Check, LoadsTheRoom) {
             0);
 }
 
+// Tag 1 is a node of the phantom, tag 7 is not.
+TEST_F(Check, NamesTagsThatCannotBeHidden) {
+  std::string file = triangle("\"name\": \"paper\"");
+  file.insert(file.find("\"mesh\": 0}"), "\"name\": \"tag 1 paper\", ");
+  write("real.gltf", file);
+  const std::string set =
+      "[[object]]\nname='real'\nfile='real.gltf'\npresence='phantom'\n"
+      "[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,0,0]\n[[tag]]\nid=7\nsize_m=0.1\nposition_m=[1,0,0]"
+      "\n";
+  check(set);
+  EXPECT_THAT(said_, Not(HasSubstr("tags.hide")));
+  check(set + "[tags]\nhide = true\n");
+  EXPECT_THAT(said_, HasSubstr("tags.hide is true, but these tags are in no phantom and stay in "
+                               "the picture: 7;"));
+}
+
 }  // namespace previz::post::check_test

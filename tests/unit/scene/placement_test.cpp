@@ -71,11 +71,13 @@ TEST(Placement, AnObjectWhereTheSetHasItIsBitForBitWhereItWas) {
 
 TEST(TagParts, AreToldByTheNamesOfNodes) {
   for (const char* name : {"tag 3", "tag 3 paper", "tag 12 print", "tag0", "Tag_7", "tag 3.001"})
-    EXPECT_EQ(tag_part(name), TagPart::printed) << name;
+    EXPECT_EQ(named_tag(name).part, TagPart::printed) << name;
   for (const char* name : {"under tag 3", "under_tag_3", "Under tag 3.001"})
-    EXPECT_EQ(tag_part(name), TagPart::under) << name;
+    EXPECT_EQ(named_tag(name).part, TagPart::under) << name;
   for (const char* name : {"", "tag", "tag cube", "price tag 3", "tag 3a", "stage 3", "under tag"})
-    EXPECT_EQ(tag_part(name), TagPart::none) << name;
+    EXPECT_EQ(named_tag(name).part, TagPart::none) << name;
+  EXPECT_EQ(named_tag("tag 12 print").id, 12);
+  EXPECT_EQ(named_tag("under tag 3.001").id, 3);
 }
 
 TEST(Placement, HidesTagsAndShowsWhatIsUnderThem) {
