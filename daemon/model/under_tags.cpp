@@ -34,10 +34,11 @@ constexpr std::size_t least_pixels = 24;
 // A pixel whose ratio is off the median of all by more than this factor shows something else.
 constexpr double most_off = 1.4;
 constexpr int steps = 16;  // squares in a row
-// Its height, for each metre that it is away from the world's origin, and at least for one: a
-// hundred times what single precision leaves. At the height of the paper it would cast a shadow,
-// a thin line along its edge, although there is nothing to cast one.
-constexpr double height_m = 1e-5;
+// Its height, for each metre that the farthest camera is away from it or from the world's origin,
+// and at least for one. Rays tell two surfaces apart that are a third of that apart (TRACE_TIE of
+// shaders/lib/hit.glsl). At the height of the paper it would cast a shadow, a thin line along its
+// edge, although there is nothing to cast one.
+constexpr double height_per_m = 1e-5;
 
 struct RingPixel {
   glm::dvec2 at{0};  // metres, in the tag's axes
@@ -68,6 +69,7 @@ struct Paper {
   const Face& face;   // in that plane
   glm::dvec2 half_m;  // of its width and height
   double unit_m;      // half of the tag's width
+  double height_m;    // of what is under it, above the ground
 };
 
 class Ground {
@@ -152,11 +154,19 @@ glm::dvec3 held_in(const Face& face, const glm::dvec3& middle, const glm::dvec3&
   return glm::mix(middle, point, in);
 }
 
+// Returns how high a tag's ground is put above what it stands for.
+double height_of(const FlatTag& flat, const calibrate::SurfacePixels& seen) {
+  double farthest_m = 1;
+  for (const glm::dmat4& camera : seen.world_from_cameras) {
+    const glm::dvec3 eye(camera[3]), tag(flat.tag->world_from_tag[3]);
+    farthest_m = std::max({farthest_m, glm::length(eye), glm::distance(eye, tag)});
+  }
+  return height_per_m * farthest_m;
+}
+
 // Adds the vertices row by row, and squares between them. `margin_m` is beyond the paper.
 void add_ground(const Paper& paper, double margin_m, const glm::dvec3& albedo,
                 const std::vector<RingPixel>& ring, NamedMesh& named) {
-  const auto& world_from_tag = paper.flat.tag->world_from_tag;
-  const double height = height_m * std::max(1.0, glm::length(glm::dvec3(world_from_tag[3])));
   const glm::dvec3 middle = above_ground(paper.flat, paper.ground, glm::dvec2(0), 0);
   for (int row = 0; row <= steps; ++row)
     for (int column = 0; column <= steps; ++column) {
@@ -164,7 +174,7 @@ void add_ground(const Paper& paper, double margin_m, const glm::dvec3& albedo,
           (paper.half_m + margin_m) * (2.0 * glm::dvec2(column, row) / double(steps) - 1.0);
       const glm::dvec3 below = above_ground(paper.flat, paper.ground, at, 0);
       named.mesh.positions.emplace_back(held_in(paper.face, middle, below) +
-                                        height * paper.ground.normal);
+                                        paper.height_m * paper.ground.normal);
       named.mesh.normals.emplace_back(paper.ground.normal);
       named.albedos.emplace_back(glm::clamp(albedo * ratio_at(at, ring, paper.unit_m), 0.0, 1.0));
     }
@@ -194,8 +204,12 @@ std::vector<UnderTag> under_tags(const TaggedModel& model, const calibrate::Surf
     if (surface == seen.surfaces.end() || albedo == model.colours.end()) continue;
     const tracking::TagCells cells = tracking::tag_cells(model.family, under.id);
     const double cell_m = flat.tag->size_m / cells.border;
-    const Paper paper{flat, ground, *below.face, half_paper(flat, cells, model.parts),
-                      0.5 * cells.total * cell_m};
+    const Paper paper{flat,
+                      ground,
+                      *below.face,
+                      half_paper(flat, cells, model.parts),
+                      0.5 * cells.total * cell_m,
+                      height_of(flat, seen)};
     const auto ring =
         ring_around(paper, seen, static_cast<std::size_t>(surface - seen.surfaces.begin()), lens);
     under.pixels = ring.size();

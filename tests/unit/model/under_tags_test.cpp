@@ -92,6 +92,14 @@ TEST_F(UnderTags, EndHalfACellBeyondAPaperOfAGivenSize) {
   EXPECT_NEAR(most.y, 0.1485 + 0.005, 1e-6);
 }
 
+// Far cameras tell less well what is above what.
+TEST_F(UnderTags, LieHigherWhereACameraIsFarAway) {
+  see(glm::dvec2(half_tag_m), [](const glm::dvec2&) { return glm::dvec3(1); });
+  EXPECT_NEAR(under().mesh.mesh.positions[0].z, 1e-5, 1e-9);
+  seen_.world_from_cameras.push_back(look_at({0, -30, 40}, {0, 0, 0}));
+  EXPECT_NEAR(under().mesh.mesh.positions[0].z, 50e-5, 1e-9);
+}
+
 // On a cube that is as large as the paper nothing hangs over its edge.
 TEST_F(UnderTags, EndAtTheEdgeOfTheFace) {
   give_table(0.054);
