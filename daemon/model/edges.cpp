@@ -117,11 +117,14 @@ class Finder {
   }
 
   bool is_near_paper(const glm::dvec2& point) const {
-    for (const Quad& paper : papers_)
+    for (const Quad& paper : papers_) {
+      const glm::dvec3 normal = glm::cross(paper[1] - paper[0], paper[3] - paper[0]);
+      if (glm::dot(eye_ - paper[0], normal) <= 0) continue;  // it faces away
       for (std::size_t i = 0; i < paper.size(); ++i) {
         const auto a = on_pinhole(paper[i]), b = on_pinhole(paper[(i + 1) % paper.size()]);
         if (a && b && distance_px(point, *a, *b) < near_paper_px) return true;
       }
+    }
     return false;
   }
 

@@ -215,13 +215,18 @@ glm::dvec3 above_ground(const FlatTag& flat, const Plane& ground, const glm::dve
 FaceBelow face_below(const FlatTag& flat, const Plane& ground, const std::vector<Solid>& solids) {
   constexpr double same_m = 1e-3, same_cosine = 1 - 1e-6;
   const glm::dvec3 middle = above_ground(flat, ground, glm::dvec2(0), 0);
+  FaceBelow nearest;
+  double nearest_m = same_m;
   for (const Solid& solid : solids)
-    for (const Face& face : solid.faces)
-      if (glm::dot(normal_of(face), ground.normal) > same_cosine &&
-          std::abs(glm::dot(face.outline[0] - ground.at, ground.normal)) < same_m &&
-          is_in(face, middle))
-        return {&solid, &face};
-  return {};
+    for (const Face& face : solid.faces) {
+      const double off_m = std::abs(glm::dot(face.outline[0] - ground.at, ground.normal));
+      if (off_m >= nearest_m || !is_in(face, middle) ||
+          glm::dot(normal_of(face), ground.normal) <= same_cosine)
+        continue;
+      nearest = {&solid, &face};
+      nearest_m = off_m;
+    }
+  return nearest;
 }
 
 glm::dvec2 half_paper(const FlatTag& flat, const tracking::TagCells& cells, const Parts& parts) {

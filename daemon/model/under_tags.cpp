@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/matrix.hpp>
+#include <limits>
 #include <optional>
 
 #include "daemon/model/tag_papers.hpp"
@@ -24,8 +25,8 @@ constexpr double ring_from = 0.06, ring_to = 0.7;
 // The square ends half a cell beyond the paper. A tag is not found any more where its edge is
 // blurred over a whole cell.
 constexpr double margin_cells = 0.5;
-// Pixels count by 1 / (distance^2 + near^2)^2: those within about `near` of a point are averaged.
-// It is in halves of the tag's width, too.
+// Pixels count by 1 / (distance^2 + near^2)^2: those within about `near` of a point, in halves of
+// the tag's width, are averaged.
 constexpr double near = 0.15;
 // Slopes are held back by this share, so that pixels on one side of the paper alone, which do not
 // show the slope across, leave it at none.
@@ -34,10 +35,10 @@ constexpr std::size_t least_pixels = 24;
 // A pixel whose ratio is off the median of all by more than this factor shows something else.
 constexpr double most_off = 1.4;
 constexpr int steps = 16;  // squares in a row
-// Its height, for each metre that the farthest camera is away from it or from the world's origin,
-// and at least for one. Rays tell two surfaces apart that are a third of that apart (TRACE_TIE of
-// shaders/lib/hit.glsl). At the height of the paper it would cast a shadow, a thin line along its
-// edge, although there is nothing to cast one.
+// What is under a tag is so high above its surface for each metre that the farthest camera is away
+// from it or from the world's origin, and at least for one. Rays tell two surfaces apart that are a
+// third of that apart (TRACE_TIE of shaders/lib/hit.glsl). At the height of the paper it would cast
+// a shadow, a thin line along its edge, although there is nothing to cast one.
 constexpr double height_per_m = 1e-5;
 
 struct RingPixel {
@@ -51,7 +52,9 @@ double ratio_of(const RingPixel& pixel) {
 
 // Drops pixels that show something that the model does not have.
 void drop_others(std::vector<RingPixel>& ring) {
-  std::erase_if(ring, [](const RingPixel& pixel) { return !(pixel.rendered.g > 0); });
+  std::erase_if(ring, [](const RingPixel& pixel) {
+    return !(pixel.rendered.r > 0 && pixel.rendered.g > 0 && pixel.rendered.b > 0);
+  });
   if (ring.empty()) return;
   const auto middle = ring.begin() + static_cast<std::ptrdiff_t>(ring.size() / 2);
   std::ranges::nth_element(ring, middle, {}, ratio_of);
@@ -95,17 +98,28 @@ class Ground {
   glm::dmat4 tag_from_world_;
 };
 
+// Returns the directions in the world that pixels look in; 0 where the lens shows nothing.
+std::vector<glm::dvec3> directions_of(const calibrate::SurfacePixels& seen,
+                                      const PinholeIntrinsics& lens) {
+  std::vector<glm::dvec3> directions;
+  directions.reserve(seen.pixels.size());
+  for (const calibrate::SurfacePixel& pixel : seen.pixels) {
+    const auto ray = undistort(lens, pixel.px);
+    const glm::dmat3 turn(seen.world_from_cameras[pixel.frame]);
+    directions.push_back(ray ? turn * glm::dvec3(*ray, 1) : glm::dvec3(0));
+  }
+  return directions;
+}
+
 std::vector<RingPixel> ring_around(const Paper& paper, const calibrate::SurfacePixels& seen,
-                                   std::size_t surface, const PinholeIntrinsics& lens) {
+                                   const std::vector<glm::dvec3>& directions, std::size_t surface) {
   const Ground ground(paper);
   std::vector<RingPixel> ring;
-  for (const calibrate::SurfacePixel& pixel : seen.pixels) {
+  for (std::size_t i = 0; i < seen.pixels.size(); ++i) {
+    const calibrate::SurfacePixel& pixel = seen.pixels[i];
     if (pixel.surface != surface) continue;
-    const auto direction = undistort(lens, pixel.px);
-    if (!direction) continue;
-    const glm::dmat4& camera = seen.world_from_cameras[pixel.frame];
-    const auto at =
-        ground.meets(glm::dvec3(camera[3]), glm::dmat3(camera) * glm::dvec3(*direction, 1));
+    const glm::dvec3 eye(seen.world_from_cameras[pixel.frame][3]);
+    const auto at = ground.meets(eye, directions[i]);
     if (!at) continue;
     const glm::dvec2 off = (glm::abs(*at) - paper.half_m) / paper.unit_m;
     const double outside = std::max(off.x, off.y);
@@ -117,14 +131,15 @@ std::vector<RingPixel> ring_around(const Paper& paper, const calibrate::SurfaceP
 }
 
 // Returns what the plates have over what is rendered, at a point: the value there of the plane that
-// fits the pixels' ratios best.
+// fits the pixels' ratios best, within what they are.
 glm::dvec3 ratio_at(const glm::dvec2& at, const std::vector<RingPixel>& ring, double unit_m) {
   // How the ratio changes with the place, for each channel: value, along x, along y.
   std::array<glm::dmat3, 3> squares{glm::dmat3(0), glm::dmat3(0), glm::dmat3(0)};
   std::array<glm::dvec3, 3> products{};
   for (const RingPixel& pixel : ring) {
     const glm::dvec2 off = (pixel.at - at) / unit_m;
-    const double weight = std::pow(glm::dot(off, off) + near * near, -2);
+    const double squared = glm::dot(off, off) + near * near;
+    const double weight = 1 / (squared * squared);
     const glm::dvec3 terms(1, off);
     for (glm::length_t c = 0; c < 3; ++c) {
       const double rendered = pixel.rendered[c];
@@ -140,7 +155,12 @@ glm::dvec3 ratio_at(const glm::dvec2& at, const std::vector<RingPixel>& ring, do
     square[2][2] += held;
     ratio[c] = (glm::inverse(square) * products[std::size_t(c)])[0];
   }
-  return ratio;
+  glm::dvec3 least(std::numeric_limits<double>::infinity()), most(0);
+  for (const RingPixel& pixel : ring) {
+    least = glm::min(least, pixel.plate / pixel.rendered);
+    most = glm::max(most, pixel.plate / pixel.rendered);
+  }
+  return glm::clamp(ratio, least, most);
 }
 
 // Returns a point of the face: this one, or where the line from `middle` to it leaves the face.
@@ -190,6 +210,7 @@ void add_ground(const Paper& paper, double margin_m, const glm::dvec3& albedo,
 
 std::vector<UnderTag> under_tags(const TaggedModel& model, const calibrate::SurfacePixels& seen,
                                  const PinholeIntrinsics& lens) {
+  const std::vector<glm::dvec3> directions = directions_of(seen, lens);
   std::vector<UnderTag> all;
   for (const FlatTag& flat : model.layout.tags) {
     UnderTag& under = all.emplace_back();
@@ -210,8 +231,8 @@ std::vector<UnderTag> under_tags(const TaggedModel& model, const calibrate::Surf
                       half_paper(flat, cells, model.parts),
                       0.5 * cells.total * cell_m,
                       height_of(flat, seen)};
-    const auto ring =
-        ring_around(paper, seen, static_cast<std::size_t>(surface - seen.surfaces.begin()), lens);
+    const auto ring = ring_around(paper, seen, directions,
+                                  static_cast<std::size_t>(surface - seen.surfaces.begin()));
     under.pixels = ring.size();
     if (ring.size() < least_pixels) continue;
     add_ground(paper, margin_cells * cell_m, albedo->second, ring, under.mesh);

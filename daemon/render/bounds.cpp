@@ -59,17 +59,39 @@ double stretch(const glm::dmat3& a) {
   return std::sqrt(largest);
 }
 
+// Returns the bound that a sphere belongs to: that of the same tag, whose paper, print and ground
+// have one middle.
+Bounds::iterator same_tag(Bounds& bounds, std::size_t first_tag, const glm::dvec4& sphere) {
+  return std::find_if(bounds.begin() + static_cast<std::ptrdiff_t>(first_tag), bounds.end(),
+                      [&](const glm::dvec4& bound) {
+                        return glm::distance(glm::dvec3(bound), glm::dvec3(sphere)) <
+                               0.25 * std::min(bound.w, sphere.w);
+                      });
+}
+
 Bounds bounds_where(const scene::Scene& scene, const Spheres& spheres,
                     const std::function<bool(const scene::Instance&)>& wanted) {
   static constexpr std::size_t most_bounds = 16;
   Bounds bounds;
-  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    const glm::dvec4& sphere = spheres[i];
-    if (!wanted(scene.instances[i]) || sphere.w < 0) continue;
+  const auto add = [&](const glm::dvec4& sphere) {
     if (bounds.size() < most_bounds)
       bounds.push_back(sphere);
     else
       bounds.back() = merged_spheres(bounds.back(), sphere);
+  };
+  const auto is_wanted = [&](std::size_t i) {
+    return spheres[i].w >= 0 && wanted(scene.instances[i]);
+  };
+  for (std::size_t i = 0; i < scene.instances.size(); ++i)
+    if (scene.instances[i].tag == scene::TagPart::none && is_wanted(i)) add(spheres[i]);
+  const std::size_t first_tag = bounds.size();
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
+    if (scene.instances[i].tag == scene::TagPart::none || !is_wanted(i)) continue;
+    const auto same = same_tag(bounds, first_tag, spheres[i]);
+    if (same != bounds.end())
+      *same = merged_spheres(*same, spheres[i]);
+    else
+      add(spheres[i]);
   }
   return bounds;
 }

@@ -104,8 +104,12 @@ constexpr Feature own_features[] = {
          [](bool, const Demand& d) {
            return std::ranges::any_of(d.scene.instances, is_not_in_both);
          },
-     .used = "an object is virtual or removed, so light is followed with it and without it",
-     .left_out = "no object is virtual or removed, so light paths are the same with or without"},
+     .used =
+         "an object is virtual, removed, or a tag that can be hidden, so light is followed with "
+         "it and without it",
+     .left_out =
+         "no object is virtual, removed, or a tag that can be hidden, so light paths are the "
+         "same with or without"},
     {.name = "removed objects",
      .in_frame =
          [](bool, const Demand& d) {

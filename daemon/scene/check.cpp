@@ -42,7 +42,7 @@ void remark_on_tags(const Scene& scene, const set::Set& set, set::Findings& find
   if (!set.hides_tags) return;
   std::set<int> known;
   for (const Instance& instance : scene.instances)
-    if (instance.tag == TagPart::printed) known.insert(named_tag(instance.name).id);
+    if (instance.tag == TagPart::printed) known.insert(instance.tag_id);
   std::string missing;
   const auto look_for = [&](const std::vector<set::Tag>& tags) {
     for (const set::Tag& tag : tags)
@@ -66,7 +66,10 @@ void remark_on(const Scene& scene, const set::Set& set, set::Findings& findings)
     return std::ranges::find(set.objects, presence, &set::Object::presence) != set.objects.end();
   };
   const bool relit = std::ranges::any_of(scene.lights, &set::Light::is_relit);
-  if (!has(set::Presence::virtual_object) && !has(set::Presence::removed) && !relit)
+  const bool hides = std::ranges::any_of(scene.instances, [&](const Instance& instance) {
+    return instance.tag == TagPart::printed && set.hides_tags;
+  });
+  if (!has(set::Presence::virtual_object) && !has(set::Presence::removed) && !relit && !hides)
     findings.remarks.push_back(
         "nothing is virtual, removed or relit: the composite will equal the plate");
   else if (!has(set::Presence::phantom))

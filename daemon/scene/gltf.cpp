@@ -114,7 +114,10 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
     instance.name = node.name;
     instance.presence = presence_bits(object.presence);
     instance.object = object_index;
-    if (object.presence == set::Presence::phantom) instance.tag = named_tag(node.name).part;
+    if (object.presence == set::Presence::phantom) {
+      instance.tag = placed.tag.part;
+      instance.tag_id = placed.tag.id;
+    }
     instance.world_from_object = object.world_from_file * z_up_from_y_up * placed.file_from_node;
     carried.clear();
     const auto first_light = static_cast<std::uint32_t>(scene.lights.size());

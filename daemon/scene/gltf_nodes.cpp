@@ -149,15 +149,16 @@ std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
     bool is_wanted;
   };
   std::vector<Visit> to_visit;
-  const auto push = [&](const std::vector<int>& nodes, const glm::dmat4& parent, bool is_wanted) {
+  const auto push = [&](const std::vector<int>& nodes, const glm::dmat4& parent, NamedTag tag,
+                        bool is_wanted) {
     for (auto node = nodes.rbegin(); node != nodes.rend(); ++node)
-      to_visit.push_back({{*node, parent}, is_wanted});
+      to_visit.push_back({{*node, parent, tag}, is_wanted});
   };
 
   std::vector<PlacedNode> placed;
   std::vector<bool> visited(model.nodes.size());
   std::set<std::string> known;
-  push(root_nodes(model, file, notes), glm::dmat4(1.0), names.empty());
+  push(root_nodes(model, file, notes), glm::dmat4(1.0), {}, names.empty());
   while (!to_visit.empty()) {
     Visit visit = to_visit.back();
     to_visit.pop_back();
@@ -172,10 +173,12 @@ std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
     visit.placed.file_from_node *=
         transform_of(node, file + ": " + node_name(model, index)).parent_from_node;
     if (!node.name.empty()) known.insert(node.name);
+    if (const NamedTag own = named_tag(node.name); own.part != TagPart::none)
+      visit.placed.tag = own;
     const bool is_wanted =
         visit.is_wanted || std::find(names.begin(), names.end(), node.name) != names.end();
     if (is_wanted) placed.push_back(visit.placed);
-    push(node.children, visit.placed.file_from_node, is_wanted);
+    push(node.children, visit.placed.file_from_node, visit.placed.tag, is_wanted);
   }
 
   for (const std::string& name : names) {

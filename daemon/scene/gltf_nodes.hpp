@@ -12,12 +12,14 @@
 #include <vector>
 
 #include "daemon/scene/load_log.hpp"
+#include "daemon/scene/scene.hpp"
 
 namespace previz::scene {
 
 struct PlacedNode {
   int node = 0;
   glm::dmat4 file_from_node{1.0};
+  NamedTag tag = {};  // by its own name, or that of the nearest ancestor that names one
 };
 
 // Returns nodes of the default scene (or the first, or all roots), parents before children: the

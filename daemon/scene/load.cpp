@@ -54,8 +54,8 @@ Scene load_scene(const set::Set& set) {
     file->add(object, static_cast<std::uint32_t>(i));
     scene.light_objects.resize(scene.lights.size(), static_cast<std::uint32_t>(i));
   }
-  hide_tags(scene.instances, set.hides_tags);
   for (const set::Surface& surface : set.surfaces) apply(surface, set.file.string(), scene);
+  hide_tags(scene.instances, set.hides_tags);  // a tag's colour is real, hidden or not
   scene.lights.insert(scene.lights.end(), set.lights.begin(), set.lights.end());
   scene.light_objects.resize(scene.lights.size(), no_object);
   for (const GltfFile* file : in_order)

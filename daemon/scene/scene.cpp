@@ -38,7 +38,8 @@ bool deform_alike(const Deformation& a, const Deformation& b) {
 
 NamedTag named_tag(const std::string& node) {
   // Families have at most some ten thousand tags.
-  static const std::regex pattern("(under[ _])?tag[ _]?([0-9]{1,5})([ ._].*)?", std::regex::icase);
+  static const std::regex pattern(
+      "(under[ _])?tag[ _]?([0-9]{1,5})([ _](paper|print))?([._][0-9]+)?", std::regex::icase);
   constexpr std::size_t longest = 200;  // of a name that a person gives
   std::smatch match;
   if (node.size() > longest || !std::regex_match(node, match, pattern)) return {};

@@ -44,19 +44,20 @@ struct Mesh {
 };
 
 // What a part of a phantom has to do with printed tags, which can be hidden (set::Set::hides_tags).
-// The names of glTF nodes say so: "tag 3", "tag 3 paper" and "tag3" are `printed`, "under tag 3" is
-// `under` it.
+// The names of glTF nodes say so: "tag 3", "tag3", "tag 3 paper" and "tag 3 print" are `printed`,
+// "under tag 3" is `under` it, and so are their children. Exporters put _ for a space, and append
+// numbers like .001.
 enum class TagPart {
   none,
   printed,  // paper or print: in both worlds; if tags are hidden, in the real one only
   under     // what is shown in its place: in neither world; if tags are hidden, in the mixed one
 };
 
-// Returns what the node of this name is if its object is a phantom, and the tag's id.
 struct NamedTag {
   TagPart part = TagPart::none;
-  int id = -1;
+  int id = -1;  // of the tag
 };
+// Returns what the node of this name is if its object is a phantom.
 NamedTag named_tag(const std::string& node);
 
 // world_from_object is finite and invertible. A negative determinant reverses orientation, but the
@@ -71,6 +72,7 @@ struct Instance {
   std::uint32_t object = 0;  // index of the set's [[object]] that the instance came from
   glm::dmat4 world_from_object{1.0};
   TagPart tag = TagPart::none;
+  int tag_id = -1;  // of a part of a tag
 };
 
 // Puts printed tags, and what is under them, into the worlds that they are in when tags are shown

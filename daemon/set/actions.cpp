@@ -17,7 +17,7 @@ constexpr Action action_table[] = {
     {"acknowledge", "Acknowledge that a recording was cut off; clears the alarm.", Acknowledge{}},
     {"snapshot", "Write the shown picture as EXR and PNG.", Snapshot{}},
     {"reload_set", "Reload the set file; if it has a mistake, the old one stays in use.", ReloadSet{}},
-    {"keep", "Write what buttons changed (objects' places and variants, lamps' brightness and colour) into the set file; the old file is kept beside it.", KeepEdits{}},
+    {"keep", "Write what buttons changed (objects' places and variants, lamps' brightness and colour, hidden tags) into the set file; the old file is kept beside it.", KeepEdits{}},
     {"next_set", "Change to the next set file of the folder.", OtherSet{1}},
     {"previous_set", "Change to the previous set file of the folder.", OtherSet{-1}},
     {"samples_up", "More samples per pixel: less noise, lower frame rate.", ChangeSamples{1}},

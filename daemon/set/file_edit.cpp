@@ -74,9 +74,13 @@ const FileEdit::Table& FileEdit::table(const std::string& tables, std::size_t in
   const auto found = tables_.find(tables);
   if (found == tables_.end() || index >= found->second.size())
     throw Error("no [[" + tables + "]] number " + std::to_string(index + 1));
-  if (found->second[index].is_inline)
-    throw Error("[[" + tables + "]] number " + std::to_string(index + 1) +
-                " is an inline table; write it as a table under [[" + tables + "]]");
+  if (found->second[index].is_inline) {
+    // Which brackets it needs is the writer's to know, who wrote none.
+    const std::string which =
+        found->second.size() == 1 ? tables : tables + " number " + std::to_string(index + 1);
+    throw Error(which + " is an inline table, {...}; write it under a header of its own, [" +
+                tables + "] or, if there can be several, [[" + tables + "]]");
+  }
   return found->second[index];
 }
 

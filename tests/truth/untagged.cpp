@@ -112,6 +112,7 @@ TruthFrame load_untagged_frame(const TruthSet& set, int frame) {
 std::vector<std::string> violations(const UntaggedMeasures& measures) {
   constexpr double most_e_tags = 0.08, most_outline = 0.01;
   std::vector<std::string> lines;
+  if (measures.tags == 0) lines.emplace_back("tags 0: no tag was hidden in this frame");
   if (!(measures.e_tags <= most_e_tags))
     lines.push_back(fmt::format("e_tags {:.4f}, at most {}", measures.e_tags, most_e_tags));
   if (!(measures.outline <= most_outline))

@@ -102,8 +102,8 @@ TEST(ModelParts, MistakesAreNamedWithTheirLine) {
       {"[[plane]]\nname = \"t\"\ntags = [0]\n[[room]]\nname = \"r\"\nfloor = \"t\"\nwalls = "
        "[\"t\"]\nheight_m = 2\n",
        "has 1 planes; allowed: 4"},
-      {"[[plane]]\nname = \"tag 3 board\"\ntags = [3]\n",
-       "plane.name: \"tag 3 board\" is how printed tags are named"},
+      {"[[plane]]\nname = \"tag 3\"\ntags = [3]\n",
+       "plane.name: \"tag 3\" is how printed tags are named"},
       {"[[scan]]\nname = \"s\"\n", "scan.file: is missing"},
       {"[[scan]]\nname = \"s\"\nfile = \"s.obj\"\nunit = \"ft\"\n",
        "is not allowed; allowed: \"m\" | \"cm\" | \"mm\" | \"in\""},

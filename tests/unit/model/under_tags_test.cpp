@@ -114,6 +114,21 @@ TEST_F(UnderTags, LeaveOutWhatTheModelDoesNotHave) {
   for (const glm::vec3& albedo : under().mesh.albedos) EXPECT_NEAR(albedo.g, 0.4, 1e-3);
 }
 
+// The ramp of a ring on one side alone is not carried on without end.
+TEST_F(UnderTags, AreNoBrighterOrDarkerThanWhatIsAround) {
+  see(glm::dvec2(half_tag_m), [](const glm::dvec2& at) { return glm::dvec3(1 + 4 * at.x); });
+  std::erase_if(seen_.pixels,
+                [](const calibrate::SurfacePixel& pixel) { return pixel.plate.g < 1.2; });
+  for (const glm::vec3& albedo : under().mesh.albedos) EXPECT_GE(albedo.g, 0.4f * 1.2f - 1e-4f);
+}
+
+// A blue stage has no red light, which says nothing of the colour.
+TEST_F(UnderTags, AreNumbersWithoutLightInAChannel) {
+  see(glm::dvec2(half_tag_m), [](const glm::dvec2&) { return glm::dvec3(1); });
+  for (calibrate::SurfacePixel& pixel : seen_.pixels) pixel.rendered.r = pixel.plate.r = 0;
+  EXPECT_TRUE(under().mesh.mesh.positions.empty());
+}
+
 TEST_F(UnderTags, NeedPixelsAroundTheTag) {
   EXPECT_TRUE(under().mesh.mesh.positions.empty());
   see(glm::dvec2(10), [](const glm::dvec2&) { return glm::dvec3(1); });

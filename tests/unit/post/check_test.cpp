@@ -403,7 +403,9 @@ TEST_F(Check, NamesTagsThatCannotBeHidden) {
       "\n";
   check(set);
   EXPECT_THAT(said_, Not(HasSubstr("tags.hide")));
+  EXPECT_THAT(said_, HasSubstr("the composite will equal the plate"));
   check(set + "[tags]\nhide = true\n");
+  EXPECT_THAT(said_, Not(HasSubstr("the composite will equal the plate")));
   EXPECT_THAT(said_, HasSubstr("tags.hide is true, but these tags are in no phantom and stay in "
                                "the picture: 7;"));
 }

@@ -267,4 +267,25 @@ TEST(CameraRadiance, WithoutAPlateAllIsTraced) {
             render_view(view, 4, traced).layers.mixed);
 }
 
+// The camera saw a paper on the floor, which is hidden. What the mirror shows there is the floor,
+// although that is only a tenth of a millimetre behind the paper.
+TEST(CameraRadiance, IsNotThatOfWhatIsRemovedCloseByWhatIsMet) {
+  View view = floor_and_mirror();
+  const scene::Scene without = view.scene;
+  add(view.scene, rectangle_mesh({7, 7}), diffuse(glm::vec3(albedo)), at({0, 0, 1e-4}),
+      scene::world_real);
+  const Plate bright = plate_of([](int, int) { return glm::dvec3(0.9 * white); });
+  const auto brightest = [&] {
+    const render::Layers layers = render_over(view, bright, by_camera()).layers;
+    float most = 0;
+    for (const Pixel& pixel : pixels_of(width, height))
+      if (layers.mask[pixel.i] == 1 && layers.depth[pixel.i] > 0)
+        most = std::max(most, layers.mixed[pixel.i].g);
+    return most;
+  };
+  EXPECT_LT(brightest(), 2) << "the sky has 1, and the plate 3.6";
+  view.scene = without;
+  EXPECT_GT(brightest(), 3) << "that is what is seen where the camera's measurement is used";
+}
+
 }  // namespace previz::test::camera_test

@@ -137,6 +137,10 @@ TEST_F(KeptEdits, HiddenTagsAreWrittenIntoTheTableThatTheSetHasOrANewOne) {
   EXPECT_TRUE(parse(hidden).hides_tags);
   edits.hides_tags = false;
   EXPECT_FALSE(parse(with_edits(hidden, parse(hidden), edits)).hides_tags);
+  const std::string in_braces = "tags = {hide = true}\n" + std::string(stage);
+  EXPECT_THAT(
+      test::error_of([&] { with_edits(in_braces, parse(in_braces), edits); }),
+      HasSubstr("tags is an inline table, {...}; write it under a header of its own, [tags]"));
 }
 
 TEST_F(KeptEdits, ALampIsAsItWasShown) {

@@ -133,6 +133,27 @@ TEST_F(GltfNodes, FiltersByNameWithWhatHangsBelow) {
             (directory / "test.gltf").string() + ": has no node \"iner\"; did you mean \"inner\"?");
 }
 
+TEST_F(GltfNodes, OfPhantomsArePrintedTagsByTheirNameOrAnAncestors) {
+  const int child = gltf.add("nodes", {{"name", "Plane.002"}, {"mesh", gltf.triangle_mesh()}});
+  gltf.root("tag 4", -1, {{"children", {child}}});
+  gltf.root("under tag 4", gltf.triangle_mesh());
+  gltf.root("table", gltf.triangle_mesh());
+  object.presence = set::Presence::phantom;
+  const scene::Scene real = load();
+  ASSERT_EQ(real.instances.size(), 3u);
+  const auto has = [&](std::size_t i, scene::TagPart part, int id, std::uint32_t presence) {
+    EXPECT_EQ(real.instances[i].tag, part) << i;
+    EXPECT_EQ(real.instances[i].tag_id, id) << i;
+    EXPECT_EQ(real.instances[i].presence, presence) << i;
+  };
+  has(0, scene::TagPart::printed, 4, scene::world_both);
+  has(1, scene::TagPart::under, 4, 0);
+  has(2, scene::TagPart::none, -1, scene::world_both);
+  object.presence = set::Presence::virtual_object;
+  for (const scene::Instance& instance : load().instances)
+    EXPECT_EQ(instance.tag, scene::TagPart::none);
+}
+
 TEST_F(GltfNodes, RefusesWhatIsNoTree) {
   const int mesh = gltf.triangle_mesh();
   gltf.root("a", mesh, {{"children", {1}}});

@@ -74,9 +74,11 @@ TEST(TagParts, AreToldByTheNamesOfNodes) {
     EXPECT_EQ(named_tag(name).part, TagPart::printed) << name;
   for (const char* name : {"under tag 3", "under_tag_3", "Under tag 3.001"})
     EXPECT_EQ(named_tag(name).part, TagPart::under) << name;
-  for (const char* name : {"", "tag", "tag cube", "price tag 3", "tag 3a", "stage 3", "under tag"})
+  for (const char* name : {"", "tag", "tag cube", "price tag 3", "tag 3a", "stage 3", "under tag",
+                           "tag 2 stand", "under tag 3 shelf", "tag 123456"})
     EXPECT_EQ(named_tag(name).part, TagPart::none) << name;
   EXPECT_EQ(named_tag("tag 12 print").id, 12);
+  EXPECT_EQ(named_tag("tag 1 " + std::string(300'000, 'x')).part, TagPart::none);
   EXPECT_EQ(named_tag("under tag 3.001").id, 3);
 }
 
