@@ -87,6 +87,10 @@ double percentile(std::vector<double> values, double share) {
 
 }  // namespace
 
+double off_px(const Figure& figure) {
+  return figure.off ? std::max(figure.off->median_px, figure.off->shift_px) : 0;
+}
+
 void Measurement::look(const Frame& frame, const glm::dmat4& world_from_camera) {
   const tracking::Photometry photometry(camera_.response);
   const auto luminance = [&](int x, int y) { return photometry.luminance(frame, x, y); };

@@ -34,6 +34,13 @@ struct Figure {
   std::string why;            // the reason then, in plain words
 };
 
+// A model that is farther off than this casts shadows that a viewer sees beside their things.
+inline constexpr double most_off_px = 2;
+
+// Returns how far off the model is, to compare with most_off_px: the median of its edges or the
+// shift, whichever is more. It is 0 px without a figure.
+double off_px(const Figure& figure);
+
 class Measurement {
  public:
   // Both must outlive this.

@@ -53,7 +53,8 @@ bool clip_to_picture(const PinholeIntrinsics& lens, glm::dvec3& a, glm::dvec3& b
 
 class Camera {
  public:
-  Camera(const RealModel& model, const PinholeIntrinsics& lens, const glm::dmat4& world_from_camera)
+  // Without a model (null) nothing is hidden.
+  Camera(const RealModel* model, const PinholeIntrinsics& lens, const glm::dmat4& world_from_camera)
       : model_(model),
         lens_(lens),
         world_from_camera_(world_from_camera),
@@ -61,13 +62,8 @@ class Camera {
 
   std::vector<SampledEdge> see() const {
     std::vector<SampledEdge> edges;
-    for (const ModelEdge& edge : model_.edges()) edges.push_back(see(edge));
+    for (const ModelEdge& edge : model_->edges()) edges.push_back(see(edge));
     return edges;
-  }
-
- private:
-  glm::dvec3 in_camera(const glm::dvec3& p) const {
-    return camera_from_world_.rotation * p + camera_from_world_.translation;
   }
 
   SampledEdge see(const ModelEdge& edge) const {
@@ -91,12 +87,17 @@ class Camera {
     return seen;
   }
 
-  bool is_seen(const glm::dvec3& in_camera) const {
-    return model_.is_seen(world_from_camera_[3],
-                          glm::dvec3(world_from_camera_ * glm::dvec4(in_camera, 1)));
+ private:
+  glm::dvec3 in_camera(const glm::dvec3& p) const {
+    return camera_from_world_.rotation * p + camera_from_world_.translation;
   }
 
-  const RealModel& model_;
+  bool is_seen(const glm::dvec3& in_camera) const {
+    return !model_ || model_->is_seen(world_from_camera_[3],
+                                      glm::dvec3(world_from_camera_ * glm::dvec4(in_camera, 1)));
+  }
+
+  const RealModel* model_;
   const PinholeIntrinsics& lens_;
   glm::dmat4 world_from_camera_;
   tracking::CameraFromWorld camera_from_world_;
@@ -149,27 +150,39 @@ void for_each_run(const std::vector<Sample>& samples, Wanted wanted, Visit visit
   }
 }
 
+void add_segments(const SampledEdge& edge, std::vector<Segment>& segments) {
+  for_each_run(
+      edge.samples, [](const Sample& sample) { return sample.pixel.has_value(); },
+      [&](std::size_t first, std::size_t last) {
+        for (std::size_t at = first; at < last;) {
+          const std::size_t next = std::min(last, at + steps_of_segment);
+          segments.push_back({*edge.samples[at].pixel, *edge.samples[next].pixel});
+          at = next;
+        }
+      });
+}
+
 }  // namespace
 
 std::vector<Segment> visible_segments(const RealModel& model, const PinholeIntrinsics& lens,
                                       const glm::dmat4& world_from_camera) {
   std::vector<Segment> segments;
-  for (const SampledEdge& edge : Camera(model, lens, world_from_camera).see())
-    for_each_run(
-        edge.samples, [](const Sample& sample) { return sample.pixel.has_value(); },
-        [&](std::size_t first, std::size_t last) {
-          for (std::size_t at = first; at < last;) {
-            const std::size_t next = std::min(last, at + steps_of_segment);
-            segments.push_back({*edge.samples[at].pixel, *edge.samples[next].pixel});
-            at = next;
-          }
-        });
+  for (const SampledEdge& edge : Camera(&model, lens, world_from_camera).see())
+    add_segments(edge, segments);
+  return segments;
+}
+
+std::vector<Segment> line_segments(const glm::dvec3& a, const glm::dvec3& b,
+                                   const PinholeIntrinsics& lens,
+                                   const glm::dmat4& world_from_camera) {
+  std::vector<Segment> segments;
+  add_segments(Camera(nullptr, lens, world_from_camera).see({a, b}), segments);
   return segments;
 }
 
 std::vector<Segment> measurable_pieces(const RealModel& model, const PinholeIntrinsics& lens,
                                        const glm::dmat4& world_from_camera) {
-  const std::vector<SampledEdge> edges = Camera(model, lens, world_from_camera).see();
+  const std::vector<SampledEdge> edges = Camera(&model, lens, world_from_camera).see();
   const Neighbours neighbours(lens, edges);
   std::vector<Segment> pieces;
   for (std::size_t e = 0; e < edges.size(); ++e) {

@@ -20,6 +20,11 @@ struct Segment {
 std::vector<Segment> visible_segments(const RealModel& model, const PinholeIntrinsics& lens,
                                       const glm::dmat4& world_from_camera);
 
+// Returns a straight line of the world as segments likewise, whether the model hides it or not.
+std::vector<Segment> line_segments(const glm::dvec3& a, const glm::dvec3& b,
+                                   const PinholeIntrinsics& lens,
+                                   const glm::dmat4& world_from_camera);
+
 // Returns the pieces of 12 to 40 px, on the pinhole plane (tracking::EdgeGuess), in which an edge
 // of light can be looked for: those of visible edges that nothing touches, and that are farther
 // than 8 px from every other visible edge.

@@ -12,8 +12,6 @@ namespace previz::post {
 namespace {
 
 constexpr std::size_t frames_looked_at = 5;
-// A model that is farther off than this casts shadows that a viewer sees beside their things.
-constexpr double most_px = 2;
 
 bool has_real(const set::Set& set) {
   return std::ranges::any_of(set.objects, [](const set::Object& object) {
@@ -26,9 +24,8 @@ std::string pieces(std::size_t count) {
 }
 
 constexpr const char* what_to_do =
-    "Look where it is off (`previzd model --overlay`), and measure the phantom's place again or, "
-    "if "
-    "all of it is off, the map of tags (`previzd calibrate tags`)";
+    "Look at the rig's display where it is off (action `guides`), and measure the phantom's place "
+    "again or, if all of it is off, the map of tags (`previzd calibrate tags`)";
 
 }  // namespace
 
@@ -69,8 +66,8 @@ void describe_fit(const fit::Figure& figure, const set::Set& set, std::ostream& 
 
 void remark_on_fit(const fit::Figure& figure, const set::Set& set, set::Findings& findings) {
   if (!has_real(set)) return;
-  const double off_px = figure.off ? std::max(figure.off->median_px, figure.off->shift_px) : 0;
-  if (off_px > most_px)
+  const double off_px = fit::off_px(figure);
+  if (off_px > fit::most_off_px)
     findings.remarks.push_back(fmt::format(
         "the model of what is real is {:.1f} px beside the pictures' edges, so that shadows and "
         "what hides virtual objects are as far off. {}",
@@ -78,8 +75,7 @@ void remark_on_fit(const fit::Figure& figure, const set::Set& set, set::Findings
   else if (!figure.off && figure.looked_at >= fit::least_pieces)
     findings.remarks.push_back(
         fmt::format("the pictures have edges at {} of {} of the model, within {:.0f} px: it may be "
-                    "farther off, "
-                    "or be as bright as what is behind it. {}",
+                    "farther off, or be as bright as what is behind it. {}",
                     figure.found, pieces(figure.looked_at), fit::reach_px, what_to_do));
 }
 

@@ -1,7 +1,7 @@
 // Which edges a body of triangles has.
 #include "daemon/fit/feature_edges.hpp"
 
-#include "tests/unit/fit/real_bodies.hpp"
+#include "tests/support/real_bodies.hpp"
 
 namespace previz::feature_edges_test {
 

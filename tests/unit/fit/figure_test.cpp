@@ -1,7 +1,7 @@
 // How far a model is off, in pictures that are drawn exactly.
 #include "daemon/fit/figure.hpp"
 
-#include "tests/unit/fit/real_bodies.hpp"
+#include "tests/support/real_bodies.hpp"
 
 namespace previz::figure_test {
 

@@ -1,5 +1,5 @@
 // Which parts of a scene are edges of the real world.
-#include "tests/unit/fit/real_bodies.hpp"
+#include "tests/support/real_bodies.hpp"
 
 namespace previz::real_model_test {
 

@@ -2,7 +2,7 @@
 #include "daemon/fit/visible_edges.hpp"
 
 #include "daemon/fit/light_edge.hpp"
-#include "tests/unit/fit/real_bodies.hpp"
+#include "tests/support/real_bodies.hpp"
 
 namespace previz::visible_edges_test {
 

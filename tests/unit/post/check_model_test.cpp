@@ -92,7 +92,7 @@ TEST_F(CheckModel, SaysWhatToDoIfItIsOff) {
   EXPECT_THAT(said, HasSubstr("worth checking"));
   // 3 px to the right and 3 px down are 4.2.
   EXPECT_THAT(said, HasSubstr("the model of what is real is 4.2 px beside the pictures' edges"));
-  EXPECT_THAT(said, HasSubstr("`previzd model --overlay`"));
+  EXPECT_THAT(said, HasSubstr("action `guides`"));
   EXPECT_THAT(said, HasSubstr("`previzd calibrate tags`"));
 }
 

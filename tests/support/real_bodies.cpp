@@ -1,4 +1,4 @@
-#include "tests/unit/fit/real_bodies.hpp"
+#include "tests/support/real_bodies.hpp"
 
 #include "daemon/fit/light_edge.hpp"
 #include "daemon/tracking/camera_pose.hpp"
