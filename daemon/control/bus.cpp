@@ -142,6 +142,7 @@ constexpr Property properties[] = {
     property<&Status::object>("Object", "s"),
     property<&Status::light>("Light", "s"),
     property<&Status::device>("Device", "s"),
+    property<&Status::model>("Model", "s"),
     property<&Status::message>("Message", "s"),
 };
 

@@ -32,6 +32,7 @@ struct Status {
   std::int32_t samples = 0;
   std::string set, object, light;  // names of the set, the selected object and the selected lamp
   std::string device;              // that draws: "NVIDIA RTX 4000", "llvmpipe (CPU)"; empty: none
+  std::string model;               // how far it is from the pictures, in words; empty: not measured
   std::string message;             // the last announcement
 };
 

@@ -61,6 +61,11 @@ void Metrics::shown(double latency_s) {
   }
 }
 
+void Metrics::model_fit(const std::optional<ModelFit>& fit) {
+  const std::lock_guard lock(mutex_);
+  model_fit_ = fit;
+}
+
 void Metrics::passes_ran(const render::DeviceTimes& times) {
   const std::lock_guard lock(mutex_);
   for (const render::DeviceTimes::Pass& pass : times.passes) {
@@ -91,6 +96,7 @@ MetricsSnapshot Metrics::snapshot(double seconds) const {
     snapshot.counts = counts_;
     snapshot.devices = devices_;
     snapshot.passes = passes_;
+    snapshot.model_fit = model_fit_;
     snapshot.latency_p50_s = quantile(latencies_s_, 0.50);
     snapshot.latency_p99_s = quantile(latencies_s_, 0.99);
   }
@@ -124,6 +130,10 @@ std::string to_json(const MetricsSnapshot& snapshot) {
   for (const auto& [name, pass] : snapshot.passes)
     json["passes"][name] = {{"runs", pass.runs}, {"busy_s", pass.busy_s}};
   json["latency_s"] = {{"p50", snapshot.latency_p50_s}, {"p99", snapshot.latency_p99_s}};
+  json["model_fit_px"] = nullptr;
+  if (const std::optional<ModelFit>& fit = snapshot.model_fit)
+    json["model_fit_px"] = {
+        {"median", fit->median_px}, {"of_90_percent", fit->most_px}, {"shift", fit->shift_px}};
   // A device's name, or what a tracker has read, need not be UTF-8.
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

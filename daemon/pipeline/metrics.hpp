@@ -7,6 +7,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -31,6 +32,13 @@ struct PassMetrics {
   double busy_s = 0;  // by the device's own clock
 };
 
+// How far the model of what is real is from the edges of the camera's picture, as fit::Figure says.
+struct ModelFit {
+  double median_px = 0;  // >= 0
+  double most_px = 0;    // 90 % of the edges are nearer
+  double shift_px = 0;   // of the whole model
+};
+
 struct MetricsSnapshot {
   double seconds = 0;  // since the start
   std::map<std::string, StageMetrics> stages;
@@ -39,6 +47,7 @@ struct MetricsSnapshot {
   std::map<std::string, PassMetrics> passes;      // by name; empty: the device does not time them
   double latency_p50_s = 0;  // capture to display, over the last frames; 0: none was shown
   double latency_p99_s = 0;
+  std::optional<ModelFit> model_fit;  // absent: not measured now, or too few edges were found
 };
 
 // Every stage's thread may use it.
@@ -57,6 +66,7 @@ class Metrics {
   // to be timed are counted as an event, `untimed_passes`.
   void passes_ran(const render::DeviceTimes& times);
   void shown(double latency_s);
+  void model_fit(const std::optional<ModelFit>& fit);  // the last one
 
   // While it lives, every snapshot asks a queue what waits in it.
   class [[nodiscard]] Watch {
@@ -88,6 +98,7 @@ class Metrics {
   std::map<std::string, std::uint64_t> counts_;
   std::map<std::string, DeviceCounters> devices_;
   std::map<std::string, PassMetrics> passes_;
+  std::optional<ModelFit> model_fit_;
   std::vector<double> latencies_s_;  // a ring once full
   std::size_t next_latency_ = 0;
   mutable std::mutex watched_mutex_;  // the owners' locks come after it, mutex_ after those
@@ -144,7 +155,8 @@ class DeviceCounts {
 //  "busy_fraction": ..., "waiting": {"values": ..., "oldest_s": ..., "bytes": ...},
 //  "dropped": {"newer frame": ...}}}, "counts": {...},
 //  "devices": {"observer": {"lost": ..., "stream missing packets": ...}},
-//  "passes": {"extend": {"runs": ..., "busy_s": ...}}, "latency_s": {"p50": ..., "p99": ...}}
+//  "passes": {"extend": {"runs": ..., "busy_s": ...}}, "latency_s": {"p50": ..., "p99": ...},
+//  "model_fit_px": {"median": ..., "of_90_percent": ..., "shift": ...}}; the last is null if absent
 std::string to_json(const MetricsSnapshot& snapshot);
 
 // Returns the smallest value that at least `fraction` (0..1) of the values do not exceed; 0 if

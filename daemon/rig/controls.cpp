@@ -281,6 +281,11 @@ Outcome Controls::apply(const set::TogglePassTimes&) {
   return {look_.pass_times ? "pass times on" : "pass times off", false, {}};
 }
 
+Outcome Controls::apply(const set::ToggleGuides&) {
+  look_.guides = !look_.guides;
+  return {look_.guides ? "guides on" : "guides off", false, {}};
+}
+
 Outcome Controls::apply(const set::SelectObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
   object_ = around(object_, effect.next, objects_.size());

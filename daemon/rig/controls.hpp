@@ -29,6 +29,7 @@ struct Look {
   render::View view = render::View::composite;
   bool osd = true;
   bool pass_times = false;     // on the overlay, while that is shown
+  bool guides = false;         // lines over the picture, with or without the overlay
   pipeline::Edits edits;       // of the live picture
   pipeline::Edits take_edits;  // of the take in review, on top of what was recorded with it
   bool of_take = false;        // the picture is a take's: what is changed now are take_edits
@@ -112,6 +113,7 @@ class Controls {
   Outcome apply(const set::NextView& effect);
   Outcome apply(const set::ToggleOsd& effect);
   Outcome apply(const set::TogglePassTimes& effect);
+  Outcome apply(const set::ToggleGuides& effect);
   Outcome apply(const set::SelectObject& effect);
   Outcome apply(const set::MoveObject& effect);
   Outcome apply(const set::TurnObject& effect);

@@ -59,6 +59,7 @@ control::Status status_of(const Rig& rig, const set::Set& set, const render::Dev
                           const report::Reports& reports) {
   const Look& look = rig.controls().look();
   const output::RecorderStatus recorder = rig.recorder_status();
+  const std::optional<fit::Figure> fit = rig.model_fit();
   return {set::name_of(look.state.mode),
           look.state.recording,
           recorder.writing,
@@ -74,6 +75,7 @@ control::Status status_of(const Rig& rig, const set::Set& set, const render::Dev
           rig.controls().selected_object(),
           rig.controls().selected_light(),
           render::drawing_device(device),
+          fit ? words_of(*fit) : "",
           reports.announced()};
 }
 
@@ -172,9 +174,9 @@ class LiveRun {
     const set::Set& set = sets_.running().set;
     EventLoop loop([this](const std::exception& error) { loop_failed(error); });
     std::optional<LiveFiles> files;
-    const auto show = [&](pipeline::Shot shot, const Look& look) {
+    const auto show = [&](pipeline::Shot shot, const Look& look, GuidesOf guides) {
       if (options_.on_shown) options_.on_shown(shot, look);
-      screen_->show(shot);
+      screen_->show(shot, std::move(guides));
       if (shot.picture) files->take(std::move(shot.picture));
     };
     // A picture comes down to the computer only where somebody there wants it.

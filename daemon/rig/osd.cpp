@@ -90,6 +90,11 @@ OsdText tracking_words(const PictureFacts& picture) {
   return {text, picture.tracking_trouble.empty() ? OsdTone::plain : OsdTone::warning};
 }
 
+OsdTone tone_of(const fit::Figure& figure) {
+  if (fit::off_px(figure) > fit::most_off_px) return OsdTone::alarm;
+  return OsdTone::plain;
+}
+
 void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page) {
   for (const report::Notice& trouble : rig.troubles)
     page.notices.push_back({line_of(trouble), tone_of(trouble.severity)});
@@ -112,6 +117,8 @@ void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page
     page.notices.push_back({"plate only: " + picture->untouched, OsdTone::warning});
   else if (picture && !picture->tracking_trouble.empty())
     page.notices.push_back({"tracking: " + picture->tracking_trouble, OsdTone::warning});
+  if (rig.fit && (!rig.fit->off || tone_of(*rig.fit) == OsdTone::alarm))
+    page.notices.push_back({words_of(*rig.fit), tone_of(*rig.fit)});
   for (const report::Notice& news : rig.news)
     page.notices.push_back({line_of(news), tone_of(news.severity)});
 }
@@ -180,6 +187,15 @@ PictureFacts facts_of(const pipeline::Shot& shot) {
   return facts;
 }
 
+std::string words_of(const fit::Figure& figure) {
+  if (!figure.off) return "model: no figure: " + figure.why;
+  const double off_px = fit::off_px(figure);
+  if (off_px > fit::most_off_px)
+    return fmt::format("model off by {:.{}f} px: check phantom or tags", off_px,
+                       off_px < 9.95 ? 1 : 0);
+  return fmt::format("model {:.1f} px (90 % {:.1f})", figure.off->median_px, figure.off->most_px);
+}
+
 OsdPage osd_page(const RigFacts& rig, const PictureFacts* picture, const Pace& pace) {
   OsdPage page;
   const Look& look = rig.look;
@@ -198,6 +214,8 @@ OsdPage osd_page(const RigFacts& rig, const PictureFacts* picture, const Pace& p
           {fmt::format("{:.1f} fps · {:.0f} ms", pace.fps, 1e3 * pace.latency_s)});
     page.bottom_right.push_back(tracking_words(*picture));
   }
+  if (rig.fit && rig.fit->off && tone_of(*rig.fit) == OsdTone::plain)
+    page.bottom_right.push_back({words_of(*rig.fit)});
   page.bottom_right.push_back({std::string("light: ") + set::name_of(look.light_mode)});
   page.column = pass_times(rig);
   add_notices(rig, picture, page);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/fit/figure.hpp"
 #include "daemon/output/osd_page.hpp"
 #include "daemon/output/record_queue.hpp"
 #include "daemon/pipeline/shot.hpp"
@@ -52,7 +53,12 @@ struct RigFacts {
   std::vector<report::Notice> news;         // actions of buttons and of the rig, oldest first
   std::vector<report::Notice> troubles;     // troubles of devices
   std::optional<PassTimes> pass_times;      // none: nothing was rendered since they were asked for
+  std::optional<fit::Figure> fit;           // of the model; none: the guides are off
 };
+
+// Returns "model 0.3 px (90 % 0.8)", or what is wrong: that the model is off, or why there is no
+// figure.
+std::string words_of(const fit::Figure& figure);
 
 // Returns the overlay's words. `picture` is null before the first picture.
 output::OsdPage osd_page(const RigFacts& rig, const PictureFacts* picture, const Pace& pace);

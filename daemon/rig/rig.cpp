@@ -125,19 +125,20 @@ Rig::Rig(Parts parts)
       folders_watch_(parts_.kept.metrics, "folders of takes",
                      [this] { return waiting_for_folders(recorder_); }),
       inbox_watch_(parts_.kept.metrics, "main loop", [this] { return inbox_.waiting(); }),
-      pipeline_(
-          {.set = loaded_.set,
-           .cameras = cameras_,
-           .scene = loaded_.scene,
-           .device = parts_.device,
-           .renderer = parts_.renderer,
-           .recorder = recorder_,
-           .look = look_,
-           .inbox = inbox_,
-           .kept = parts_.kept,
-           .wants = parts_.wants,
-           .show = [this](pipeline::Shot shot) { parts_.show(std::move(shot), *look_.get()); }},
-          parts_.stop) {
+      guides_({loaded_.set, loaded_.scene, look_, parts_.kept},
+              pipeline::observer_calibration(loaded_.set, cameras_.recorded.info)),
+      pipeline_({.set = loaded_.set,
+                 .cameras = cameras_,
+                 .scene = loaded_.scene,
+                 .device = parts_.device,
+                 .renderer = parts_.renderer,
+                 .recorder = recorder_,
+                 .look = look_,
+                 .inbox = inbox_,
+                 .kept = parts_.kept,
+                 .wants = parts_.wants,
+                 .show = [this](pipeline::Shot shot) { show_picture(std::move(shot)); }},
+                parts_.stop) {
   for (const std::string& what : loaded_.scene.notes)
     parts_.kept.reports(report::once({Severity::warning, "scene", what}));
   desk_.emplace(
@@ -371,7 +372,9 @@ void Rig::tick() {
     free_bytes_ = recorder_.free_bytes();
     look_at_folders();
   }
-  if (ticks_ % ticks_a_page == 0) show_facts();
+  if (ticks_ % ticks_a_page != 0) return;
+  show_facts();
+  look_at_guides();
 }
 
 // A pipeline that has ended leaves the loop through the inbox. One that does not end, because a
@@ -446,6 +449,18 @@ void Rig::resume(const std::string& take) {
   parts_.kept.reports.show(report::lasting(cut_off, what));
 }
 
+void Rig::look_at_guides() {
+  const std::optional<fit::Figure> fit = guides_.figure();
+  std::string words = fit ? words_of(*fit) : "";
+  if (words == std::exchange(fit_said_, words)) return;
+  if (changed_) changed_();
+}
+
+void Rig::show_picture(pipeline::Shot shot) {
+  GuidesOf guides = guides_.look_at(shot);
+  parts_.show(std::move(shot), *look_.get(), std::move(guides));
+}
+
 void Rig::show_facts() {
   if (!parts_.show_facts) return;
   const output::RecorderStatus recorder = recorder_.status();
@@ -462,6 +477,7 @@ void Rig::show_facts() {
   facts.news = parts_.kept.reports.news();
   facts.troubles = parts_.kept.reports.troubles();
   if (facts.look.pass_times) facts.pass_times = pipeline_.pass_times();
+  if (facts.look.guides) facts.fit = guides_.figure();
   parts_.show_facts(std::move(facts));
 }
 

@@ -20,6 +20,7 @@
 #include "daemon/rig/controls.hpp"
 #include "daemon/rig/event_loop.hpp"
 #include "daemon/rig/inbox.hpp"
+#include "daemon/rig/live_guides.hpp"
 #include "daemon/rig/live_pipeline.hpp"
 #include "daemon/rig/osd.hpp"
 #include "daemon/rig/review.hpp"
@@ -37,10 +38,11 @@ class Rig {
     Service& service;
     pipeline::Liveness::Pulse& pulse;  // the main thread's
     std::shared_ptr<render::Device> device;
-    std::shared_ptr<render::Renderer>& renderer;            // as LivePipeline's
-    std::function<void(pipeline::Shot, const Look&)> show;  // on the pipeline's last thread
-    LiveRender::Wants wants;                                // on the render thread
-    std::function<void(RigFacts)> show_facts;               // facts for the overlay
+    std::shared_ptr<render::Renderer>& renderer;  // as LivePipeline's
+    // Shows a picture and the lines over it, on the pipeline's last thread.
+    std::function<void(pipeline::Shot, const Look&, GuidesOf)> show;
+    LiveRender::Wants wants;                                              // on the render thread
+    std::function<void(RigFacts)> show_facts;                             // facts for the overlay
     std::function<std::vector<std::unique_ptr<Buttons>>()> more_buttons;  // may be empty
     std::function<void(Cameras&)> around_cameras;  // as LiveOptions'; may be empty
     bool loop_cameras = false;
@@ -66,6 +68,8 @@ class Rig {
   // Returns the samples per pixel that the preview has now.
   int samples() const;
   output::RecorderStatus recorder_status() const { return recorder_.status(); }
+  // Returns how far the model is from the pictures; nothing while the guides are off.
+  std::optional<fit::Figure> model_fit() const { return guides_.figure(); }
   // Called after controls, recorder or Reports::announced() have changed.
   void on_change(std::function<void()> changed) { changed_ = std::move(changed); }
 
@@ -92,6 +96,8 @@ class Rig {
   std::optional<std::string> carry_out(Request request, const std::string& by);
   std::optional<std::string> read_set(const std::function<void()>& begin, const std::string& by);
   std::optional<std::string> take_set(std::chrono::milliseconds patience);
+  void look_at_guides();
+  void show_picture(pipeline::Shot shot);
   void publish_look();
   std::int64_t now_ns() const;  // the cameras' clock
 
@@ -112,9 +118,11 @@ class Rig {
   bool is_take_closed_ = false;
   std::string reading_for_;  // who wants the set that is being read; empty: its file has changed
   std::string announced_;    // the last announcement that the bus knows of
+  std::string fit_said_;     // the last figure that the bus knows of, in words
   std::unique_ptr<Review> review_;  // at most one, even if it takes long to end
   std::function<void()> changed_;
   std::optional<std::uint64_t> free_bytes_;
+  LiveGuides guides_;
   LivePipeline pipeline_;  // last: its threads use all of the above
 };
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/output/guide_painter.hpp"
 #include "daemon/output/osd_painter.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/pipeline/channel.hpp"
@@ -33,6 +34,11 @@ struct Picture {
   Clock::time_point arrived;  // arrival at the daemon
   double in_device_s = 0;     // from capture to arrival, as the driver reports it
   bool frozen = false;        // a refinement's picture, which has no latency
+  GuidesOf guides = {};
+
+  // Either is 0 if there is no picture.
+  int width() const { return on_card ? on_card->memory->width : plate ? plate->width : 0; }
+  int height() const { return on_card ? on_card->memory->height : plate ? plate->height : 0; }
 
   double latency_s(std::int64_t shown_ns) const {
     const auto arrived_ns = std::chrono::nanoseconds(arrived.time_since_epoch()).count();
@@ -91,6 +97,7 @@ struct Screen::Impl {
   void run();
   void look_after(std::optional<Picture>& newest);
   void begin_anew();
+  bool renew_guides(bool fresh, bool wanted);
   void put(const output::OsdPage& next, bool fresh);
   Screenful compose(const DisplayMode& mode, const output::OsdPage& next);
   void was_shown(const Shown& shown, bool fresh);
@@ -105,10 +112,12 @@ struct Screen::Impl {
   // Only the thread uses these.
   DisplayLifeline life;
   std::optional<output::OsdPainter> painter;
+  std::optional<output::GuidePainter> guide_painter;
   DisplayMode painted_for;
   output::OsdPage painted;
   std::vector<Overlay> overlays;  // `painted`, for `painted_for`
   std::optional<Picture> picture;
+  std::shared_ptr<const output::GuidePage> guides;  // over `picture`; null: none
   PaceMeter pace;
   output::OsdPage page;
   bool up_to_date = false;  // the screen shows `picture` and `page`
@@ -143,6 +152,7 @@ void Screen::Impl::run() {
 void Screen::Impl::begin_anew() {
   life.close();
   painter.reset();
+  guide_painter.reset();
   overlays.clear();
   up_to_date = dark = false;
 }
@@ -163,7 +173,17 @@ void Screen::Impl::look_after(std::optional<Picture>& newest) {
   dark = false;
   output::OsdPage next;
   if (facts->look.osd) next = osd_page(*facts, picture ? &picture->facts : nullptr, pace.read());
-  if (fresh || !up_to_date || next != page) put(next, fresh);
+  const bool other_guides = renew_guides(fresh, facts->look.guides);
+  if (fresh || !up_to_date || other_guides || next != page) put(next, fresh);
+}
+
+// Returns whether the screen has other lines to show. Those of a picture that stands may come late:
+// when they are asked for, or once the model is there.
+bool Screen::Impl::renew_guides(bool fresh, bool wanted) {
+  if (!wanted) return std::exchange(guides, nullptr) != nullptr;
+  if (guides && !fresh) return false;
+  guides = picture && picture->guides ? picture->guides() : nullptr;
+  return guides != nullptr;
 }
 
 void Screen::Impl::put(const output::OsdPage& next, bool fresh) {
@@ -190,12 +210,19 @@ void Screen::Impl::put(const output::OsdPage& next, bool fresh) {
 
 Screenful Screen::Impl::compose(const DisplayMode& mode, const output::OsdPage& next) {
   const bool other_screen = !painter || mode != painted_for;
-  if (other_screen) painter.emplace(mode.width, mode.height, settings.text_height);
+  if (other_screen) {
+    painter.emplace(mode.width, mode.height, settings.text_height);
+    guide_painter.emplace(mode.width, mode.height, settings.scale);
+  }
   if (other_screen || next != painted) overlays = painter->paint(next);
   painted_for = mode;
   painted = next;
   if (!picture) return {nullptr, overlays};
-  return {picture->plate, overlays, picture->on_card};
+  std::vector<Overlay> all;
+  if (guides && picture->width() > 0)
+    all = guide_painter->paint(*guides, picture->width(), picture->height());
+  all.insert(all.end(), overlays.begin(), overlays.end());
+  return {picture->plate, std::move(all), picture->on_card};
 }
 
 void Screen::Impl::was_shown(const Shown& shown, bool fresh) {
@@ -225,13 +252,14 @@ Screen::Screen(const set::Set& set, Parts parts)
 
 Screen::~Screen() = default;
 
-void Screen::show(const pipeline::Shot& shot) {
+void Screen::show(const pipeline::Shot& shot, GuidesOf guides) {
   Picture shown{shot.picture,
                 shot.on_card,
                 facts_of(shot),
                 shot.arrived,
                 1e-9 * static_cast<double>(shot.frame->arrival_ns - shot.frame->timestamp_ns),
-                shot.frozen};
+                shot.frozen,
+                std::move(guides)};
   if (impl_)
     impl_->pictures.push(std::move(shown));
   else if (!shown.frozen)

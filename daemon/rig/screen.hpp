@@ -10,6 +10,7 @@
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/pipeline/stage_keeper.hpp"
+#include "daemon/rig/live_guides.hpp"
 #include "daemon/rig/osd.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/card_picture.hpp"
@@ -38,7 +39,8 @@ class Screen {
   Screen& operator=(const Screen&) = delete;
 
   // These return at once and may be called from any thread. The latest picture and facts are shown.
-  void show(const pipeline::Shot& shot);
+  // `guides` is called, on the screen's thread, only while Look::guides is on; it may be empty.
+  void show(const pipeline::Shot& shot, GuidesOf guides);
   void show(RigFacts facts);
   // Returns the card whose pictures the screen shows where they are (Display::card()); nothing
   // where they have to come down. May be called from any thread.

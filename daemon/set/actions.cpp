@@ -29,6 +29,7 @@ constexpr Action action_table[] = {
     {"debug_view", "Show the next layer in place of the composite.", NextView{}},
     {"osd", "Hide the overlay; press again to show it.", ToggleOsd{}},
     {"pass_times", "Show on the overlay how long each pass of the graphics card takes (a hidden overlay comes back); press again to hide the times.", TogglePassTimes{}},
+    {"guides", "Show lines over the picture: the model's edges, tags, horizon and axes; press again to hide them.", ToggleGuides{}},
     {"next_object", "Select the next virtual object.", SelectObject{1}},
     {"previous_object", "Select the previous virtual object.", SelectObject{-1}},
     {"move_left", "Move the selected object a step along -X.", MoveObject{{-1, 0, 0}}},

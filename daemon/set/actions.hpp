@@ -41,6 +41,7 @@ struct NextLightMode {};
 struct NextView {};
 struct ToggleOsd {};
 struct TogglePassTimes {};
+struct ToggleGuides {};
 struct SelectObject {
   int next = 1;
 };
@@ -77,8 +78,8 @@ struct ChangeExposure {
 using Effect =
     std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits, OtherSet,
                  ChangeSamples, HoldRate, ToggleAccumulation, NextEstimator, NextLightMode,
-                 NextView, ToggleOsd, TogglePassTimes, SelectObject, MoveObject, TurnObject,
-                 ScaleObject, ChangeVariant, ResetObject, ToggleTags, PlayAnimations,
+                 NextView, ToggleOsd, TogglePassTimes, ToggleGuides, SelectObject, MoveObject,
+                 TurnObject, ScaleObject, ChangeVariant, ResetObject, ToggleTags, PlayAnimations,
                  HoldAnimations, SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
 
 struct Action {

@@ -205,6 +205,20 @@ TEST(Metrics, JsonHasRatesDropsAndLatency) {
   EXPECT_DOUBLE_EQ(json["latency_s"]["p99"], 0.099);
 }
 
+TEST(Metrics, JsonHasTheFitOfTheModelWhileItIsMeasured) {
+  Metrics metrics;
+  const auto fit = [&] {
+    return nlohmann::json::parse(to_json(metrics.snapshot(1)))["model_fit_px"];
+  };
+  EXPECT_TRUE(fit().is_null());
+  metrics.model_fit(ModelFit{0.3, 0.8, 0.5});
+  EXPECT_EQ(fit()["median"], 0.3);
+  EXPECT_EQ(fit()["of_90_percent"], 0.8);
+  EXPECT_EQ(fit()["shift"], 0.5);
+  metrics.model_fit(std::nullopt);
+  EXPECT_TRUE(fit().is_null());
+}
+
 // Text of foreign origin that gets into a name fills no memory; what is known goes on being
 // counted.
 TEST(Metrics, OfNamesWithoutEndTheFirstAreCountedByName) {

@@ -454,6 +454,17 @@ TEST(Controls, PassTimesBringBackAnOverlayThatIsHidden) {
   EXPECT_TRUE(look.pass_times && look.osd);
 }
 
+TEST(Controls, GuidesAreSwitchedWhateverTheOverlayDoes) {
+  Desk desk;
+  EXPECT_FALSE(desk.controls.look().guides);
+  desk("osd");
+  EXPECT_EQ(desk("guides").said, "guides on");
+  EXPECT_TRUE(desk.controls.look().guides);
+  EXPECT_FALSE(desk.controls.look().osd);
+  EXPECT_EQ(desk("guides").said, "guides off");
+  EXPECT_FALSE(desk.controls.look().guides);
+}
+
 TEST(Controls, EstimatorAndViewGoAround) {
   Desk desk;
   EXPECT_EQ(desk("estimator").said, "estimator: difference");

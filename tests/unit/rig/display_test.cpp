@@ -30,7 +30,7 @@ class RigDisplay : public test::RigLive {
       std::unique_lock lock(mutex_);
       const Pictures pictures = pictures_;
       lock.unlock();
-      if (is_a_picture(screen, page, pictures)) ++as_expected_;
+      ++(is_a_picture(screen, page, pictures) ? as_expected_ : others_);
     };
   }
 
@@ -90,7 +90,7 @@ class RigDisplay : public test::RigLive {
                          Plate{picture_width, picture_height, 8,
                                std::vector<std::uint16_t>(3 * picture_width * picture_height, 0)})};
   std::atomic<int> count_ = 0;
-  int as_expected_ = 0;  // on the display's thread
+  std::atomic<int> as_expected_ = 0, others_ = 0;
 };
 
 TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
@@ -186,6 +186,32 @@ TEST_F(RigDisplay, ShowsWhatEachPassTakesWhileItIsAskedFor) {
   for (std::size_t i = 0; i < stream->records().size(); ++i)
     EXPECT_EQ(stream->read(i)->bytes,
               test::small_take_frame(static_cast<int>(stream->records()[i].sequence % 8)).bytes);
+}
+
+TEST_F(RigDisplay, ShowsLinesOverThePictureOnlyWhileTheGuidesAreOn) {
+  write_set(
+      "[display]\ndriver = \"headless\"\nmode = \"480x270\"\nscale = \"1:1\"\n"
+      "text_height = 0.05\n");
+  run_rendering([&] {
+    pages_.until_words("2 samples");
+    EXPECT_EQ(others_, 0);
+    press("guides");
+    test::must_come("there are lines", [&] { return others_ > 3; });
+    until_notice("model: no figure: ");  // nothing of the small take is real but a table
+    press("refine");                     // a frozen picture has them too
+    until_mode("REFINE");
+    const int before = others_;
+    test::must_come("there are lines", [&] { return others_ > before + 1; });
+    press("live");
+    press("guides");
+    until_notice("guides off");
+    const int with_lines = others_;
+    until_more(10);
+    EXPECT_EQ(others_, with_lines);
+    press("snapshot");
+    until_notice("snapshot");
+  });
+  EXPECT_EQ(as_expected_ + others_, count_);
 }
 
 // What a driver's release() does is seen on a real screen (KmsScreen): here that it comes, once,

@@ -162,6 +162,45 @@ TEST(OsdWords, BeforeTheFirstPicture) {
   EXPECT_TRUE(page.bottom_left.empty());
 }
 
+fit::Figure figure_of(double median_px, double most_px, double shift_px) {
+  fit::Figure figure;
+  figure.off = {median_px, most_px, shift_px};
+  return figure;
+}
+
+TEST(OsdWords, SayHowFarTheModelIsFromThePicture) {
+  const PictureFacts picture = tracked();
+  RigFacts rig = in(Mode::live);
+  const auto before = osd_page(rig, &picture, pace).bottom_right.size();
+  rig.fit = figure_of(0.31, 0.84, 0.5);
+  const OsdPage page = osd_page(rig, &picture, pace);
+  ASSERT_EQ(page.bottom_right.size(), before + 1);
+  EXPECT_EQ(page.bottom_right[1], OsdText{"model 0.3 px (90 % 0.8)"});
+  EXPECT_TRUE(page.notices.empty());
+}
+
+TEST(OsdWords, AModelThatIsOffIsAlarming) {
+  const PictureFacts picture = tracked();
+  RigFacts rig = in(Mode::live);
+  const auto before = osd_page(rig, &picture, pace).bottom_right.size();
+  for (const auto& [figure, words] :
+       {std::pair{figure_of(0.3, 0.8, 8), "model off by 8.0 px: check phantom or tags"},
+        {figure_of(2.1, 4, 0), "model off by 2.1 px: check phantom or tags"},
+        {figure_of(9.96, 12, 12), "model off by 12 px: check phantom or tags"}}) {
+    rig.fit = figure;
+    const OsdPage page = osd_page(rig, &picture, pace);
+    EXPECT_EQ(page.notices, (Texts{{words, OsdTone::alarm}}));
+    EXPECT_EQ(page.bottom_right.size(), before);
+  }
+}
+
+TEST(OsdWords, SayWhyThereIsNoFigureOfTheModel) {
+  const PictureFacts picture = tracked();
+  RigFacts rig = in(Mode::live);
+  rig.fit.emplace().why = "too few edges";
+  EXPECT_EQ(osd_page(rig, &picture, pace).notices, (Texts{{"model: no figure: too few edges"}}));
+}
+
 PassTimes times_of(std::vector<PassTimes::Pass> passes) {
   PassTimes times;
   times.is_timed = true;

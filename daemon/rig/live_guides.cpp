@@ -1,0 +1,88 @@
+#include "daemon/rig/live_guides.hpp"
+
+#include <utility>
+
+namespace previz::rig {
+
+using Clock = std::chrono::steady_clock;
+using pipeline::Shot;
+
+namespace {
+
+constexpr std::chrono::seconds figure_interval{1};
+constexpr std::chrono::milliseconds look_interval{100};  // at whether the guides are on
+constexpr const char* stage_name = "model fit";
+
+}  // namespace
+
+LiveGuides::LiveGuides(Parts parts, const ObserverCalibration& camera)
+    : parts_(std::move(parts)),
+      camera_(camera),
+      model_(std::make_shared<pipeline::Newest<ModelPtr>>(nullptr)) {
+  thread_ = std::jthread([this] { run(); });
+}
+
+LiveGuides::~LiveGuides() {
+  seen_.abandon();
+  thread_.join();
+  parts_.kept.metrics.model_fit(std::nullopt);
+}
+
+GuidesOf LiveGuides::look_at(const Shot& shot) {
+  if (parts_.look.get()->guides && Clock::now() - offered_ >= figure_interval) {
+    offered_ = Clock::now();
+    Seen seen{shot.frame, {}};
+    if (shot.track.pose) seen.world_from_camera = shot.track.pose->world_from_camera;
+    seen_.push(std::move(seen));
+  }
+  const glm::dmat4* pose = world_from_camera(shot);
+  if (!pose) return {};
+  return [model = model_, view = GuideModel::View{*pose, shot.scene, shot.motion.carriers}] {
+    const ModelPtr made = *model->get();
+    return made ? std::make_shared<const output::GuidePage>(made->guides_of(view)) : nullptr;
+  };
+}
+
+void LiveGuides::run() {
+  pipeline::StageKeeper keeper(stage_name, parts_.kept, &pipeline::Patience::set);
+  while (!seen_.finished()) {
+    const std::optional<Seen> seen = seen_.pop_for(look_interval);
+    if (!parts_.look.get()->guides) {
+      if (figure()) publish(std::nullopt);
+    } else if (seen || !*model_->get()) {
+      keeper.attempt([&] {
+        if (!*model_->get()) make_model();
+        if (seen) measure(*seen);
+      });
+    }
+  }
+}
+
+void LiveGuides::make_model() {
+  model_->set(std::make_shared<const GuideModel>(parts_.scene, parts_.set, camera_));
+}
+
+void LiveGuides::measure(const Seen& seen) {
+  if (!seen.world_from_camera) {
+    fit::Figure none;
+    none.why = "the camera's place is not known";
+    return publish(none);
+  }
+  const auto begin = Clock::now();
+  const ModelPtr model = *model_->get();
+  fit::Measurement measurement(model->real(), model->camera());
+  measurement.look(*seen.frame, *seen.world_from_camera);
+  publish(measurement.figure());
+  parts_.kept.metrics.worked(stage_name,
+                             std::chrono::duration<double>(Clock::now() - begin).count());
+}
+
+void LiveGuides::publish(const std::optional<fit::Figure>& figure) {
+  figure_.set(figure);
+  std::optional<pipeline::ModelFit> fit;
+  if (figure && figure->off)
+    fit = {figure->off->median_px, figure->off->most_px, figure->off->shift_px};
+  parts_.kept.metrics.model_fit(fit);
+}
+
+}  // namespace previz::rig
