@@ -1,6 +1,6 @@
 #!/bin/sh
 # All benchmarks of a build: run.sh BUILD_DIR OUT_DIR [SETDIR...]. Writes rays.md, instances.md,
-# frame.md, picture.md, move.md, deform.md, hard.md, and where ground truth sets are given live.md,
+# frame.md, picture.md, move.md, deform.md, guides.md, hard.md, and where ground truth sets are given live.md,
 # equal_error.md and tracking.md.
 # Beside Cycles: cycles/run.
 set -eu
@@ -19,6 +19,8 @@ mkdir -p "$out"
 "$bench/bench_picture" | tee "$out/picture.md"
 "$bench/bench_move" | tee "$out/move.md"
 "$bench/bench_deform" | tee "$out/deform.md"
+demo="$(dirname "$0")/../../config/demo"
+"$bench/bench_guides" "$demo/session" "$demo/demo.toml" | tee "$out/guides.md"
 "$bench/bench_hard" | tee "$out/hard.md"
 [ $# -eq 0 ] || "$bench/bench_live" "$@" | tee "$out/live.md"
 [ $# -eq 0 ] || "$bench/bench_equal_error" "$@" | tee "$out/equal_error.md"
