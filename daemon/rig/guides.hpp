@@ -1,11 +1,10 @@
 // Computes the lines that show on a picture how well the set fits what the camera sees.
 #pragma once
 
-#include <array>
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
-#include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "daemon/fit/real_model.hpp"

@@ -190,7 +190,7 @@ class RigTranscript : public test::RigLive {
   // Which signal says what of the take depends on how far the recorder's thread is: it is no part
   // of a line, and compared with the take afterwards.
   void remember_take(Changes& changes) {
-    changes.erase("Model");  // likewise: it is measured on a thread of its own
+    changes.erase("Model");  // it depends on how far the thread is that measures it
     for (const char* name :
          {"Take", "TakeFrames", "TakeDropped", "Writing", "BehindSeconds", "BehindMegabytes"})
       if (const auto found = changes.find(name); found != changes.end()) {
