@@ -109,7 +109,9 @@ void Measurement::look(const Frame& frame, const glm::dmat4& world_from_camera) 
 
 Figure Measurement::figure() const {
   Figure figure{frames_, looked_at_, off_px_.size(), {}, {}};
-  if (looked_at_ < least_pieces)
+  if (frames_ == 0)
+    figure.why = "none of the pictures looked at has a pose";
+  else if (looked_at_ < least_pieces)
     figure.why = "the pictures show too few straight edges of the model";
   else if (off_px_.size() < least_pieces)
     figure.why = "the pictures have edges of light at too few of the model's";

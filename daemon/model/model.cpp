@@ -81,7 +81,7 @@ void print_fit(const Parts& parts, const Layout& layout, const Fit& fit, std::os
     std::ranges::sort(off);
     fmt::print(out,
                "{} pieces of edges found in the pictures: the model is {:.2f} px off in the "
-               "median, {:.2f} px in 90 %\n",
+               "median, and 90 % of them by at most {:.2f} px\n",
                off.size(), off[off.size() / 2], off[off.size() * 9 / 10]);
   }
   if (fit.mark_factor > 1.5)

@@ -187,7 +187,7 @@ samples = 1500
   expect_said("1 500 samples per pixel");
   expect_said("geometry: 2 triangles, or 2 counting every copy of an object");
   expect_used("metal: an object is metal");
-  expect_used("two worlds: an object is virtual or removed");
+  expect_used("two worlds: an object is virtual, removed");
   expect_used("lamps: the set or a model has lamps");
   expect_used("relighting: a lamp is added, switched off, dimmed");
   expect_used("denoiser: noise is removed");
