@@ -13,6 +13,7 @@
 #include "daemon/model/colours.hpp"
 #include "daemon/model/fit.hpp"
 #include "daemon/model/glb.hpp"
+#include "daemon/model/on_phantom.hpp"
 #include "daemon/model/overlay.hpp"
 #include "daemon/model/parts.hpp"
 #include "daemon/model/pictures.hpp"
@@ -23,6 +24,7 @@
 #include "daemon/model/under_tags.hpp"
 #include "daemon/model/views.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/scene/load.hpp"
 #include "daemon/set/file_edit.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/problems.hpp"
@@ -228,7 +230,7 @@ void warn_of_others(const set::Set& set, const std::filesystem::path& model, std
     if (object.presence == set::Presence::phantom && !is_same(object.file, model))
       fmt::print(out,
                  "the set has a phantom \"{}\" beside this model; remove its [[object]] if it is "
-                 "of the same things\n",
+                 "of the same things, or keep it and make the tags alone, with --tags-only\n",
                  object.name);
 }
 
@@ -264,6 +266,35 @@ void add_under_tags(const LitTake& lit, const TaggedModel& model, std::vector<Na
   }
 }
 
+// Puts tags onto the phantoms that the set has beside this model.
+void put_onto_phantoms(const ModelOptions& options, set::Set set, const Adjusted& at,
+                       std::vector<NamedMesh>& tags, std::ostream& out) {
+  std::erase_if(set.objects, [&](const set::Object& object) {
+    return object.presence != set::Presence::phantom || is_same(object.file, file_of(options));
+  });
+  set.surfaces.clear();
+  const PhantomSurface phantoms(scene::load_scene(set), set);
+  double most_m = 0;
+  std::set<int> beside;
+  for (NamedMesh& mesh : tags) {
+    const int id = scene::named_tag(mesh.name).id;
+    const auto flat =
+        std::ranges::find(at.layout.tags, id, [](const FlatTag& tag) { return tag.tag->id; });
+    const auto moved = phantoms.put(mesh, ground_of(*flat, at.shape));
+    most_m = std::max(most_m, moved.value_or(0));
+    if (!moved) beside.insert(id);
+  }
+  fmt::print(out,
+             "tags are put onto the set's phantoms, at most {:.1f} mm from where they are seen\n",
+             1000 * most_m);
+  for (const int id : beside)
+    fmt::print(
+        out,
+        "warning: the set has no phantom within 20 mm of tag {}: hidden, its place will show "
+        "an edge\n",
+        id);
+}
+
 // Returns the bytes of the model's file, with the tags and the colours of everything.
 std::string coloured_model(const ModelOptions& options, const set::Set& set, const Adjusted& at,
                            const std::vector<Solid>& solids, const std::vector<NamedMesh>& scans,
@@ -284,10 +315,12 @@ std::string coloured_model(const ModelOptions& options, const set::Set& set, con
   if (lit)
     add_under_tags(*lit, {set.tracking.family, at.parts, at.layout, at.shape, solids, albedos},
                    meshes, out);
-  if (options.tags_only)
+  if (options.tags_only) {
     std::erase_if(meshes, [](const NamedMesh& mesh) {
       return scene::named_tag(mesh.name).part == scene::TagPart::none;
     });
+    put_onto_phantoms(options, set, at, meshes, out);
+  }
   return glb_of(meshes, albedos);
 }
 

@@ -23,6 +23,7 @@
 #include "daemon/post/render_directory.hpp"
 #include "daemon/post/render_folder.hpp"
 #include "daemon/report/report.hpp"
+#include "daemon/scene/check.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/load.hpp"
@@ -58,6 +59,13 @@ void override_take(pipeline::Take& take, const RenderOptions& options) {
   if (options.exr) set.output.exr = *options.exr;
   if (options.png) set.output.png = *options.png;
   if (options.video) set.output.video = *options.video;
+}
+
+// Returns whether tags are hidden in any of the take's frames.
+bool hides_tags(const pipeline::Take& take) {
+  return take.set.hides_tags || std::ranges::any_of(take.session.track, [](const auto& record) {
+           return record.scene.hides_tags.value_or(false);
+         });
 }
 
 // A session from elsewhere does not choose where files are written.
@@ -315,6 +323,11 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
                 pipeline::Metrics& metrics, std::ostream& out) {
   const scene::Scene scene = scene::load_scene(take.set);
   for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
+  if (hides_tags(take)) {
+    out << "tags: printed tags are hidden" << std::endl;
+    for (const std::string& remark : scene::remarks_on_hidden_tags(scene, take.set))
+      out << "tags: " << remark << std::endl;
+  }
   const std::shared_ptr<render::Device> device =
       render::open_device(render::options_for(options.device, take.set.quality.hardware_rays));
   check_neighbours(options, take, *device);

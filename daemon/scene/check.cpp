@@ -37,30 +37,46 @@ std::optional<Scene> check(const set::CheckedSet& checked, set::Findings& findin
 
 namespace {
 
-// Names the tags that stay in the picture although tags are to be hidden.
-void remark_on_tags(const Scene& scene, const set::Set& set, set::Findings& findings) {
-  if (!set.hides_tags) return;
-  std::set<int> known;
-  for (const Instance& instance : scene.instances)
-    if (instance.tag == TagPart::printed) known.insert(instance.tag_id);
-  std::string missing;
-  const auto look_for = [&](const std::vector<set::Tag>& tags) {
-    for (const set::Tag& tag : tags)
-      if (!known.contains(tag.id))
-        missing += (missing.empty() ? "" : ", ") + std::to_string(tag.id);
-  };
-  look_for(set.tracking.tags);
-  for (const set::Carrier& carrier : set.tracking.carriers) look_for(carrier.tags);
-  if (!missing.empty())
-    findings.remarks.push_back(
-        "tags.hide is true, but these tags are in no phantom and stay in the picture: " + missing +
-        "; `previzd model --tags-only` makes a phantom of them");
+// Lists numbers as "0, 1 and 2".
+std::string listed(const std::set<int>& ids) {
+  std::string text;
+  for (const int id : ids)
+    text += (text.empty() ? "" : id == *ids.rbegin() ? " and " : ", ") + std::to_string(id);
+  return text;
 }
 
 }  // namespace
 
+std::vector<std::string> remarks_on_hidden_tags(const Scene& scene, const set::Set& set) {
+  std::set<int> missing, bare;
+  for (const set::Tag& tag : set.tracking.tags) missing.insert(tag.id);
+  for (const set::Carrier& carrier : set.tracking.carriers)
+    for (const set::Tag& tag : carrier.tags) missing.insert(tag.id);
+  for (const Instance& instance : scene.instances)
+    if (instance.tag == TagPart::printed) {
+      missing.erase(instance.tag_id);
+      bare.insert(instance.tag_id);
+    }
+  for (const Instance& instance : scene.instances)
+    if (instance.tag == TagPart::under) bare.erase(instance.tag_id);
+  std::vector<std::string> remarks;
+  if (!missing.empty())
+    remarks.push_back(
+        "tags are hidden, but these are in no phantom and stay in the picture: " + listed(missing) +
+        "; `previzd model` makes a phantom of them, beside another one with "
+        "--tags-only");
+  if (!bare.empty())
+    remarks.push_back(
+        "tags are hidden, but no phantom has what is under these, so that their "
+        "outlines may be seen: " +
+        listed(bare) + "; `previzd model` makes it, beside another phantom with --tags-only");
+  return remarks;
+}
+
 void remark_on(const Scene& scene, const set::Set& set, set::Findings& findings) {
-  remark_on_tags(scene, set, findings);
+  if (set.hides_tags)
+    for (const std::string& remark : remarks_on_hidden_tags(scene, set))
+      findings.remarks.push_back(remark);
   for (const auto& note : scene.notes) findings.remarks.push_back(note);
   const auto has = [&](set::Presence presence) {
     return std::ranges::find(set.objects, presence, &set::Object::presence) != set.objects.end();

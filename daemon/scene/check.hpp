@@ -3,6 +3,8 @@
 
 #include <iosfwd>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/check.hpp"
@@ -11,6 +13,10 @@ namespace previz::scene {
 
 // Loads the scene; where that fails, finds the problems of each object's file and returns nothing.
 std::optional<Scene> check(const set::CheckedSet& checked, set::Findings& findings);
+
+// Returns what a user must know if tags are hidden: those that cannot be, and those of which it is
+// not known what is under them.
+std::vector<std::string> remarks_on_hidden_tags(const Scene& scene, const set::Set& set);
 
 // Remarks on what was ignored in the files, and on sets whose picture is the plate's.
 void remark_on(const Scene& scene, const set::Set& set, set::Findings& findings);

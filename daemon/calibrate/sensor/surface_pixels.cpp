@@ -194,10 +194,10 @@ class Probe {
         if (!alone || blind[at(x, y)]) continue;
         SurfacePixel pixel{.surface = surface - 1,
                            .tile = tile(plate, frame, x, y),
-                           .frame = frame,
-                           .px = (glm::dvec2(x, y) + 0.5) * pixel_size - 0.5,
                            .plate = {},
-                           .rendered = glm::dvec3(real[at(x, y)])};
+                           .rendered = glm::dvec3(real[at(x, y)]),
+                           .frame = frame,
+                           .px = (glm::dvec2(x, y) + 0.5) * pixel_size - 0.5};
         for (int c = 0; c < 3; ++c)
           pixel.plate[c] =
               response.inverse()[plate.samples[3 * at(x, y) + std::size_t(c)]] / exposure;

@@ -19,10 +19,10 @@ namespace previz::calibrate {
 struct SurfacePixel {
   std::uint32_t surface = 0;  // index into SurfacePixels::surfaces
   std::uint32_t tile = 0;     // a sixteenth of one picture; pixels of a tile err together
-  std::uint32_t frame = 0;    // index into SurfacePixels::world_from_cameras
-  glm::dvec2 px{0};           // its centre, in pixels of the film camera's picture
   glm::dvec3 plate{0};        // linear Rec. 709 radiance of the camera's picture
   glm::dvec3 rendered{0};     // from the real world's model under the light camera's light
+  std::uint32_t frame = 0;    // index into SurfacePixels::world_from_cameras
+  glm::dvec2 px{0};           // its centre, in pixels of the film camera's picture
 };
 
 // Surfaces are materials, by the name that a set's [[surface]] gives them.

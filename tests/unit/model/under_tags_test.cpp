@@ -38,7 +38,7 @@ class UnderTags : public testing::Test {
         const glm::dvec2 at = glm::dvec2(ray) * (0.5 / -ray.z);
         if (std::abs(at.x) < half_paper_m.x && std::abs(at.y) < half_paper_m.y) continue;
         seen_.pixels.push_back(
-            {.px = glm::dvec2(x, y), .plate = ratio(at), .rendered = glm::dvec3(1)});
+            {.plate = ratio(at), .rendered = glm::dvec3(1), .px = glm::dvec2(x, y)});
       }
   }
   model::UnderTag under() {

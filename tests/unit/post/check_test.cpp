@@ -402,12 +402,14 @@ TEST_F(Check, NamesTagsThatCannotBeHidden) {
       "[[tag]]\nid=1\nsize_m=0.1\nposition_m=[0,0,0]\n[[tag]]\nid=7\nsize_m=0.1\nposition_m=[1,0,0]"
       "\n";
   check(set);
-  EXPECT_THAT(said_, Not(HasSubstr("tags.hide")));
+  EXPECT_THAT(said_, Not(HasSubstr("tags are hidden")));
   EXPECT_THAT(said_, HasSubstr("the composite will equal the plate"));
   check(set + "[tags]\nhide = true\n");
   EXPECT_THAT(said_, Not(HasSubstr("the composite will equal the plate")));
-  EXPECT_THAT(said_, HasSubstr("tags.hide is true, but these tags are in no phantom and stay in "
-                               "the picture: 7;"));
+  EXPECT_THAT(said_, HasSubstr("tags are hidden, but these are in no phantom and stay in the "
+                               "picture: 7;"));
+  EXPECT_THAT(said_, HasSubstr("no phantom has what is under these, so that their outlines may be "
+                               "seen: 1;"));
 }
 
 }  // namespace previz::post::check_test

@@ -284,10 +284,13 @@ TEST_F(RenderSession, TagsAreHiddenAsTheyWereRecordedUnlessTheOptionSaysOtherwis
   options.set_file = directory_ / "set.toml";
   const auto covered = [&] { return layers_of(options).mask[18 * 48 + 24]; };
   EXPECT_EQ(covered(), 1);
+  EXPECT_THAT(out_.str(), HasSubstr("tags: printed tags are hidden\n"));
+  EXPECT_THAT(out_.str(), HasSubstr("their outlines may be seen: 1;"));
   options.hides_tags = false;
   EXPECT_THAT(test::error_of([&] { render(options); }), HasSubstr("hides_tags"));
   options.directory = directory_ / "shown";
   EXPECT_EQ(covered(), 0);
+  EXPECT_THAT(out_.str(), Not(HasSubstr("tags:")));
 }
 
 // 24 x 18 of the 48 x 36 pixels: to look at a take quickly. It is another picture, not the same.
