@@ -21,7 +21,7 @@ void main() {
   seen[index] = GpuSeen(0.0, NO_INDEX);
   if (!trace_closest(vec3(0.0), direction, 0.0, 3.4e38, WORLD_REAL, hit)) return;
   if (materials[instances[hit.instance].material].alpha_mode != ALPHA_OPAQUE) return;
-  // What is removed from the picture is not what a mixed path meets, however close behind it that is.
+  // A mixed path does not meet what is removed from the picture, however close behind it the path ends.
   if (instances[hit.instance].presence != WORLD_BOTH) return;
   seen[index] = GpuSeen(1.0 / (hit.t * depth_of_unit), hit.instance);
 }

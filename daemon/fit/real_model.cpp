@@ -12,21 +12,8 @@ namespace {
 // Surfaces touch that are as near as this.
 constexpr double touch_m = 2e-3;
 
-bool stands_still(const scene::Instance& instance, const set::Set& set) {
-  const set::Object& object = set.objects[instance.object];
-  return object.carrier.empty() && object.animation.empty();
-}
-
 bool has_edges(const scene::Material& material) {
   return material.alpha_mode == scene::AlphaMode::opaque && !scene::transmits(material);
-}
-
-void append(const scene::Scene& scene, const scene::Instance& instance,
-            lighting::Triangles& triangles) {
-  const scene::Mesh& mesh = scene.meshes[instance.mesh];
-  for (const glm::uvec3& triangle : mesh.triangles)
-    for (int k = 0; k < 3; ++k)
-      triangles.push_back(instance.world_from_object * glm::dvec4(mesh.positions[triangle[k]], 1));
 }
 
 glm::dvec3 middle_of(const lighting::Triangles& triangles) {
@@ -62,6 +49,19 @@ bool is_touched(const lighting::Room& surface, const FeatureEdge& edge) {
 }
 
 }  // namespace
+
+bool stands_still(const scene::Instance& instance, const set::Set& set) {
+  const set::Object& object = set.objects[instance.object];
+  return object.carrier.empty() && object.animation.empty();
+}
+
+void append(const scene::Scene& scene, const scene::Instance& instance,
+            lighting::Triangles& triangles) {
+  const scene::Mesh& mesh = scene.meshes[instance.mesh];
+  for (const glm::uvec3& triangle : mesh.triangles)
+    for (int k = 0; k < 3; ++k)
+      triangles.push_back(instance.world_from_object * glm::dvec4(mesh.positions[triangle[k]], 1));
+}
 
 RealModel::RealModel(const scene::Scene& scene, const set::Set& set) {
   lighting::Triangles all, opaque;

@@ -11,6 +11,13 @@
 
 namespace previz::fit {
 
+// Returns whether neither a carrier nor an animation moves an instance.
+bool stands_still(const scene::Instance& instance, const set::Set& set);
+
+// Appends the triangles of an instance, in the world.
+void append(const scene::Scene& scene, const scene::Instance& instance,
+            lighting::Triangles& triangles);
+
 struct ModelEdge {
   glm::dvec3 a{0}, b{0};  // world, metres
   // Something of the model touches it: a shadow begins there, which moves the edge of light by half

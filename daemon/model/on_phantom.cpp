@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
+#include "daemon/fit/real_model.hpp"
+
 namespace previz::model {
 namespace {
 
@@ -13,9 +15,8 @@ constexpr double reach_m = 0.02;
 constexpr double same_surface_m = 2e-3;
 
 bool is_surface(const scene::Instance& instance, const set::Set& set) {
-  const set::Object& object = set.objects[instance.object];
-  return object.presence == set::Presence::phantom && object.carrier.empty() &&
-         object.animation.empty() && instance.tag == scene::TagPart::none;
+  return set.objects[instance.object].presence == set::Presence::phantom &&
+         fit::stands_still(instance, set) && instance.tag == scene::TagPart::none;
 }
 
 double median_of(std::vector<double> values) {
@@ -28,14 +29,8 @@ double median_of(std::vector<double> values) {
 
 PhantomSurface::PhantomSurface(const scene::Scene& scene, const set::Set& set) {
   lighting::Triangles triangles;
-  for (const scene::Instance& instance : scene.instances) {
-    if (!is_surface(instance, set)) continue;
-    const scene::Mesh& mesh = scene.meshes[instance.mesh];
-    for (const glm::uvec3& triangle : mesh.triangles)
-      for (int k = 0; k < 3; ++k)
-        triangles.push_back(instance.world_from_object *
-                            glm::dvec4(mesh.positions[triangle[k]], 1));
-  }
+  for (const scene::Instance& instance : scene.instances)
+    if (is_surface(instance, set)) fit::append(scene, instance, triangles);
   if (!triangles.empty()) surface_.emplace(triangles, glm::dvec3(0));
 }
 

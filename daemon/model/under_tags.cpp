@@ -35,15 +35,21 @@ constexpr std::size_t least_pixels = 24;
 // A pixel whose ratio is off the median of all by more than this factor shows something else.
 constexpr double most_off = 1.4;
 constexpr int steps = 16;  // squares in a row
-// What is under a tag is so high above its surface for each metre that the farthest camera is away
-// from it or from the world's origin, and at least for one. Rays tell two surfaces apart that are a
-// third of that apart (TRACE_TIE of shaders/lib/hit.glsl). At the height of the paper it would cast
-// a shadow, a thin line along its edge, although there is nothing to cast one.
+// The piece of ground under a tag is put so high above its surface for each metre that the farthest
+// camera is away from the tag or from the world's origin, and at least for one. Rays tell surfaces
+// apart that are a third of that apart (TRACE_TIE of shaders/lib/hit.glsl). At the height of the
+// paper the piece would cast a shadow, a thin line along its edge.
 constexpr double height_per_m = 1e-5;
 
 struct RingPixel {
   glm::dvec2 at{0};  // metres, in the tag's axes
   glm::dvec3 plate{0}, rendered{0};
+};
+
+// The pixels around a tag, and the least and the largest ratio of plate and rendered among them.
+struct Ring {
+  std::vector<RingPixel> pixels;
+  glm::dvec3 least{std::numeric_limits<double>::infinity()}, most{0};
 };
 
 double ratio_of(const RingPixel& pixel) {
@@ -111,10 +117,10 @@ std::vector<glm::dvec3> directions_of(const calibrate::SurfacePixels& seen,
   return directions;
 }
 
-std::vector<RingPixel> ring_around(const Paper& paper, const calibrate::SurfacePixels& seen,
-                                   const std::vector<glm::dvec3>& directions, std::size_t surface) {
+Ring ring_around(const Paper& paper, const calibrate::SurfacePixels& seen,
+                 const std::vector<glm::dvec3>& directions, std::size_t surface) {
   const Ground ground(paper);
-  std::vector<RingPixel> ring;
+  Ring ring;
   for (std::size_t i = 0; i < seen.pixels.size(); ++i) {
     const calibrate::SurfacePixel& pixel = seen.pixels[i];
     if (pixel.surface != surface) continue;
@@ -124,19 +130,23 @@ std::vector<RingPixel> ring_around(const Paper& paper, const calibrate::SurfaceP
     const glm::dvec2 off = (glm::abs(*at) - paper.half_m) / paper.unit_m;
     const double outside = std::max(off.x, off.y);
     if (outside >= ring_from && outside <= ring_to)
-      ring.push_back({*at, pixel.plate, pixel.rendered});
+      ring.pixels.push_back({*at, pixel.plate, pixel.rendered});
   }
-  drop_others(ring);
+  drop_others(ring.pixels);
+  for (const RingPixel& pixel : ring.pixels) {
+    ring.least = glm::min(ring.least, pixel.plate / pixel.rendered);
+    ring.most = glm::max(ring.most, pixel.plate / pixel.rendered);
+  }
   return ring;
 }
 
 // Returns what the plates have over what is rendered, at a point: the value there of the plane that
 // fits the pixels' ratios best, within what they are.
-glm::dvec3 ratio_at(const glm::dvec2& at, const std::vector<RingPixel>& ring, double unit_m) {
+glm::dvec3 ratio_at(const glm::dvec2& at, const Ring& ring, double unit_m) {
   // How the ratio changes with the place, for each channel: value, along x, along y.
   std::array<glm::dmat3, 3> squares{glm::dmat3(0), glm::dmat3(0), glm::dmat3(0)};
   std::array<glm::dvec3, 3> products{};
-  for (const RingPixel& pixel : ring) {
+  for (const RingPixel& pixel : ring.pixels) {
     const glm::dvec2 off = (pixel.at - at) / unit_m;
     const double squared = glm::dot(off, off) + near * near;
     const double weight = 1 / (squared * squared);
@@ -155,12 +165,7 @@ glm::dvec3 ratio_at(const glm::dvec2& at, const std::vector<RingPixel>& ring, do
     square[2][2] += held;
     ratio[c] = (glm::inverse(square) * products[std::size_t(c)])[0];
   }
-  glm::dvec3 least(std::numeric_limits<double>::infinity()), most(0);
-  for (const RingPixel& pixel : ring) {
-    least = glm::min(least, pixel.plate / pixel.rendered);
-    most = glm::max(most, pixel.plate / pixel.rendered);
-  }
-  return glm::clamp(ratio, least, most);
+  return glm::clamp(ratio, ring.least, ring.most);
 }
 
 // Returns a point of the face: this one, or where the line from `middle` to it leaves the face.
@@ -185,8 +190,8 @@ double height_of(const FlatTag& flat, const calibrate::SurfacePixels& seen) {
 }
 
 // Adds the vertices row by row, and squares between them. `margin_m` is beyond the paper.
-void add_ground(const Paper& paper, double margin_m, const glm::dvec3& albedo,
-                const std::vector<RingPixel>& ring, NamedMesh& named) {
+void add_ground(const Paper& paper, double margin_m, const glm::dvec3& albedo, const Ring& ring,
+                NamedMesh& named) {
   const glm::dvec3 middle = above_ground(paper.flat, paper.ground, glm::dvec2(0), 0);
   for (int row = 0; row <= steps; ++row)
     for (int column = 0; column <= steps; ++column) {
@@ -231,10 +236,10 @@ std::vector<UnderTag> under_tags(const TaggedModel& model, const calibrate::Surf
                       half_paper(flat, cells, model.parts),
                       0.5 * cells.total * cell_m,
                       height_of(flat, seen)};
-    const auto ring = ring_around(paper, seen, directions,
+    const Ring ring = ring_around(paper, seen, directions,
                                   static_cast<std::size_t>(surface - seen.surfaces.begin()));
-    under.pixels = ring.size();
-    if (ring.size() < least_pixels) continue;
+    under.pixels = ring.pixels.size();
+    if (ring.pixels.size() < least_pixels) continue;
     add_ground(paper, margin_cells * cell_m, albedo->second, ring, under.mesh);
   }
   return all;

@@ -1,4 +1,4 @@
-// What is shown in place of a printed tag that is hidden: the surface that it lies on, in the
+// Makes what a picture shows in place of a hidden printed tag: the surface that it lies on, in the
 // colours around it.
 #pragma once
 

@@ -88,7 +88,7 @@ class Labels {
   std::vector<int> labels_;
 };
 
-// What the composite and the truth have in a band along an outline.
+// Sums up the brightness of the composite and of the truth in a band along an outline.
 struct Band {
   double composite = 0, truth = 0;
   double off() const { return truth > 0 ? composite / truth - 1 : 0; }

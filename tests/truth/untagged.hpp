@@ -16,7 +16,7 @@ bool has_untagged(const TruthSet& set, int frame);
 TruthFrame load_untagged_frame(const TruthSet& set, int frame);
 
 struct UntaggedMeasures {
-  // Of the composite where tags were: rms of its error over the rms of what hiding them changes.
+  // The rms of the composite's error where tags were, over the rms of what hiding them changes.
   double e_tags = 0;
   // The largest step that shows a tag's outline: how much brighter the composite is than the truth
   // just inside of it, less how much just outside, of the truth's brightness.

@@ -1,4 +1,4 @@
-// Which edges a body of triangles has.
+// Tests which edges a body of triangles has.
 #include "daemon/fit/feature_edges.hpp"
 
 #include "tests/support/real_bodies.hpp"

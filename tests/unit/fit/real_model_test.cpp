@@ -1,4 +1,4 @@
-// Which parts of a scene are edges of the real world.
+// Tests which parts of a scene are edges of the real world.
 #include "tests/support/real_bodies.hpp"
 
 namespace previz::real_model_test {

@@ -1,4 +1,4 @@
-// Which edges of a model a camera sees, and in which of them light is looked for.
+// Tests which edges of a model a camera sees, and in which of them light is looked for.
 #include "daemon/fit/visible_edges.hpp"
 
 #include "daemon/fit/light_edge.hpp"
@@ -74,7 +74,7 @@ TEST(VisibleEdges, AreNoneBehindAWall) {
   real.add(test::sheet({{{-9, -0.3, -9}, {9, -0.3, -9}, {9, -0.3, 9}, {-9, -0.3, 9}}}));
   EXPECT_TRUE(segments(real).empty());
   EXPECT_TRUE(pieces(real).empty());
-  // What is virtual hides nothing real.
+  // Virtual objects hide nothing real.
   real.scene.instances[1].presence = scene::world_mixed;
   EXPECT_FALSE(segments(real).empty());
 }

@@ -190,7 +190,7 @@ TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
   for (const bool hides : {false, true}) expect_tags(made, hides);
 }
 
-// For a phantom of another program, which needs no marks.
+// Tags alone go beside a phantom of another program, and need no box or mark in the file.
 TEST_F(ModelCommand, MakesTheTagsAlone) {
   options_.tags_only = true;
   write_parts(marks() + parts_text);

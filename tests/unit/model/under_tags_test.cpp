@@ -1,4 +1,4 @@
-// What is shown in place of hidden tags: the surface around them, continued.
+// Tests what a picture shows in place of hidden tags: the surface around them, continued.
 #include "daemon/model/under_tags.hpp"
 
 #include <glm/geometric.hpp>

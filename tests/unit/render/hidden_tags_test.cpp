@@ -6,7 +6,7 @@ namespace previz::test::hidden_tags_test {
 // A tag of 0.4 m lies on a grey floor under an even sky, with what is under it ready. Nothing on
 // the floor sees anything but the sky, so the tag lights no pixel but its own.
 struct Stage {
-  // So low that no sample meets the shadow of an edge.
+  // Its height is so small that no sample meets the shadow of its edge.
   static constexpr double above = 1e-5;
   View view;
   std::vector<scene::Instance> hidden;
@@ -67,7 +67,7 @@ TEST(HiddenTags, ShowWhatIsUnderThemAndLeaveEveryOtherPixelAsItIs) {
   }
 }
 
-// From so far that a float does not tell the floor from what lies on it: the first of them is seen.
+// Rays of a far camera cannot tell the floor from what lies on it; they hit the first of the two.
 TEST(HiddenTags, ShowWhatIsUnderThemFromFarAway) {
   Stage stage;
   stage.view.calibration = pinhole(48, 36, 0.03);
