@@ -37,10 +37,11 @@ std::optional<LightCameraCalibration> light_calibration(const set::Set& set,
 
 Take open_take(const std::filesystem::path& session_directory,
                const std::optional<std::filesystem::path>& set_file, bool any_paths,
-               const std::stop_token& stop, const std::optional<set::Overlay>& with) {
+               const std::stop_token& stop, const std::optional<set::Overlay>& with,
+               const std::vector<std::pair<std::string, std::filesystem::path>>& set_assets) {
   Take take;
   take.session = session::open_session(session_directory, stop);
-  std::vector<std::pair<std::string, std::filesystem::path>> assets;
+  std::vector<std::pair<std::string, std::filesystem::path>> assets = set_assets;
   for (const auto& [as_written, stored] : take.session.info.assets)
     if (!set_file || !std::filesystem::exists(set_file->parent_path() / as_written))
       assets.emplace_back(as_written, std::filesystem::absolute(session_directory / stored));

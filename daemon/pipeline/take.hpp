@@ -7,6 +7,8 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
@@ -30,15 +32,17 @@ struct Take {
 // overrides the session's. The session's own set may name only files inside the session, unless
 // `any_paths`. Throws previz::Error if something cannot be read, or there are no observer frames or
 // no observer calibration. The whole take is read once, which a stop ends, also with an error.
-// `with` replaces settings of either set.
+// `with` replaces settings of either set. `set_assets` are files that stand in for those of the
+// set, by the names that it has for them, before any others.
 Take open_take(const std::filesystem::path& session_directory,
                const std::optional<std::filesystem::path>& set_file, bool any_paths = false,
-               const std::stop_token& stop = {}, const std::optional<set::Overlay>& with = {});
+               const std::stop_token& stop = {}, const std::optional<set::Overlay>& with = {},
+               const std::vector<std::pair<std::string, std::filesystem::path>>& set_assets = {});
 
-// Returns the timestamp (ns) of the take's first observer frame.
 // Says that the light must come from a light camera, that the take has none, and what to do.
 std::string no_light_words();
 
+// Returns the timestamp (ns) of the take's first observer frame.
 std::int64_t start_of(const Take& take);
 
 // These return a camera's calibration: the set's own, otherwise the session's.

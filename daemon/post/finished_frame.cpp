@@ -3,6 +3,8 @@
 #include <glm/mat4x4.hpp>
 #include <nlohmann/json.hpp>
 
+#include "drivers/error.hpp"
+
 namespace previz::post {
 namespace {
 
@@ -82,6 +84,8 @@ std::string to_json(const FinishedFrame& frame) {
     json["measured"] = frame.counters.measured;
     json["unmeasured"] = frame.counters.unmeasured;
   }
+  if (!frame.made_on.device.empty())
+    json["device"] = {{"name", frame.made_on.device}, {"is_gpu", frame.made_on.is_gpu}};
   for (const auto& [name, mark] : frame.files)
     json["files"][name] = {{"bytes", mark.bytes}, {"sha256", mark.sha256}};
   return json.dump();
@@ -119,10 +123,22 @@ FinishedFrame from_json(const std::string& line) {
   frame.counters.rebuilt_trees = json.value("rebuilt_trees", std::uint64_t{0});
   frame.counters.measured = json.value("measured", std::uint64_t{0});
   frame.counters.unmeasured = json.value("unmeasured", std::uint64_t{0});
+  if (json.contains("device"))
+    frame.made_on = {json["device"].at("name"), json["device"].at("is_gpu")};
   if (json.contains("files"))
     for (const auto& [name, mark] : json["files"].items())
       frame.files[name] = {mark.at("bytes"), mark.at("sha256")};
   return frame;
+}
+
+std::string frames_words(const std::vector<std::uint64_t>& frames) {
+  std::string text;
+  for (std::size_t first = 0, last = 0; first < frames.size(); first = last = last + 1) {
+    while (last + 1 < frames.size() && frames[last + 1] == frames[last] + 1) ++last;
+    add_to_list(text, std::to_string(frames[first]) +
+                          (last > first ? " to " + std::to_string(frames[last]) : ""));
+  }
+  return (frames.size() == 1 ? "frame " : "frames ") + text;
 }
 
 }  // namespace previz::post

@@ -28,6 +28,15 @@ struct FileMark {
   friend bool operator==(const FileMark&, const FileMark&) = default;
 };
 
+// The device that a frame was rendered on. Pictures of a processor and of a graphics card differ in
+// their last bits, and so do those of different cards.
+struct MadeOn {
+  std::string device;  // its name; empty in a line of a previzd that did not write it
+  bool is_gpu = false;
+
+  friend bool operator==(const MadeOn&, const MadeOn&) = default;
+};
+
 enum class FrameStatus { rendered, untouched };
 
 // A line of DIR/frames.jsonl.
@@ -46,6 +55,7 @@ struct FinishedFrame {
   render::Counters counters;
   // By the file's name in DIR, "0007.exr"; empty in a line of a previzd that wrote none.
   std::map<std::string, FileMark> files;
+  MadeOn made_on;
 };
 
 // Returns the record of a shot whose pictures are written.
@@ -55,5 +65,8 @@ FinishedFrame finished_frame(const pipeline::Shot& shot);
 // nlohmann::json::exception on a broken line.
 std::string to_json(const FinishedFrame& frame);
 FinishedFrame from_json(const std::string& line);
+
+// Returns "frame 7", or "frames 1, 3 to 5, 9".
+std::string frames_words(const std::vector<std::uint64_t>& frames);
 
 }  // namespace previz::post

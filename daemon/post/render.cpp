@@ -5,7 +5,6 @@
 #include <charconv>
 #include <chrono>
 #include <cstdio>
-#include <nlohmann/json.hpp>
 #include <ostream>
 #include <set>
 #include <utility>
@@ -21,16 +20,12 @@
 #include "daemon/pipeline/take_shots.hpp"
 #include "daemon/post/frames_to_render.hpp"
 #include "daemon/post/render_directory.hpp"
-#include "daemon/post/render_folder.hpp"
+#include "daemon/post/render_plan.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/scene/check.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
-#include "daemon/set/load.hpp"
-#include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
-#include "drivers/session/nominal_rate.hpp"
 
 namespace previz::post {
 namespace {
@@ -41,94 +36,11 @@ double now_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-void override_take(pipeline::Take& take, const RenderOptions& options) {
-  set::Set& set = take.set;
-  if (options.samples) set.quality.samples = *options.samples;
-  if (options.adaptive) set.quality.adaptive = *options.adaptive;
-  if (options.denoise) set.quality.denoise = *options.denoise;
-  if (options.neighbours) set.quality.neighbours = *options.neighbours;
-  if (options.error) set.quality.error = *options.error;
-  if (options.seconds) set.quality.seconds = *options.seconds;
-  if (options.seed) set.estimation.seed = *options.seed;
-  if (options.hides_tags) {
-    set.hides_tags = *options.hides_tags;
-    for (session::TrackRecord& record : take.session.track) record.scene.hides_tags.reset();
-  }
-  if (options.estimator) set.estimation.estimator = *options.estimator;
-  if (options.directory) set.output.directory = *options.directory;
-  if (options.exr) set.output.exr = *options.exr;
-  if (options.png) set.output.png = *options.png;
-  if (options.video) set.output.video = *options.video;
-}
-
 // Returns whether tags are hidden in any of the take's frames.
 bool hides_tags(const pipeline::Take& take) {
   return take.set.hides_tags || std::ranges::any_of(take.session.track, [](const auto& record) {
            return record.scene.hides_tags.value_or(false);
          });
-}
-
-// A session from elsewhere does not choose where files are written.
-void check_directory(const set::Set& set, const RenderOptions& options) {
-  const bool chosen = options.directory || options.set_file || options.any_paths;
-  if (!chosen && !session::lies_within(options.session, set.output.directory))
-    throw Error(
-        options.session.string() + ": its set file writes to " + set.output.directory.string() +
-        ", outside the take's folder; give a folder with --out, or allow it with --any-paths");
-}
-
-// Returns how many frames on each side a picture is averaged with.
-int neighbours_of(const set::Quality& quality) {
-  return quality.denoise ? quality.neighbours : 0;
-}
-
-// Returns everything that decides what the pictures look like, as JSON that RenderDirectory
-// compares.
-std::string settings_of(const pipeline::Take& take, const set::Set& set,
-                        const std::optional<set::Overlay>& with, const RenderOptions& options) {
-  nlohmann::ordered_json json;
-  json["software"] = "previzd " PREVIZ_VERSION;
-  json["session"] = take.session.info.name;
-  json["session_start_ns"] = take.observer_stream->records().front().timestamp_ns;
-  json["scale"] = options.scale;
-  json["samples"] = set.quality.samples;
-  json["adaptive"] = set.quality.adaptive;
-  json["denoise"] = set.quality.denoise;
-  // Where it is unused the pictures are those of a previzd that did not know it.
-  if (const int neighbours = neighbours_of(set.quality)) json["neighbours"] = neighbours;
-  if (options.hides_tags) json["hides_tags"] = *options.hides_tags;
-  json["error"] = set.quality.error;
-  json["seconds"] = set.quality.seconds;
-  json["seed"] = set.estimation.seed;
-  json["estimator"] = set::name_of(set.estimation.estimator);
-  json["set"] = take.set_text;
-  if (with) json["with"] = with->text;
-  for (const set::Object& object : set.objects)
-    json["file " + object.file_as_written] = session::sha256_of(object.file);
-  if (const auto& room = set.lighting.room; room && !room->size_m)
-    json["file " + room->file_as_written] = session::sha256_of(room->file);
-  if (set.lighting.environment)
-    json["file " + set.lighting.environment_as_written] =
-        session::sha256_of(*set.lighting.environment);
-  return json.dump(2) + "\n";
-}
-
-session::TakeClock clock_of(const pipeline::Take& take) {
-  std::vector<std::int64_t> times;
-  for (const session::FrameRecord& frame : take.observer_stream->records())
-    times.push_back(frame.timestamp_ns);
-  return {session::nominal_rate(times).fps, session::timecode_of(take.session.info),
-          times.empty() ? 0 : times.front()};
-}
-
-FrameRange range_of(const RenderOptions& options, const pipeline::Take& take) {
-  const std::uint64_t last = take.observer_stream->records().size() - 1;
-  FrameRange range = options.frames.value_or(FrameRange{0, last});
-  if (range.first > last)
-    throw Error(options.session.string() + ": --frames starts at " + std::to_string(range.first) +
-                ", but the last frame is " + std::to_string(last));
-  range.last = std::min(range.last, last);
-  return range;
 }
 
 std::string size_words(const PinholeIntrinsics& picture) {
@@ -164,17 +76,6 @@ std::string quality_words(const set::Quality& quality) {
     text += ", over " + std::to_string(neighbours) + (neighbours == 1 ? " frame" : " frames") +
             " on either side";
   return text;
-}
-
-// Returns "frame 7", or "frames 1, 3 to 5, 9".
-std::string frames_words(const std::vector<std::uint64_t>& frames) {
-  std::string text;
-  for (std::size_t first = 0, last = 0; first < frames.size(); first = last = last + 1) {
-    while (last + 1 < frames.size() && frames[last + 1] == frames[last] + 1) ++last;
-    add_to_list(text, std::to_string(frames[first]) +
-                          (last > first ? " to " + std::to_string(frames[last]) : ""));
-  }
-  return (frames.size() == 1 ? "frame " : "frames ") + text;
 }
 
 // Reports NaN and negative samples, which are left out of the means, and paths that were cut short,
@@ -226,6 +127,10 @@ struct Job {
   RenderDirectory& directory;
   pipeline::Metrics& metrics;
 };
+
+MadeOn made_on(const render::Device& device) {
+  return {render::device_name(device), render::is_gpu(device)};
+}
 
 // Both must outlive the options.
 pipeline::RenderStageOptions stage_options(const Job& job, output::Progress& progress) {
@@ -293,7 +198,7 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
     });
   stages.sink("output", rendered, [&](const Shot& shot) {
     if (!shot.whole) return directory.release(shot.index);
-    directory.write(shot, written);
+    directory.write(shot, written, made_on(*job.device));
     if (const std::string dropped = dropped_text(shot.counters); !dropped.empty())
       progress.note("frame " + std::to_string(shot.index) + ": dropped " + dropped);
     progress.frame_done(done_text(shot), now_s());
@@ -329,11 +234,14 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
       out << "tags: " << remark << std::endl;
   }
   const std::shared_ptr<render::Device> device =
-      render::open_device(render::options_for(options.device, take.set.quality.hardware_rays));
+      options.open_device ? options.open_device
+                          : render::open_device(render::options_for(
+                                options.device, take.set.quality.hardware_rays));
   check_neighbours(options, take, *device);
   out << take.session.info.name << ": " << to_do.size() << " frames of "
       << size_words(pipeline::scaled(take.observer, options.scale).intrinsics) << ", "
       << quality_words(take.set.quality) << ", on " << render::device_name(*device) << std::endl;
+  if (options.on_begin) options.on_begin();
   output::Progress progress(out, options.terminal, to_do.size(), now_s());
   const Job job{options, take, scene, device, directory, metrics};
   while (!to_do.empty() && !options.stop.stop_requested()) {
@@ -386,26 +294,23 @@ void finish_video(const std::map<std::string, std::vector<std::uint64_t>>& at_ot
 }  // namespace
 
 RenderReport render_session(const RenderOptions& options, std::ostream& out) {
-  std::optional<set::Overlay> with;
-  if (options.with) with = set::read_overlay(*options.with);
-  pipeline::Take take =
-      pipeline::open_take(options.session, options.set_file, options.any_paths, {}, with);
-  override_take(take, options);
-  check_directory(take.set, options);
-  if (!options.directory)
-    take.set.output.directory = render_folder(options.session, take.session.info.take.has_value(),
-                                              take.set.output.directory);
+  const RenderPlan plan = plan_render(options);
+  const pipeline::Take& take = plan.take;
   const set::Set& set = take.set;
-  const FrameRange range = range_of(options, take);
-  RenderDirectory directory(set.output, settings_of(take, set, with, options), options.force,
-                            clock_of(take), range, options.stop);
+  const FrameRange range = plan.range;
+  RenderDirectory directory(set.output, plan.settings, options.force, plan.clock, range,
+                            options.stop);
 
   RenderReport report;
   report.directory = directory.path();
   std::set<std::uint64_t> to_do;
   for (std::uint64_t frame = range.first; frame <= range.last; ++frame)
-    if (!directory.finished(frame)) to_do.insert(frame);
-  report.found_finished = range.last - range.first + 1 - to_do.size();
+    if (options.is_elsewhere && options.is_elsewhere(frame))
+      continue;
+    else if (directory.finished(frame))
+      ++report.found_finished;
+    else
+      to_do.insert(frame);
   for (const std::string& what : take.session.missing) out << "session: " << what << std::endl;
   report_opened(directory, report, out);
 

@@ -6,9 +6,11 @@
 #include <filesystem>
 #include <functional>
 #include <iosfwd>
+#include <memory>
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/pipeline/metrics.hpp"
@@ -53,6 +55,15 @@ struct RenderOptions {
   // Called after a frame's files are written, on the output stage's thread, in frame order, but not
   // for frames that were finished before. The shot has its layers.
   std::function<void(const pipeline::Shot&)> on_frame;
+  // Files that stand in for those of `set_file`, by the names that it has for them.
+  std::vector<std::pair<std::string, std::filesystem::path>> set_assets;
+  // Rendered on in place of a device that is opened by `device`; null: none is open.
+  std::shared_ptr<render::Device> open_device;
+  // Called once all that the take and the set name has been read, and frames are next: what fails
+  // before it fails on every machine that sees the same files. Not called if no frame is to do.
+  std::function<void()> on_begin;
+  // Returns whether a frame is finished elsewhere, so that it is not rendered and not reported.
+  std::function<bool(std::uint64_t frame)> is_elsewhere;
 };
 
 struct RenderReport {

@@ -120,13 +120,77 @@ void append_line(const std::filesystem::path& file, const std::string& line) {
   lines.sync();
 }
 
+using Frames = std::map<std::uint64_t, FinishedFrame>;
+
+// Reads the lines; a power cut may have left one half written, and its frame is rendered again.
+Frames frames_in(const std::filesystem::path& file) {
+  Frames frames;
+  std::istringstream text(session::read_plain_file(file));
+  for (std::string line; std::getline(text, line);) {
+    try {
+      const FinishedFrame record = from_json(line);
+      frames[record.frame] = record;
+    } catch (const nlohmann::json::exception&) {
+      continue;
+    }
+  }
+  return frames;
+}
+
+// The video is made from PNGs.
+bool wants_png(const set::Output& output) {
+  return output.png || output.video;
+}
+
+// Returns the endings of the files that the set asks for.
+std::vector<const char*> extensions_of(const set::Output& output) {
+  std::vector<const char*> all;
+  if (output.exr) all.push_back(".exr");
+  if (wants_png(output)) all.push_back(".png");
+  return all;
+}
+
+std::filesystem::path file_in(const std::filesystem::path& folder, std::uint64_t frame,
+                              const char* extension) {
+  std::string number = std::to_string(frame);
+  number.insert(0, number.size() < 4 ? 4 - number.size() : 0, '0');
+  return folder / (number + extension);
+}
+
+bool has_files(const set::Output& output, std::uint64_t frame) {
+  return std::ranges::all_of(extensions_of(output), [&](const char* extension) {
+    std::error_code unknown;
+    return std::filesystem::is_regular_file(
+        std::filesystem::symlink_status(file_in(output.directory, frame, extension), unknown));
+  });
+}
+
+// Gives the file another name, which may be on another disk; throws previz::Error.
+void move_file(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::error_code code;
+  std::filesystem::rename(from, to, code);
+  if (!code) return;
+  if (code != std::errc::cross_device_link)
+    throw Error(to.string() + ": cannot be moved here from " + from.string() + ": " +
+                code.message());
+  session::Draft draft(to);
+  session::read_blocks(
+      from, [] { return false; }, [&](std::string_view block) { draft.file().append(block); });
+  draft.file().sync();
+  if (session::sha256_of(draft.path()) != session::sha256_of(from))
+    throw Error(to.string() + ": what was copied from " + from.string() +
+                " is read back with other content; look at the disk");
+  draft.put();
+  std::filesystem::remove(from, code);
+}
+
 }  // namespace
 
 // What takes long, the reading of the pictures, is done while others may go on.
 RenderDirectory::RenderDirectory(const set::Output& output, const std::string& settings, bool force,
                                  const session::TakeClock& clock, FrameRange range,
                                  const std::stop_token& stop)
-    : output_(output), clock_(clock) {
+    : output_(output), clock_(clock), range_(range) {
   std::error_code code;
   std::filesystem::create_directories(path(), code);
   if (!std::filesystem::is_directory(path()))
@@ -151,6 +215,7 @@ void RenderDirectory::begin(const std::string& settings, bool force, FrameRange 
                             const std::stop_token& stop) {
   const FolderLocks::Transaction transaction(*locks_, stop);
   const std::vector<FolderUser> others = locks_->others();
+  has_others_ = !others.empty();
   std::string who;
   for (const FolderUser& user : others) add_to_list(who, words_of(user), "; ");
   if (!who.empty()) notes_.push_back("also at work here: " + who);
@@ -192,16 +257,7 @@ std::string RenderDirectory::differences_from(const std::string& settings) const
 void RenderDirectory::read_lines() {
   const std::string state = state_of(path() / lines_name);
   if (state == lines_state_) return;
-  finished_.clear();
-  std::istringstream text(state.empty() ? "" : session::read_plain_file(path() / lines_name));
-  for (std::string line; std::getline(text, line);) {
-    try {
-      const FinishedFrame record = from_json(line);
-      finished_[record.frame] = record;
-    } catch (const nlohmann::json::exception&) {
-      // A power cut may leave a line half written; its frame is rendered again.
-    }
-  }
+  finished_ = state.empty() ? Frames() : frames_in(path() / lines_name);
   lines_state_ = state;
 }
 
@@ -262,31 +318,25 @@ void RenderDirectory::reject_without_line(FrameRange range) {
 }
 
 std::vector<const char*> RenderDirectory::extensions() const {
-  std::vector<const char*> all;
-  if (output_.exr) all.push_back(".exr");
-  if (wants_png()) all.push_back(".png");
-  return all;
+  return extensions_of(output_);
 }
 
 std::filesystem::path RenderDirectory::file(std::uint64_t frame, const char* extension) const {
-  std::string number = std::to_string(frame);
-  number.insert(0, number.size() < 4 ? 4 - number.size() : 0, '0');
-  return path() / (number + extension);
-}
-
-bool RenderDirectory::is_there(std::uint64_t frame, const char* extension) const {
-  std::error_code unknown;
-  return std::filesystem::is_regular_file(
-      std::filesystem::symlink_status(file(frame, extension), unknown));
+  return file_in(path(), frame, extension);
 }
 
 const FinishedFrame* RenderDirectory::finished(std::uint64_t frame) const {
   const auto found = finished_.find(frame);
-  const bool whole =
-      found != finished_.end() && std::ranges::all_of(extensions(), [&](const char* extension) {
-        return is_there(frame, extension);
-      });
-  return whole ? &found->second : nullptr;
+  return found != finished_.end() && has_files(output_, frame) ? &found->second : nullptr;
+}
+
+std::map<std::uint64_t, FinishedFrame> finished_frames(const set::Output& output) {
+  const std::filesystem::path lines = output.directory / lines_name;
+  std::error_code unknown;
+  if (!std::filesystem::exists(std::filesystem::symlink_status(lines, unknown))) return {};
+  Frames frames = frames_in(lines);
+  std::erase_if(frames, [&](const auto& entry) { return !has_files(output, entry.first); });
+  return frames;
 }
 
 Claim RenderDirectory::claim(std::uint64_t frame) {
@@ -335,16 +385,18 @@ bool RenderDirectory::claim_video() {
   return locks_->claim_video();
 }
 
-void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set) {
+void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set,
+                            const MadeOn& made_on) {
   if (output_.exr) {
     output::ExrMetadata metadata = output::exr_metadata(*shot.layers, *shot.frame, shot.track, set);
     metadata.fps = clock_.fps;
     metadata.timecode = clock_.at(shot.frame->timestamp_ns);
     output::write_exr(file(shot.index, ".exr"), *shot.layers, metadata);
   }
-  if (wants_png()) output::write_png(file(shot.index, ".png"), *shot.picture);
+  if (wants_png(output_)) output::write_png(file(shot.index, ".png"), *shot.picture);
 
   FinishedFrame record = finished_frame(shot);
+  record.made_on = made_on;
   for (const char* extension : extensions()) {
     const std::filesystem::path written = file(shot.index, extension);
     record.files[written.filename().string()] = mark_of(written);
@@ -356,6 +408,51 @@ void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set) {
   finished_[record.frame] = record;
   lines_state_ = state_of(path() / lines_name);
   locks_->release(record.frame);
+}
+
+std::vector<FinishedFrame> RenderDirectory::reject(
+    const std::function<bool(const FinishedFrame&)>& is_such) {
+  const std::lock_guard guard(mutex_);
+  std::vector<FinishedFrame> rejected;
+  for (auto at = finished_.lower_bound(range_.first);
+       at != finished_.end() && at->first <= range_.last;) {
+    const auto next = std::next(at);
+    if (is_such(at->second)) rejected.push_back(finished_.extract(at).mapped());
+    at = next;
+  }
+  return rejected;
+}
+
+std::size_t RenderDirectory::adopt(const RenderDirectory& from) {
+  const std::lock_guard guard(mutex_);
+  const FolderLocks::Transaction transaction(*locks_);
+  read_lines();
+  std::vector<FinishedFrame> taken;
+  std::string lines;
+  const auto end = from.finished_.upper_bound(from.range_.last);
+  for (auto at = from.finished_.lower_bound(from.range_.first); at != end; ++at) {
+    const auto& [frame, record] = *at;
+    if (finished(frame) || !from.finished(frame)) continue;
+    taken.push_back(record);
+    add_to_list(lines, to_json(record), "\n");
+  }
+  if (taken.empty()) return 0;
+  append_line(path() / lines_name, lines);
+  for (const FinishedFrame& record : taken) {
+    for (const char* extension : extensions())
+      move_file(from.file(record.frame, extension), file(record.frame, extension));
+    finished_[record.frame] = record;
+  }
+  session::sync_names(path());
+  lines_state_ = state_of(path() / lines_name);
+  return taken.size();
+}
+
+std::string RenderDirectory::settings() const {
+  const std::filesystem::path file = path() / settings_name;
+  std::error_code unknown;
+  if (!std::filesystem::exists(file, unknown) || !session::why_not_plain(file).empty()) return "";
+  return session::read_plain_file(file);
 }
 
 std::filesystem::path RenderDirectory::write_video(const std::vector<FinishedFrame>& frames,

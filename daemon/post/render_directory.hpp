@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <iosfwd>
 #include <limits>
 #include <map>
@@ -25,6 +26,11 @@ namespace previz::post {
 
 // What came of asking for a frame.
 enum class Claim { mine, finished, at_another };
+
+// Returns the frames of which the folder has a line and all files that are wanted, without a look
+// into these and without a lock; none where there is no such folder. Throws previz::Error where
+// something else is in the place of the lines.
+std::map<std::uint64_t, FinishedFrame> finished_frames(const set::Output& output);
 
 // claim(), release() and write() are for several threads at once.
 class RenderDirectory {
@@ -58,6 +64,12 @@ class RenderDirectory {
   // else is at work here, that the file system has no locks.
   const std::vector<std::string>& notes() const { return notes_; }
 
+  // Returns whether other processes were at work here when the folder was opened.
+  bool has_others() const { return has_others_; }
+  // Counts the frames of the range that are such as not finished, as long as this object lives, and
+  // returns them.
+  std::vector<FinishedFrame> reject(const std::function<bool(const FinishedFrame&)>& is_such);
+
   // Takes a frame, so that no other process renders it.
   Claim claim(std::uint64_t frame);
   // Takes those of the frames that are neither finished nor at another process, and returns them.
@@ -74,19 +86,25 @@ class RenderDirectory {
 
   // Writes the shot's files, then its line, which is on the medium after the return, and gives the
   // frame back. Whoever shares the directory has claimed it.
-  void write(const pipeline::Shot& shot, const set::Set& set);
+  void write(const pipeline::Shot& shot, const set::Set& set, const MadeOn& made_on = {});
+
+  // Takes over what is finished in the range of another folder: the lines, then the files, which
+  // are moved, or copied and compared where it is on another file system. Frames that are finished
+  // here stay as they are, in both folders. Whoever calls has found the settings of both the same.
+  // What a crash interrupts, the next call completes. Returns the number of frames taken over.
+  std::size_t adopt(const RenderDirectory& from);
 
   // Encodes the pictures of these frames to review.mp4 (or .mkv) and names the codec on `out`.
   std::filesystem::path write_video(const std::vector<FinishedFrame>& frames,
                                     std::ostream& out) const;
 
   const std::filesystem::path& path() const { return output_.directory; }
+  // Returns the text of the settings in the folder; empty: there are none, or not in a plain file.
+  std::string settings() const;
 
  private:
   std::filesystem::path file(std::uint64_t frame, const char* extension) const;
   std::vector<const char*> extensions() const;  // of the files that the set asks for
-  bool wants_png() const { return output_.png || output_.video; }  // the video is made from PNGs
-  bool is_there(std::uint64_t frame, const char* extension) const;
   void begin(const std::string& settings, bool force, FrameRange range,
              const std::stop_token& stop);
   std::string differences_from(const std::string& settings) const;
@@ -103,6 +121,8 @@ class RenderDirectory {
   std::string lines_state_;  // of frames.jsonl when it was read last
   std::map<std::uint64_t, FinishedFrame> finished_;
   std::map<std::string, std::vector<std::uint64_t>> rejected_;
+  FrameRange range_;
+  bool has_others_ = false;
 };
 
 }  // namespace previz::post

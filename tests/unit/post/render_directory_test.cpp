@@ -95,6 +95,53 @@ TEST_F(RenderDirectoryTest, WritesNumberedFilesAndALineAFrame) {
   }
 }
 
+TEST_F(RenderDirectoryTest, ALineSaysWhichDeviceMadeTheFrame) {
+  const MadeOn card{"Some Card 9000", true};
+  open().write(sample_shot(0), set_, card);
+  open().write(sample_shot(1), set_);
+  const RenderDirectory again = open();
+  EXPECT_EQ(again.finished(0)->made_on, card);
+  EXPECT_EQ(again.finished(1)->made_on, MadeOn{});
+}
+
+// Frame 1 is in both folders, and the one that is there stays; frame 3 is beyond the range.
+TEST_F(RenderDirectoryTest, TakesOverWhatAnotherFolderHas) {
+  const set::Output part{directory_ / "part", true, true, false};
+  {
+    RenderDirectory from(part, settings, false);
+    for (const std::uint64_t frame : {0, 1, 2, 3}) from.write(sample_shot(frame), set_);
+  }
+  open().write(sample_shot(1), set_, {"the first", false});
+  const std::string exr = content_of(directory_ / "part/0002.exr");
+  const RenderDirectory from(part, settings, false, {}, {0, 2});
+  EXPECT_EQ(open().adopt(from), 2u);
+  EXPECT_EQ(content_of(directory_ / "out/0002.exr"), exr);
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "part/0002.exr"));
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "part/0002.png"));
+  EXPECT_TRUE(std::filesystem::exists(directory_ / "part/0003.exr"));
+  const RenderDirectory again = open();
+  EXPECT_EQ(finished(again, 3), "yyyn");
+  EXPECT_EQ(again.finished(1)->made_on.device, "the first");
+  EXPECT_TRUE(again.rejected().empty());
+  EXPECT_EQ(open().adopt(RenderDirectory(part, settings, false, {}, {0, 2})), 0u);
+}
+
+// A crash after the lines were written, and before all files were moved.
+TEST_F(RenderDirectoryTest, GoesOnWithWhatItHadBegunToTakeOver) {
+  const set::Output part{directory_ / "part", true, true, false};
+  {
+    RenderDirectory from(part, settings, false);
+    for (const std::uint64_t frame : {0, 1}) from.write(sample_shot(frame), set_);
+  }
+  open();
+  std::filesystem::copy_file(directory_ / "part/frames.jsonl", directory_ / "out/frames.jsonl",
+                             std::filesystem::copy_options::overwrite_existing);
+  for (const char* name : {"0000.exr", "0000.png"})
+    std::filesystem::rename(directory_ / "part" / name, directory_ / "out" / name);
+  EXPECT_EQ(open().adopt(RenderDirectory(part, settings, false)), 1u);
+  EXPECT_EQ(finished(open(), 1), "yy");
+}
+
 TEST_F(RenderDirectoryTest, UntouchedFrameSaysWhyAndHasNoPose) {
   pipeline::Shot shot = sample_shot(0);
   shot.track = {};
