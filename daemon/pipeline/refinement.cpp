@@ -1,6 +1,7 @@
 #include "daemon/pipeline/refinement.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <chrono>
 #include <cmath>
 #include <optional>
@@ -69,6 +70,38 @@ Refined spread(render::Renderer& renderer, int samples, const std::function<bool
 
 bool spreads_samples(const set::Quality& quality) {
   return quality.adaptive && !goes_on(quality) && quality.samples >= least_adaptive_samples;
+}
+
+bool has_fixed_samples(const set::Quality& quality) {
+  return !goes_on(quality) && !spreads_samples(quality);
+}
+
+Refined render_range(render::Renderer& renderer, int samples, render::SampleRange range,
+                     const std::function<bool()>& cancelled,
+                     const std::function<void(int samples)>& progress) {
+  Refined refined;
+  const render::SampleSpan own = render::samples_of(range, samples);
+  const int all_parts = render::part_count(samples), parts = all_parts / range.count;
+  assert(parts > 0 && parts * range.count == all_parts);
+  const int batch = std::max(1, own.count / batches_a_round);
+  renderer.start_at(own.first);
+  render::SumTree tree;
+  for (int part = 0; part < parts; ++part) {
+    const int count =
+        render::samples_of({parts * (range.index - 1) + part + 1, all_parts}, samples).count;
+    for (int done = 0; done < count;) {
+      const int now = std::min(batch, count - done);
+      renderer.render(now, cancelled);
+      if (cancelled && cancelled()) return refined;
+      done += now;
+      refined.samples += now;
+      if (progress) progress(refined.samples);
+    }
+    if (parts > 1) tree.add(renderer.take_sums());
+  }
+  if (parts > 1) renderer.put_sums(tree.take());
+  refined.whole = true;
+  return refined;
 }
 
 Refined refine(render::Renderer& renderer, const set::Quality& quality,

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "daemon/render/renderer.hpp"
+#include "daemon/render/sample_sums.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::pipeline {
@@ -33,5 +34,18 @@ bool spreads_samples(const set::Quality& quality);
 Refined refine(render::Renderer& renderer, const set::Quality& quality,
                const std::function<bool()>& cancelled,
                const std::function<void(int samples)>& progress);
+
+// True if every pixel gets quality.samples, so that the frame can be rendered in ranges of them.
+bool has_fixed_samples(const set::Quality& quality);
+
+// Renders a range of the `samples` a pixel of the frame that the renderer has begun, and sums it in
+// parts (render::part_count), so that the sums of all ranges, merged by a render::SumTree, have the
+// bits of those of one call for all samples. The range's count is a power of two and at most the
+// number of parts. While it works it takes a frame's sums (Renderer::take_sums) of the computer's
+// memory once for every doubling of the parts, and once more; with one part none. `progress`
+// receives how many of the range's samples are done.
+Refined render_range(render::Renderer& renderer, int samples, render::SampleRange range,
+                     const std::function<bool()>& cancelled,
+                     const std::function<void(int samples)>& progress);
 
 }  // namespace previz::pipeline

@@ -83,7 +83,10 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
 void RenderStage::operator()(Shot& shot) {
   const auto start = std::chrono::steady_clock::now();
   if (!begin(shot, options_.is_live) || !sample(shot)) return;
-  finish(shot);
+  if (options_.sample_range)
+    take_sums(shot);
+  else
+    finish(shot);
   shot.render_s = seconds_from(start);
 }
 
@@ -110,16 +113,38 @@ Shot RenderStage::finish(ShotUnderWay under_way) const {
   return std::move(under_way.shot);
 }
 
-// Returns false if it was cancelled.
+// Returns false if it was cancelled, or the sums from elsewhere cannot be had.
 bool RenderStage::sample(Shot& shot) {
-  const Refined refined = refine(
-      *renderer_, set_.quality, [&] { return cancelled(); },
-      [&](int samples) {
-        if (options_.progress) options_.progress(shot, samples);
-      });
+  if (options_.sums) return put_sums(shot);
+  const auto is_cancelled = [&] { return cancelled(); };
+  const auto progress = [&](int samples) {
+    if (options_.progress) options_.progress(shot, samples);
+  };
+  const bool in_parts = !options_.is_live && has_fixed_samples(set_.quality);
+  const Refined refined = in_parts
+                              ? render_range(*renderer_, set_.quality.samples,
+                                             options_.sample_range.value_or(render::SampleRange{}),
+                                             is_cancelled, progress)
+                              : refine(*renderer_, set_.quality, is_cancelled, progress);
   shot.error = refined.error;
   shot.samples = refined.samples;
   return refined.whole;
+}
+
+bool RenderStage::put_sums(Shot& shot) {
+  const std::optional<render::SampleSums> sums = options_.sums(shot);
+  if (!sums) return false;
+  renderer_->put_sums(*sums);
+  shot.samples = static_cast<int>(sums->samples);
+  return true;
+}
+
+void RenderStage::take_sums(Shot& shot) {
+  shot.counters = renderer_->counters();
+  render::SampleSums sums = renderer_->take_sums();
+  sums.counters = shot.counters;
+  shot.sums = std::make_shared<const render::SampleSums>(std::move(sums));
+  shot.whole = true;
 }
 
 KeptShot RenderStage::keep(Shot& shot) {

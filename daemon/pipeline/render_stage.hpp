@@ -37,6 +37,13 @@ struct RenderStageOptions {
   std::function<bool()> cancelled;
   std::function<void(const Shot&, int samples_done)> progress;  // a few times per frame
   std::function<void(const std::string&)> note;                 // each message once
+  // Only these samples of a shot are rendered, and it gets their sums in place of a picture
+  // (render_range()). The set must have has_fixed_samples(), and shots are neither live nor kept.
+  std::optional<render::SampleRange> sample_range = {};
+  // Returns the sums of all samples of a shot, which were rendered elsewhere with its settings and
+  // become its picture; nothing where they cannot be had, and the shot is then not whole. Null: the
+  // samples are rendered here.
+  std::function<std::optional<render::SampleSums>(const Shot&)> sums = {};
 };
 
 // A rendered shot as it is kept to be shown together with its neighbours.
@@ -64,7 +71,8 @@ class RenderStage {
 
   // Fills picture, layers, counters and untouched. Every frame uses the same random numbers (P8),
   // unless frames are averaged, live or with their neighbours.
-  // This is begin(), the samples that the set's quality asks for, and finish().
+  // This is begin(), the samples that the set's quality asks for, and finish(). Where every pixel
+  // gets the same number and the stage is not live, they are summed in parts (render_range()).
   void operator()(Shot& shot);
   // The same in two parts, between which the next shot can be started: the device goes on with that
   // one while the computer has the first one's picture. Shots are finished in the order in which
@@ -110,6 +118,8 @@ class RenderStage {
  private:
   bool begin(Shot& shot, bool is_live);
   bool sample(Shot& shot);
+  bool put_sums(Shot& shot);
+  void take_sums(Shot& shot);
   bool cancelled() const { return options_.cancelled && options_.cancelled(); }
   double exposure_of(const Shot& shot) const;
   void light(const Shot& shot);

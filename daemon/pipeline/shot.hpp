@@ -15,6 +15,7 @@
 #include "daemon/pipeline/light.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/layers.hpp"
+#include "daemon/render/sample_sums.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/pose_filter.hpp"
 #include "daemon/tracking/tracker.hpp"
@@ -60,6 +61,8 @@ struct Shot {
   // True: a frame of a take that is rendered only because others are averaged with it.
   bool only_neighbour = false;
   bool frozen = false;  // true: a round of refining one frame, not a new frame
+  // In place of picture and layers, where only a range of the samples is rendered; else null.
+  std::shared_ptr<const render::SampleSums> sums;
 };
 
 // Returns where the picture shows the camera; null: nowhere.

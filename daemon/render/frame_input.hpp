@@ -5,6 +5,7 @@
 #include <glm/mat4x4.hpp>
 #include <optional>
 
+#include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
 
@@ -30,5 +31,9 @@ struct FrameInput {
   // mean of the linear signal over its area.
   bool is_scaled = false;
 };
+
+// Returns the bits of a sample of the frame's plate, 8 where it has none. Throws previz::Error if
+// the plate has another size than the lens's picture, or, where it is to be scaled, a smaller one.
+int refuse_other_size(const FrameInput& input, const PinholeIntrinsics& lens);
 
 }  // namespace previz::render

@@ -6,7 +6,7 @@
 #include "daemon/render/frame_input.hpp"
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/light_change.hpp"
-#include "daemon/render/wavefront.hpp"
+#include "daemon/render/sample_sums.hpp"
 
 namespace previz::render {
 
@@ -17,7 +17,7 @@ struct KeptFrame {
   std::uint32_t features = 0;   // FEATURE_* bits of the pipelines
   GpuScene::Standing standing;  // of the scene
   LightCells light;             // of the environment
-  Wavefront::KeptSums sums;
+  PixelSums sums;
 };
 
 }  // namespace previz::render

@@ -13,6 +13,7 @@
 #include "daemon/render/denoiser.hpp"
 #include "daemon/render/device_plate.hpp"
 #include "daemon/render/feature.hpp"
+#include "daemon/render/frame_camera.hpp"
 #include "daemon/render/gpu_scene.hpp"
 #include "daemon/render/history.hpp"
 #include "daemon/render/kept_frame.hpp"
@@ -26,18 +27,6 @@
 
 namespace previz::render {
 namespace {
-
-struct PlateSize {
-  int width = 0, height = 0, bits = 8;  // without a plate: no pixel
-};
-
-PlateSize size_of(const FrameInput& input) {
-  if (input.camera)
-    return {input.camera->width, input.camera->height, plate_bits(input.camera->format)};
-  if (input.plate && !input.plate->samples.empty())
-    return {input.plate->width, input.plate->height, input.plate->bits};
-  return {};
-}
 
 void check_size(const Device& device, const PinholeIntrinsics& picture) {
   refuse_too_large(picture.width, picture.height, memory_of(device));
@@ -80,6 +69,10 @@ struct Renderer::Impl {
   void begin_accumulating();
   void add_view();
   void put_back(const KeptFrame& kept);
+  void forget_samples() {
+    samples = first_sample = 0;
+    counted_elsewhere = {};
+  }
   ToPresent to_present(bool denoise);
   Counters host_counters() const;
 
@@ -107,9 +100,11 @@ struct Renderer::Impl {
   bool has_scene = false, has_environment = false;
   FrameInput frame;
   std::optional<lighting::Response> response;
-  std::vector<float> radiance;   // of codes, for this response
-  double radiance_exposure = 0;  // and this exposure
-  std::int64_t samples = 0;
+  std::vector<float> radiance;                    // of codes, for this response
+  double radiance_exposure = 0;                   // and this exposure
+  std::int64_t samples = 0;                       // in the sums
+  std::int64_t first_sample = 0;                  // the index of the first of them
+  Counters counted_elsewhere;                     // of samples in the sums that put_sums() brought
   std::uint64_t trees_now = 0, trees_before = 0;  // rebuilt up to this frame's begin and the last's
 };
 
@@ -129,26 +124,7 @@ void Renderer::Impl::upload_rays() {
 
 void Renderer::Impl::upload_frame() {
   gpu::GpuFrame gpu_frame{};
-  for (int r = 0; r < 3; ++r) {
-    const glm::dmat4& m = frame.world_from_camera;
-    gpu_frame.world_from_camera[r] = glm::vec4(m[0][r], m[1][r], m[2][r], 0.0);
-  }
-  gpu_frame.width = static_cast<std::uint32_t>(calibration.intrinsics.width);
-  gpu_frame.height = static_cast<std::uint32_t>(calibration.intrinsics.height);
-  if (calibration.lens) {
-    const ThinLens& lens = *calibration.lens;
-    gpu_frame.lens_radius = static_cast<float>(lens.focal_length_m / (2 * lens.f_number));
-    gpu_frame.focus_distance = static_cast<float>(lens.focus_distance_m);
-  }
-  // If the lens is only carried, the camera is a pinhole: every ray starts at its centre and aims
-  // at a distance of one.
-  if (!calibration.lens) gpu_frame.focus_distance = 1;
-  const PinholeIntrinsics& k = calibration.intrinsics;
-  gpu_frame.focal_px = {k.fx, k.fy};
-  gpu_frame.principal_px = {k.cx, k.cy};
-  gpu_frame.radial = {k.k1, k.k2, k.k3};
-  gpu_frame.radial_divisor = {k.k4, k.k5, k.k6};
-  gpu_frame.tangential = {k.p1, k.p2};
+  describe_camera(gpu_frame, calibration, frame.world_from_camera);
   gpu_frame.seed = frame.seed.value_or(estimation.seed);
   gpu_frame.max_depth = static_cast<std::uint32_t>(estimation.max_depth);
   gpu_frame.roulette_depth = static_cast<std::uint32_t>(estimation.roulette_depth);
@@ -273,7 +249,7 @@ void Renderer::begin_set(const set::Estimation& estimation,
   r.has_scene = r.has_environment = false;
   r.carried = 0;
   r.frame = {};
-  r.samples = 0;
+  r.forget_samples();
   r.past_samples = 0;
   r.history.reset();
   r.response.reset();
@@ -333,17 +309,11 @@ std::uint32_t Renderer::needed() const {
 void Renderer::Impl::take(FrameInput input) {
   const PinholeIntrinsics& lens = calibration.intrinsics;
   if (input.camera) check_size(*input.camera);
-  const PlateSize taken = size_of(input);
-  const bool fits = input.is_scaled ? taken.width >= lens.width && taken.height >= lens.height
-                                    : taken.width == lens.width && taken.height == lens.height;
-  if (taken.width > 0 && !fits)
-    throw Error("observer: a frame of " + std::to_string(taken.width) + "x" +
-                std::to_string(taken.height) + " does not fit the calibration's " +
-                std::to_string(lens.width) + "x" + std::to_string(lens.height));
+  const int bits = refuse_other_size(input, lens);
   if (!input.camera && !input.plate) input.plate = std::make_shared<const Plate>();
   frame = std::move(input);
-  if (!response || response->bits() != taken.bits) {
-    response.emplace(calibration.response, taken.bits);
+  if (!response || response->bits() != bits) {
+    response.emplace(calibration.response, bits);
     radiance.clear();
     presenter.reset();
   }
@@ -366,7 +336,7 @@ void Renderer::begin(FrameInput frame) {
     throw Error("renderer: a frame was begun before the scene and the environment were set");
   r.take(std::move(frame));
   r.begin_accumulating();
-  r.samples = 0;
+  r.forget_samples();
   r.has_separate_parts = false;
   r.trees_before = std::exchange(r.trees_now, r.scene.rebuilt_trees());
   r.place();
@@ -381,15 +351,40 @@ void Renderer::begin(FrameInput frame) {
 
 void Renderer::render(int samples, const std::function<bool()>& cancelled) {
   Impl& r = *impl_;
-  const bool whole = r.wavefront->render(
-      static_cast<std::uint32_t>(r.samples), static_cast<std::uint32_t>(std::max(samples, 0)),
-      static_cast<std::uint32_t>(r.estimation.max_depth), cancelled);
+  const bool whole =
+      r.wavefront->render(static_cast<std::uint32_t>(r.first_sample + r.samples),
+                          static_cast<std::uint32_t>(std::max(samples, 0)),
+                          static_cast<std::uint32_t>(r.estimation.max_depth), cancelled);
   if (whole) {
     r.samples += samples;
   } else {
     r.wavefront->clear();
-    r.samples = 0;
+    r.forget_samples();
   }
+}
+
+void Renderer::start_at(std::int64_t sample) {
+  assert(impl_->samples == 0);
+  impl_->first_sample = sample;
+}
+
+SampleSums Renderer::take_sums() {
+  Impl& r = *impl_;
+  const PinholeIntrinsics& lens = r.calibration.intrinsics;
+  SampleSums taken{lens.width, lens.height, r.samples, r.wavefront->keep()};
+  r.wavefront->clear_sums();
+  r.first_sample += std::exchange(r.samples, 0);
+  return taken;
+}
+
+void Renderer::put_sums(const SampleSums& sums) {
+  Impl& r = *impl_;
+  assert(r.samples == 0);
+  refuse_unfit(sums, r.calibration.intrinsics, (r.features & gpu::FEATURE_PHOTONS) != 0);
+  r.wavefront->put_back(sums.sums);
+  r.samples = sums.samples;
+  r.first_sample = 0;
+  add_samples_counted(r.counted_elsewhere, sums.counters);
 }
 
 void Renderer::wait() {
@@ -407,7 +402,7 @@ std::optional<Layers> Renderer::pilot(int samples, const std::function<bool()>& 
   r.frame.seed = seed;
   r.upload_frame();
   r.wavefront->clear();
-  r.samples = 0;
+  r.forget_samples();
   return result;
 }
 
@@ -494,6 +489,7 @@ void Renderer::Impl::put_back(const KeptFrame& kept) {
   frame.seed.reset();
   counts_samples = false;
   past_samples = 0;
+  forget_samples();
   samples = kept.samples;
   features = kept.features;
   scene.stand(kept.standing);
@@ -553,7 +549,9 @@ Counters Renderer::Impl::host_counters() const {
 }
 
 Counters Renderer::counters() const {
-  return with(impl_->host_counters(), impl_->wavefront->control());
+  Counters counters = with(impl_->host_counters(), impl_->wavefront->control());
+  add_samples_counted(counters, impl_->counted_elsewhere);
+  return counters;
 }
 
 std::optional<CardIdentity> Renderer::card() const {

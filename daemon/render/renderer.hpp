@@ -12,6 +12,7 @@
 #include "daemon/render/gpu.hpp"
 #include "daemon/render/gpu_environment.hpp"
 #include "daemon/render/layers.hpp"
+#include "daemon/render/sample_sums.hpp"
 #include "daemon/render/showing.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
@@ -82,6 +83,20 @@ class Renderer {
   // Waits until the samples so far are there, which render() need not do. Whatever asks for a
   // result waits by itself.
   void wait();
+  // The sample that render() adds next is that of this index (from 0), so that a range of a frame's
+  // samples can be rendered by itself. The current frame must have no samples yet, and the next
+  // begin() starts at 0 again.
+  void start_at(std::int64_t sample);
+  // Returns the sums of the current frame's samples and forgets these; the sample that render()
+  // adds next is the one after them. What was counted stays in counters(), so that the sums say
+  // nothing of it. It takes 160 bytes of the computer's memory per pixel, 16 more with photons. Not
+  // for a frame that accumulates.
+  SampleSums take_sums();
+  // Gives the current frame these samples, as if they had been rendered here: layers(), show() and
+  // keep() are of them, and counters() include what the sums say. The frame must have no samples;
+  // no more can be added. Throws previz::Error where the sums have another size than the
+  // calibration, or have photons where the scene needs none, or the other way round.
+  void put_sums(const SampleSums& sums);
   // Returns layers of separate samples, with other random numbers, which are then forgotten:
   // decisions based on them bias no picture. The current frame must have no samples yet. Returns
   // nothing if `cancelled` ended it.

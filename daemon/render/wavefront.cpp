@@ -254,12 +254,19 @@ void Wavefront::clear() {
   upload_bytes(device_, control_, std::as_bytes(std::span(&control, 1)));
   device_.record([&](const vk::raii::CommandBuffer& commands) {
     commands.fillBuffer(limits_.buffer, 0, VK_WHOLE_SIZE, gpu::UNLIMITED);
-    for (std::size_t i = 0; i < tiles_.size(); ++i)
-      record_clear(device_, commands, pixels_[i], bytes_of(tiles_[i]));
-    for (const Buffer& caustics : caustics_)
-      record_clear(device_, commands, caustics, caustics.size);
+    record_clear_sums(commands);
   });
   count();
+}
+
+void Wavefront::clear_sums() {
+  device_.record([&](const vk::raii::CommandBuffer& commands) { record_clear_sums(commands); });
+}
+
+void Wavefront::record_clear_sums(const vk::raii::CommandBuffer& commands) {
+  for (std::size_t i = 0; i < tiles_.size(); ++i)
+    record_clear(device_, commands, pixels_[i], bytes_of(tiles_[i]));
+  for (const Buffer& caustics : caustics_) record_clear(device_, commands, caustics, caustics.size);
 }
 
 // The queue that was filled becomes the active one, and each of its paths finds its next hit.
@@ -395,10 +402,10 @@ std::vector<Wavefront::Sums> Wavefront::sums() const {
   return result;
 }
 
-Wavefront::KeptSums Wavefront::keep() const {
+PixelSums Wavefront::keep() const {
   const auto width = static_cast<std::size_t>(width_);
   const std::vector<Sums> tiles = sums();
-  KeptSums kept;
+  PixelSums kept;
   kept.pixels.resize(width * static_cast<std::size_t>(height_));
   if (tiles.front().caustics) kept.caustics.resize(kept.pixels.size());
   for (const Sums& tile : tiles) {
@@ -413,7 +420,7 @@ Wavefront::KeptSums Wavefront::keep() const {
   return kept;
 }
 
-void Wavefront::put_back(const KeptSums& kept) {
+void Wavefront::put_back(const PixelSums& kept) {
   const auto width = static_cast<std::size_t>(width_);
   const bool has_photons = (features_.value() & gpu::FEATURE_PHOTONS) != 0;
   assert(kept.pixels.size() == width * static_cast<std::size_t>(height_));

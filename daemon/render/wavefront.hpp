@@ -12,6 +12,7 @@
 #include "daemon/render/camera_map.hpp"
 #include "daemon/render/kernel.hpp"
 #include "daemon/render/photon_map.hpp"
+#include "daemon/render/sample_sums.hpp"
 #include "shaders/lib/render_shared.h"
 
 namespace previz::render {
@@ -46,6 +47,8 @@ class Wavefront {
   void limit_samples(const std::vector<std::uint32_t>& limits);
   // Forgets all samples; every pixel is sampled again, without a limit.
   void clear();
+  // Sets the sums to zero. Limits, photons and what was counted stay, so that samples can go on.
+  void clear_sums();
   // Adds samples first_sample .. first_sample + samples - 1 to every pixel, up to its limit.
   // Returns false where `cancelled` stopped it between two batches: the sums are then uneven and
   // must be cleared.
@@ -61,15 +64,11 @@ class Wavefront {
     const Buffer* caustics = nullptr;
   };
   std::vector<Sums> sums() const;
-  // The same in the computer's memory, row-major, without tiles.
-  struct KeptSums {
-    std::vector<gpu::GpuPixel> pixels;
-    std::vector<glm::vec4> caustics;  // empty: there are no photons
-  };
-  KeptSums keep() const;
+  // Returns the same in the computer's memory.
+  PixelSums keep() const;
   // Puts kept sums in the place of the picture's, of which they must have the size; with the
   // features that they were kept with. The next samples are to be preceded by a clear().
-  void put_back(const KeptSums& kept);
+  void put_back(const PixelSums& kept);
   gpu::GpuControl control();  // counters since the last clear
   // The same as they are now, by a copy that comes down.
   void count_into(gpu::GpuControl& counted, Downloads& down) const;
@@ -85,6 +84,7 @@ class Wavefront {
   void create_path_buffers(std::uint32_t slots);
   void create_caustics(bool has_photons);
   void create_kernels(std::uint32_t features);
+  void record_clear_sums(const vk::raii::CommandBuffer& commands);
   Buffers buffers_of(std::size_t tile) const;  // with the scene's and the maps'
   vk::DeviceSize bytes_of(const Tile& tile) const;
   std::uint32_t passes() const;  // rounds for panes that paths meet and pass
