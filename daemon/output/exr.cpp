@@ -6,27 +6,21 @@
 #include <ImfDoubleAttribute.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
-#include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfIntAttribute.h>
 #include <ImfMatrixAttribute.h>
-#include <ImfOutputFile.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <ImfTestFile.h>
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <glm/matrix.hpp>
 #include <limits>
 #include <string>
 #include <utility>
 
-#include "daemon/output/picture_size.hpp"
+#include "daemon/output/exr_file.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/nominal_rate.hpp"
 
@@ -56,20 +50,13 @@ constexpr std::array scalar_layers{
     ScalarLayer{"depth.Z", &render::Layers::depth},
 };
 
-// OpenEXR's slices take a mutable pointer for reading and writing alike.
-Imf::Slice slice(const float* first, std::size_t floats_a_pixel, int width) {
-  const std::size_t stride = floats_a_pixel * sizeof(float);
-  return Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(const_cast<float*>(first)), stride,
-                    stride * static_cast<std::size_t>(width));
-}
-
 Imf::FrameBuffer frame_buffer(const render::Layers& layers) {
   Imf::FrameBuffer buffer;
   for (const ColorLayer& layer : color_layers)
     for (int i = 0; i < 3; ++i)
-      buffer.insert(layer.channels[i], slice(&(layers.*layer.values)[0][i], 3, layers.width));
+      buffer.insert(layer.channels[i], exr_slice(&(layers.*layer.values)[0][i], 3, layers.width));
   for (const ScalarLayer& layer : scalar_layers)
-    buffer.insert(layer.channel, slice((layers.*layer.values).data(), 1, layers.width));
+    buffer.insert(layer.channel, exr_slice((layers.*layer.values).data(), 1, layers.width));
   return buffer;
 }
 
@@ -143,53 +130,6 @@ Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
   return header;
 }
 
-// Writes into a draft. OpenEXR writes the end of a picture in a destructor, which cannot report an
-// error: the first one is remembered.
-class WrittenFile final : public Imf::OStream {
- public:
-  explicit WrittenFile(const session::Draft& draft)
-      : OStream(draft.target().c_str()), file_(draft.file()) {}
-
-  void write(const char bytes[], int count) override {
-    waiting_.append(bytes, static_cast<std::size_t>(count));
-    position_ += static_cast<std::uint64_t>(count);
-    if (waiting_.size() >= piece) flush();
-  }
-  std::uint64_t tellp() override { return position_; }
-  void seekp(std::uint64_t position) override {
-    flush();
-    position_ = position;
-    if (::lseek(file_.get(), static_cast<off_t>(position), SEEK_SET) < 0)
-      remember(std::string(fileName()) + ": cannot be written: " + std::strerror(errno));
-  }
-
-  // Throws previz::Error if any part of the file could not be written.
-  void close() {
-    flush();
-    if (!failure_.empty()) throw Error(failure_);
-  }
-
- private:
-  static constexpr std::size_t piece = 1 << 20;
-
-  void flush() {
-    try {
-      file_.append(std::exchange(waiting_, {}));
-    } catch (const Error& error) {
-      remember(error.what());
-    }
-    if (!failure_.empty()) throw Error(failure_);
-  }
-  void remember(const std::string& failure) {
-    if (failure_.empty()) failure_ = failure;
-  }
-
-  const session::OpenFile& file_;
-  std::string waiting_;  // for the file, from position_ - waiting_.size() on
-  std::uint64_t position_ = 0;
-  std::string failure_;
-};
-
 void require_whole(const std::filesystem::path& path, const render::Layers& layers) {
   const std::size_t pixels = std::size_t(layers.width) * std::size_t(layers.height);
   for (const ColorLayer& layer : color_layers)
@@ -198,19 +138,6 @@ void require_whole(const std::filesystem::path& path, const render::Layers& laye
   for (const ScalarLayer& layer : scalar_layers)
     if ((layers.*layer.values).size() != pixels)
       throw Error(path.string() + ": layer " + layer.channel + " does not fill the picture");
-}
-
-// Returns the number of pixels of a data window, which must be one that write_exr writes.
-std::size_t pixels_of(const std::filesystem::path& path, const Imath::Box2i& window) {
-  const bool begins_at_0 = window.min.x == 0 && window.min.y == 0;
-  const std::int64_t width = std::int64_t{window.max.x} + 1,
-                     height = std::int64_t{window.max.y} + 1;
-  if (!begins_at_0 || width < 1 || height < 1 ||
-      width > static_cast<std::int64_t>(most_pixels) / height)
-    throw Error(path.string() + ": its data window from " + std::to_string(window.min.x) + ", " +
-                std::to_string(window.min.y) + " to " + std::to_string(window.max.x) + ", " +
-                std::to_string(window.max.y) + " does not begin at 0, 0, or is empty or too large");
-  return static_cast<std::size_t>(width * height);
 }
 
 }  // namespace
@@ -238,21 +165,7 @@ session::Draft exr_draft(const std::filesystem::path& path, const render::Layers
   require_whole(path, layers);
   render::Layers written = layers;
   for (std::size_t i = 0; i < written.diff.size(); ++i) written.diff[i] *= 1.0f - written.mask[i];
-  session::Draft draft(path);
-  try {
-    WrittenFile stream(draft);
-    {
-      Imf::OutputFile file(stream, header(written, metadata));
-      file.setFrameBuffer(frame_buffer(written));
-      file.writePixels(written.height);
-    }
-    stream.close();
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw Error(path.string() + ": cannot be written: " + error.what());
-  }
-  return draft;
+  return exr_draft(path, header(written, metadata), frame_buffer(written));
 }
 
 void write_exr(const std::filesystem::path& path, const render::Layers& layers,
@@ -266,7 +179,7 @@ render::Layers read_exr(const std::filesystem::path& path) {
     if (!Imf::isOpenExrFile(path.c_str(), is_tiled, is_deep, has_parts) || is_deep || has_parts)
       throw Error(path.string() + ": is not a flat, single-part EXR file");
     Imf::InputFile file(path.c_str());
-    const std::size_t pixels = pixels_of(path, file.header().dataWindow());
+    const std::size_t pixels = exr_pixels(path, file.header().dataWindow());
     render::Layers layers;
     layers.width = file.header().dataWindow().max.x + 1;
     layers.height = file.header().dataWindow().max.y + 1;

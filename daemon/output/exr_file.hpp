@@ -1,0 +1,29 @@
+// Writes OpenEXR files as the other files of this program are written: whole or not at all.
+#pragma once
+
+#include <ImathBox.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+
+#include <cstddef>
+#include <filesystem>
+
+#include "drivers/session/draft.hpp"
+
+namespace previz::output {
+
+// Returns the place of a channel of 32-bit floats in rows of `width` pixels. `first` is that of the
+// first pixel, and `floats_a_pixel` floats lie between those of two pixels. The floats are also
+// written to if a file is read into the slice.
+Imf::Slice exr_slice(const float* first, std::size_t floats_a_pixel, int width);
+
+// Writes the channels into a draft, which is not yet put in place. Throws previz::Error naming the
+// file on failure.
+session::Draft exr_draft(const std::filesystem::path& path, const Imf::Header& header,
+                         const Imf::FrameBuffer& channels);
+
+// Returns the number of pixels of a data window. Throws previz::Error naming the file unless the
+// window begins at 0, 0 and has from 1 to most_pixels pixels.
+std::size_t exr_pixels(const std::filesystem::path& path, const Imath::Box2i& window);
+
+}  // namespace previz::output
