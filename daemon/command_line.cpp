@@ -1,4 +1,5 @@
 #include "daemon/command_line.hpp"
+#include "daemon/post/sample_ranges.hpp"
 #include "daemon/trade/axes.hpp"
 #include "drivers/error.hpp"
 
@@ -39,19 +40,8 @@ void add_with(CLI::App& command, std::optional<std::filesystem::path>& with) {
       "writes it");
 }
 
-void add_render(CLI::App& app, post::RenderOptions& options,
-                std::optional<post::WhichTakes>& takes) {
-  CLI::App& command = *app.add_subcommand("render", "Composite every frame of a recorded session");
-  command
-      .add_option("session", options.session,
-                  "Session folder; with --good or --all, a folder of takes")
-      ->required();
-  CLI::Option* good = command.add_flag_callback(
-      "--good", [&] { takes = post::WhichTakes::good; }, "Render every take that is marked good");
-  command
-      .add_flag_callback(
-          "--all", [&] { takes = post::WhichTakes::all; }, "Render every take of the folder")
-      ->excludes(good);
+// Adds the options that decide what pictures are made of a take; `out` describes --out.
+void add_render_options(CLI::App& command, post::RenderOptions& options, const std::string& out) {
   command.add_option("--set", options.set_file, "Set file, instead of the session's own");
   add_with(command, options.with);
   add_any_paths(command, options.any_paths);
@@ -98,10 +88,7 @@ void add_render(CLI::App& app, post::RenderOptions& options,
           },
           "Estimator (default: the set file's)")
       ->check(CLI::IsMember({"paired", "difference"}));
-  command.add_option(
-      "--out", options.directory,
-      "Folder for the pictures; with --good or --all, one subfolder per take (default: "
-      "the set's output.directory, one subfolder per take)");
+  command.add_option("--out", options.directory, out);
   command.add_flag_callback(
       "--no-exr", [&] { options.exr = false; }, "No EXR files");
   command.add_flag_callback(
@@ -110,6 +97,43 @@ void add_render(CLI::App& app, post::RenderOptions& options,
       "--no-video", [&] { options.video = false; }, "No review video");
   command.add_flag("--force", options.force, "Render finished frames again");
   add_device_options(command, options.device);
+}
+
+void add_render(CLI::App& app, post::RenderOptions& options,
+                std::optional<post::WhichTakes>& takes) {
+  CLI::App& command = *app.add_subcommand("render", "Composite every frame of a recorded session");
+  command
+      .add_option("session", options.session,
+                  "Session folder; with --good or --all, a folder of takes")
+      ->required();
+  CLI::Option* good = command.add_flag_callback(
+      "--good", [&] { takes = post::WhichTakes::good; }, "Render every take that is marked good");
+  command
+      .add_flag_callback(
+          "--all", [&] { takes = post::WhichTakes::all; }, "Render every take of the folder")
+      ->excludes(good);
+  add_render_options(
+      command, options,
+      "Folder for the pictures; with --good or --all, one subfolder per take (default: "
+      "the set's output.directory, one subfolder per take)");
+  command.add_option_function<std::string>(
+      "--sample-range",
+      [&](const std::string& text) { options.sample_range = post::parse_sample_range(text); },
+      "Render only one of several equal ranges of every frame's samples, 2/4 for the second of "
+      "four, and write their sums; previzd merge makes the pictures");
+}
+
+void add_merge(CLI::App& app, post::RenderOptions& options) {
+  CLI::App& command = *app.add_subcommand(
+      "merge", "Make the pictures of what render --sample-range has made on several computers");
+  command.add_option("session", options.session, "Session folder")->required();
+  command
+      .add_option("folders", options.sums_from,
+                  "Folders of render --sample-range, at least one for each range")
+      ->required();
+  add_render_options(command, options,
+                     "Folder for the pictures (default: the set's output.directory, one subfolder "
+                     "per take)");
 }
 
 void add_run(CLI::App& app, rig::LiveOptions& options) {
@@ -266,6 +290,7 @@ void add_commands(CLI::App& app, CommandLine& said) {
       ->capture_default_str();
   add_render(app, said.render, said.render_takes);
   add_run(app, said.run);
+  add_merge(app, said.merge);
   add_check(app, said.check);
   add_devices(app, said.learn, said.rules);
   add_import(app, said.import_session);

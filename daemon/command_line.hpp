@@ -37,6 +37,7 @@ struct CommandLine {
   model::ModelOptions model;
   print::Commands print;
   TakesCommands takes;
+  post::RenderOptions merge;
 };
 
 // Adds all subcommands and options to `app`, which writes what it parses into `said`; `said` must

@@ -73,16 +73,25 @@ int do_render_takes(const post::RenderOptions& options, post::WhichTakes which,
   return report.failures.empty() ? 0 : 1;
 }
 
+// Returns the exit status of a render of one take that `stop` may have ended.
+int do_render_take(const post::RenderOptions& options, const StopOnSignal& stop) {
+  const post::RenderReport report = post::render_session(options, std::cout);
+  std::cout << report.directory.string() << ": " << report.frames.size() << " frames"
+            << (report.interrupted ? "; stopped; run the same command to continue" : "")
+            << std::endl;
+  if (report.interrupted) return 128 + stop.received();
+  if (report.failures.empty()) return 0;
+  throw Error(std::to_string(report.failures.size()) +
+              (report.failures.size() == 1 ? " frame was" : " frames were") + " not made, " +
+              report.failures.front());
+}
+
 int do_render(post::RenderOptions& options, std::optional<post::WhichTakes> which,
               const StopOnSignal& stop) {
   options.stop = stop.token();
   options.terminal = isatty(STDOUT_FILENO) != 0;
   if (which) return do_render_takes(options, *which, stop);
-  const post::RenderReport report = post::render_session(options, std::cout);
-  std::cout << report.directory.string() << ": " << report.frames.size() << " frames"
-            << (report.interrupted ? "; stopped; run the same command to continue" : "")
-            << std::endl;
-  return report.interrupted ? 128 + stop.received() : 0;
+  return do_render_take(options, stop);
 }
 
 int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
@@ -140,6 +149,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("check")) return post::check_set(said.check, std::cout);
     if (app.got_subcommand("calibrate"))
       return calibrate::do_calibrate(app, said.calibrate, std::cout);
+    if (app.got_subcommand("merge")) return do_render(said.merge, std::nullopt, stop);
     if (app.got_subcommand("model")) return model::make_model(said.model, std::cout), 0;
     if (app.got_subcommand("devices")) return do_devices(said.learn, said.rules, stop);
     if (app.got_subcommand("export")) return do_export(said.export_take, stop);

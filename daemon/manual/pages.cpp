@@ -61,6 +61,8 @@ previzd check takes/12A_take003: Does the same for a take and its own set, and m
 previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the rest.
 previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Run again, it continues where it stopped.
 previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
+previzd render takes/12A_take003 --frames 40 --spp 4096 --neighbours 0 --sample-range 1/2 --out first: Renders the first half of a heavy frame's samples, while another computer renders 2/2.
+previzd merge takes/12A_take003 first second --frames 40 --spp 4096 --neighbours 0 --out renders/12A_take003: Makes the picture of both halves. If both computers have the same graphics card and driver, it is the picture of one, to the last bit.
 previzd bench --page bench.html: Measures what this machine can do, in two minutes at most, and writes a page about it. The first thing to run on a new machine.
 previzd bench --no-hardware-rays: Measures it without the hardware that a graphics card may have for rays, to see what that brings.
 previzd bench desk.toml --json bench.json: Also measures the frames of a set, whose newest take is used, and writes all figures as JSON.
@@ -173,6 +175,7 @@ track.jsonl: In a take: the camera's pose in each frame that was tracked live, a
 events.jsonl: In a take: button presses and other events, in order.
 assets: In a take: the files that the set uses, each named by its SHA-256.
 frames.jsonl: Beside rendered pictures, one line per frame: whether it was rendered or why not, samples, seconds, the camera's pose with its error in pixels and the tags used for it, the light frames, and size and SHA-256 of its files. A render that continues checks them, and renders a frame again whose file is missing or was changed, or that has no line; it says which and why.
+0007.sums.exr: What `previzd render --sample-range 2/4` writes in place of the picture of frame 7: the sums of the second quarter of its samples. `previzd merge` needs the folders of all ranges and the options with which they were rendered. Frames of 128 samples or more can be divided, unless a target error or time decides how many they get, they are adaptive, or they are averaged with their neighbours.
 render.json: Beside rendered pictures: the settings that they were rendered with.
 render.lock: Beside rendered pictures: the processes that are at work there, one line each, with the frames they have. Several `previzd render` of one take may share a folder, on several computers over NFS as well: each renders frames that no other has, and the one that finishes last makes the review video. One that ends while others still render names them and exits with 0. Use --force with the first of them only.
 poses.jsonl: Written by `previzd track --out`, one line per frame: frame, timestamp_ns, tracked; world_from_camera (4 rows of 4, metres, OpenCV axes, world Z up; as in the track of FRAMES.json), covariance, tags and reprojection_rms_px, or the reason why there is no pose; and carriers that were found.

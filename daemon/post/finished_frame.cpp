@@ -32,13 +32,17 @@ glm::dvec3 vector_of(const nlohmann::json& json) {
 
 }  // namespace
 
+std::int64_t samples_of(const pipeline::Shot& shot) {
+  return shot.sums ? shot.sums->samples : shot.layers->samples;
+}
+
 FinishedFrame finished_frame(const pipeline::Shot& shot) {
   FinishedFrame frame;
   frame.frame = shot.index;
   frame.timestamp_ns = shot.frame->timestamp_ns;
   frame.status = shot.untouched.empty() ? FrameStatus::rendered : FrameStatus::untouched;
   frame.reason = shot.untouched;
-  frame.samples = shot.layers->samples;
+  frame.samples = samples_of(shot);
   frame.render_s = shot.render_s;
   frame.error = shot.error;
   frame.pose = shot.track.pose;

@@ -58,6 +58,9 @@ struct FinishedFrame {
   MadeOn made_on;
 };
 
+// Returns the samples of each pixel of a finished shot, or of its sums; 0: it is untouched.
+std::int64_t samples_of(const pipeline::Shot& shot);
+
 // Returns the record of a shot whose pictures are written.
 FinishedFrame finished_frame(const pipeline::Shot& shot);
 

@@ -21,6 +21,8 @@
 #include "daemon/post/frames_to_render.hpp"
 #include "daemon/post/render_directory.hpp"
 #include "daemon/post/render_plan.hpp"
+#include "daemon/post/sample_ranges.hpp"
+#include "daemon/post/sums_folders.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/scene/check.hpp"
 #include "daemon/scene/load.hpp"
@@ -56,7 +58,7 @@ std::string percent_words(double share) {
 std::string done_text(const Shot& shot) {
   const std::string frame = "frame " + std::to_string(shot.index) + ": ";
   if (!shot.untouched.empty()) return frame + "plate untouched, " + shot.untouched;
-  std::string text = frame + std::to_string(shot.layers->samples) + " samples in " +
+  std::string text = frame + std::to_string(samples_of(shot)) + " samples in " +
                      output::duration_words(shot.render_s);
   if (shot.error > 0) text += ", error " + percent_words(shot.error);
   return text;
@@ -126,10 +128,24 @@ struct Job {
   const std::shared_ptr<render::Device>& device;
   RenderDirectory& directory;
   pipeline::Metrics& metrics;
+  const SumsFolders* sums;  // null: the samples are rendered here
+  RenderReport& report;
 };
 
 MadeOn made_on(const render::Device& device) {
   return {render::device_name(device), render::is_gpu(device)};
+}
+
+// Returns the merged sums of a shot, or reports why there are none.
+std::optional<render::SampleSums> merged_sums(const Job& job, const Shot& shot,
+                                              output::Progress& progress) {
+  try {
+    return job.sums->merged(shot.index);
+  } catch (const Error& error) {
+    progress.note(error.what());
+    job.report.failures.emplace_back(error.what());
+    return std::nullopt;
+  }
 }
 
 // Both must outlive the options.
@@ -140,9 +156,13 @@ pipeline::RenderStageOptions stage_options(const Job& job, output::Progress& pro
   options.seeds_shots = neighbours_of(quality) > 0;
   options.scale = job.options.scale;
   options.cancelled = [&] { return job.options.stop.stop_requested(); };
-  options.progress = [&](const Shot& shot, int samples) {
-    progress.sample(shot.index, samples, quality.samples, now_s());
+  const int samples =
+      samples_of(job.options.sample_range.value_or(render::SampleRange{}), quality.samples).count;
+  options.progress = [&, samples](const Shot& shot, int done) {
+    progress.sample(shot.index, done, samples, now_s());
   };
+  options.sample_range = job.options.sample_range;
+  if (job.sums) options.sums = [&](const Shot& shot) { return merged_sums(job, shot, progress); };
   options.note = [&](const std::string& what) { progress.note(what); };
   return options;
 }
@@ -225,7 +245,8 @@ void check_neighbours(const RenderOptions& options, const pipeline::Take& take,
 // Renders the frames, and then those that another process had and did not finish: it was killed.
 void render_all(const RenderOptions& options, const pipeline::Take& take,
                 std::set<std::uint64_t> to_do, RenderDirectory& directory,
-                pipeline::Metrics& metrics, std::ostream& out) {
+                pipeline::Metrics& metrics, const SumsFolders* sums, RenderReport& report,
+                std::ostream& out) {
   const scene::Scene scene = scene::load_scene(take.set);
   for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
   if (hides_tags(take)) {
@@ -240,10 +261,13 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
   check_neighbours(options, take, *device);
   out << take.session.info.name << ": " << to_do.size() << " frames of "
       << size_words(pipeline::scaled(take.observer, options.scale).intrinsics) << ", "
-      << quality_words(take.set.quality) << ", on " << render::device_name(*device) << std::endl;
+      << quality_words(take.set.quality)
+      << (options.sample_range ? ", range " + to_string(*options.sample_range) + " of them" : "")
+      << (sums ? ", merged from their ranges" : "") << ", on " << render::device_name(*device)
+      << std::endl;
   if (options.on_begin) options.on_begin();
   output::Progress progress(out, options.terminal, to_do.size(), now_s());
-  const Job job{options, take, scene, device, directory, metrics};
+  const Job job{options, take, scene, device, directory, metrics, sums, report};
   while (!to_do.empty() && !options.stop.stop_requested()) {
     const std::set<std::uint64_t> left = render_frames(job, to_do, progress);
     to_do.clear();
@@ -298,8 +322,11 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
   const pipeline::Take& take = plan.take;
   const set::Set& set = take.set;
   const FrameRange range = plan.range;
+  std::optional<SumsFolders> sums;
+  if (!options.sums_from.empty())
+    sums.emplace(options.sums_from, plan.settings, set.quality.samples);
   RenderDirectory directory(set.output, plan.settings, options.force, plan.clock, range,
-                            options.stop);
+                            options.stop, options.sample_range);
 
   RenderReport report;
   report.directory = directory.path();
@@ -316,13 +343,18 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
 
   pipeline::Metrics metrics;
   const double start = now_s();
-  if (!to_do.empty()) render_all(options, take, to_do, directory, metrics, out);
+  if (!to_do.empty())
+    render_all(options, take, to_do, directory, metrics, sums ? &*sums : nullptr, report, out);
 
   const auto at_others = directory.at_others(to_do);
   for (std::uint64_t frame = range.first; frame <= range.last; ++frame)
     if (const FinishedFrame* record = directory.finished(frame)) report.frames.push_back(*record);
   report.interrupted = options.stop.stop_requested();
-  if (!report.interrupted) finish_video(at_others, set.output.video, directory, report, out);
+  const bool wants_video = set.output.video && report.failures.empty();
+  if (set.output.video && !wants_video)
+    out << directory.path().string() << ": no review video, because frames are missing"
+        << std::endl;
+  if (!report.interrupted) finish_video(at_others, wants_video, directory, report, out);
   report.seconds = now_s() - start;
   report.metrics = metrics.snapshot(report.seconds);
   return report;

@@ -17,6 +17,7 @@
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/post/finished_frame.hpp"
 #include "daemon/render/renderer.hpp"
+#include "daemon/render/sample_sums.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 
@@ -64,6 +65,13 @@ struct RenderOptions {
   std::function<void()> on_begin;
   // Returns whether a frame is finished elsewhere, so that it is not rendered and not reported.
   std::function<bool(std::uint64_t frame)> is_elsewhere;
+  // Only these samples of every frame are rendered, and their sums are written in place of pictures
+  // and video: NNNN.sums.exr (output::write_sums_exr). check_sample_range() says what is refused.
+  std::optional<render::SampleRange> sample_range;
+  // Folders with the sums of all ranges of the frames' samples, of which the pictures are made in
+  // place of rendering them (SumsFolders). They are those of one run to the last bit, if one device
+  // rendered them all.
+  std::vector<std::filesystem::path> sums_from;
 };
 
 struct RenderReport {
@@ -75,6 +83,9 @@ struct RenderReport {
   double seconds = 0;           // wall clock, without opening the session, scene and device
   std::filesystem::path video;  // empty: none was made
   pipeline::MetricsSnapshot metrics;
+  // A sentence for each frame whose sums could not be had (RenderOptions::sums_from); the others
+  // are made, but no video.
+  std::vector<std::string> failures;
 };
 
 // Writes NNNN.exr and NNNN.png for every frame, then review.mp4 over all pictures of the range, and

@@ -5,95 +5,24 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <ostream>
 #include <set>
-#include <sstream>
 #include <utility>
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
+#include "daemon/output/sums_exr.hpp"
 #include "daemon/output/video.hpp"
+#include "daemon/post/render_files.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::post {
 namespace {
-
-constexpr const char* settings_name = "render.json";
-constexpr const char* lines_name = "frames.jsonl";
-
-// Returns the first few settings that differ: "quality.samples is 16 there and 64 now".
-std::string differences(const nlohmann::json& there, const nlohmann::json& now) {
-  std::string text;
-  const auto add = [&](const std::string& key, const std::string& before,
-                       const std::string& after) {
-    if (!text.empty()) text += "; ";
-    text += key;
-    if (std::max(before.size(), after.size()) < 60)
-      text += " is " + before + " there and " + after + " now";
-    else
-      text += " differs";
-  };
-  for (const auto& [key, value] : now.items())
-    if (!there.contains(key) || there[key] != value)
-      add(key, there.contains(key) ? there[key].dump() : "unknown", value.dump());
-  for (const auto& [key, value] : there.items())
-    if (!now.contains(key)) add(key, value.dump(), "unused");
-  return text;
-}
-
-FileMark mark_of(const std::filesystem::path& file) {
-  return {std::filesystem::file_size(file), session::sha256_of(file)};
-}
-
-// Decodes the whole picture; throws previz::Error if it is damaged.
-void decode(const std::filesystem::path& file) {
-  if (file.extension() == ".exr")
-    output::read_exr(file);
-  else
-    output::read_png(file);
-}
-
-// Returns why a file of a finished frame cannot be kept, or an empty text. A line without any marks
-// gets one for the file.
-std::string why_broken(const std::filesystem::path& file, bool has_marks, FinishedFrame& record) {
-  const std::string its = "its " + file.extension().string();
-  std::error_code unknown;
-  if (!std::filesystem::exists(std::filesystem::symlink_status(file, unknown)))
-    return its + " is missing";
-  if (const std::string why = session::why_not_plain(file); !why.empty()) return its + " " + why;
-  const std::string name = file.filename().string();
-  try {
-    if (!has_marks) {
-      decode(file);
-      record.files[name] = mark_of(file);
-      return {};
-    }
-    const auto mark = record.files.find(name);
-    if (mark == record.files.end()) return its + " is not in its line of frames.jsonl";
-    if (std::filesystem::file_size(file, unknown) != mark->second.bytes)
-      return its + " has another size than when it was written";
-    if (session::sha256_of(file) != mark->second.sha256)
-      return its + " has other content (SHA-256) than when it was written";
-  } catch (const Error&) {
-    return its + (has_marks ? " cannot be read" : " cannot be decoded");
-  }
-  return {};
-}
-
-// Returns the frame whose picture a file of this name is, if it is one: "0007.exr".
-std::optional<std::uint64_t> frame_of(const std::filesystem::path& name) {
-  const std::string digits = name.stem().string();
-  std::uint64_t frame = 0;
-  const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), frame);
-  if (code != std::errc() || end != digits.data() + digits.size()) return std::nullopt;
-  return frame;
-}
 
 // Returns what changes when anybody appends to the file or replaces it; empty: there is no file.
 std::string state_of(const std::filesystem::path& file) {
@@ -120,77 +49,14 @@ void append_line(const std::filesystem::path& file, const std::string& line) {
   lines.sync();
 }
 
-using Frames = std::map<std::uint64_t, FinishedFrame>;
-
-// Reads the lines; a power cut may have left one half written, and its frame is rendered again.
-Frames frames_in(const std::filesystem::path& file) {
-  Frames frames;
-  std::istringstream text(session::read_plain_file(file));
-  for (std::string line; std::getline(text, line);) {
-    try {
-      const FinishedFrame record = from_json(line);
-      frames[record.frame] = record;
-    } catch (const nlohmann::json::exception&) {
-      continue;
-    }
-  }
-  return frames;
-}
-
-// The video is made from PNGs.
-bool wants_png(const set::Output& output) {
-  return output.png || output.video;
-}
-
-// Returns the endings of the files that the set asks for.
-std::vector<const char*> extensions_of(const set::Output& output) {
-  std::vector<const char*> all;
-  if (output.exr) all.push_back(".exr");
-  if (wants_png(output)) all.push_back(".png");
-  return all;
-}
-
-std::filesystem::path file_in(const std::filesystem::path& folder, std::uint64_t frame,
-                              const char* extension) {
-  std::string number = std::to_string(frame);
-  number.insert(0, number.size() < 4 ? 4 - number.size() : 0, '0');
-  return folder / (number + extension);
-}
-
-bool has_files(const set::Output& output, std::uint64_t frame) {
-  return std::ranges::all_of(extensions_of(output), [&](const char* extension) {
-    std::error_code unknown;
-    return std::filesystem::is_regular_file(
-        std::filesystem::symlink_status(file_in(output.directory, frame, extension), unknown));
-  });
-}
-
-// Gives the file another name, which may be on another disk; throws previz::Error.
-void move_file(const std::filesystem::path& from, const std::filesystem::path& to) {
-  std::error_code code;
-  std::filesystem::rename(from, to, code);
-  if (!code) return;
-  if (code != std::errc::cross_device_link)
-    throw Error(to.string() + ": cannot be moved here from " + from.string() + ": " +
-                code.message());
-  session::Draft draft(to);
-  session::read_blocks(
-      from, [] { return false; }, [&](std::string_view block) { draft.file().append(block); });
-  draft.file().sync();
-  if (session::sha256_of(draft.path()) != session::sha256_of(from))
-    throw Error(to.string() + ": what was copied from " + from.string() +
-                " is read back with other content; look at the disk");
-  draft.put();
-  std::filesystem::remove(from, code);
-}
-
 }  // namespace
 
 // What takes long, the reading of the pictures, is done while others may go on.
 RenderDirectory::RenderDirectory(const set::Output& output, const std::string& settings, bool force,
                                  const session::TakeClock& clock, FrameRange range,
-                                 const std::stop_token& stop)
-    : output_(output), clock_(clock), range_(range) {
+                                 const std::stop_token& stop,
+                                 std::optional<render::SampleRange> sample_range)
+    : output_(output), clock_(clock), sample_range_(sample_range), range_(range) {
   std::error_code code;
   std::filesystem::create_directories(path(), code);
   if (!std::filesystem::is_directory(path()))
@@ -257,7 +123,7 @@ std::string RenderDirectory::differences_from(const std::string& settings) const
 void RenderDirectory::read_lines() {
   const std::string state = state_of(path() / lines_name);
   if (state == lines_state_) return;
-  finished_ = state.empty() ? Frames() : frames_in(path() / lines_name);
+  finished_ = frames_in(path() / lines_name);
   lines_state_ = state;
 }
 
@@ -280,7 +146,7 @@ void RenderDirectory::verify(FrameRange range, const std::stop_token& stop) {
     before[frame] = to_json(record);
     const bool has_marks = !record.files.empty();
     std::string& why = why_not[frame];
-    for (const char* extension : extensions())
+    for (const char* extension : extensions(record.status))
       if (why.empty()) why = why_broken(file(frame, extension), has_marks, record);
   }
 
@@ -309,7 +175,7 @@ void RenderDirectory::reject_without_line(FrameRange range) {
     if (!frame || *frame < range.first || *frame > range.last || finished_.contains(*frame) ||
         broken.contains(*frame) || locks_->is_at_another(*frame))
       continue;
-    for (const char* extension : extensions())
+    for (const char* extension : extensions(FrameStatus::rendered))
       if (file(*frame, extension).filename() == entry.path().filename()) frames.insert(*frame);
   }
   if (!frames.empty())
@@ -317,26 +183,19 @@ void RenderDirectory::reject_without_line(FrameRange range) {
                                                                               frames.end());
 }
 
-std::vector<const char*> RenderDirectory::extensions() const {
-  return extensions_of(output_);
+std::vector<const char*> RenderDirectory::extensions(FrameStatus status) const {
+  return extensions_of(output_, sample_range_.has_value(), status);
 }
 
 std::filesystem::path RenderDirectory::file(std::uint64_t frame, const char* extension) const {
-  return file_in(path(), frame, extension);
+  return path() / frame_file(frame, extension);
 }
 
 const FinishedFrame* RenderDirectory::finished(std::uint64_t frame) const {
   const auto found = finished_.find(frame);
-  return found != finished_.end() && has_files(output_, frame) ? &found->second : nullptr;
-}
-
-std::map<std::uint64_t, FinishedFrame> finished_frames(const set::Output& output) {
-  const std::filesystem::path lines = output.directory / lines_name;
-  std::error_code unknown;
-  if (!std::filesystem::exists(std::filesystem::symlink_status(lines, unknown))) return {};
-  Frames frames = frames_in(lines);
-  std::erase_if(frames, [&](const auto& entry) { return !has_files(output, entry.first); });
-  return frames;
+  if (found == finished_.end()) return nullptr;
+  const bool is_there = has_files(output_, sample_range_.has_value(), found->second);
+  return is_there ? &found->second : nullptr;
 }
 
 Claim RenderDirectory::claim(std::uint64_t frame) {
@@ -385,19 +244,28 @@ bool RenderDirectory::claim_video() {
   return locks_->claim_video();
 }
 
-void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set,
-                            const MadeOn& made_on) {
+void RenderDirectory::write_files(const pipeline::Shot& shot, const set::Set& set) const {
+  if (sample_range_) {
+    if (shot.sums)
+      output::write_sums_exr(file(shot.index, sums_extension),
+                             {shot.index, *sample_range_, *shot.sums});
+    return;
+  }
   if (output_.exr) {
     output::ExrMetadata metadata = output::exr_metadata(*shot.layers, *shot.frame, shot.track, set);
     metadata.fps = clock_.fps;
     metadata.timecode = clock_.at(shot.frame->timestamp_ns);
     output::write_exr(file(shot.index, ".exr"), *shot.layers, metadata);
   }
-  if (wants_png(output_)) output::write_png(file(shot.index, ".png"), *shot.picture);
+  if (output_.png || output_.video) output::write_png(file(shot.index, ".png"), *shot.picture);
+}
 
+void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set,
+                            const MadeOn& made_on) {
+  write_files(shot, set);
   FinishedFrame record = finished_frame(shot);
   record.made_on = made_on;
-  for (const char* extension : extensions()) {
+  for (const char* extension : extensions(record.status)) {
     const std::filesystem::path written = file(shot.index, extension);
     record.files[written.filename().string()] = mark_of(written);
   }
@@ -439,7 +307,7 @@ std::size_t RenderDirectory::adopt(const RenderDirectory& from) {
   if (taken.empty()) return 0;
   append_line(path() / lines_name, lines);
   for (const FinishedFrame& record : taken) {
-    for (const char* extension : extensions())
+    for (const char* extension : extensions(record.status))
       move_file(from.file(record.frame, extension), file(record.frame, extension));
     finished_[record.frame] = record;
   }

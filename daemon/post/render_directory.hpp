@@ -19,6 +19,7 @@
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/post/finished_frame.hpp"
 #include "daemon/post/folder_locks.hpp"
+#include "daemon/render/sample_sums.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/session/timecode.hpp"
 
@@ -26,11 +27,6 @@ namespace previz::post {
 
 // What came of asking for a frame.
 enum class Claim { mine, finished, at_another };
-
-// Returns the frames of which the folder has a line and all files that are wanted, without a look
-// into these and without a lock; none where there is no such folder. Throws previz::Error where
-// something else is in the place of the lines.
-std::map<std::uint64_t, FinishedFrame> finished_frames(const set::Output& output);
 
 // claim(), release() and write() are for several threads at once.
 class RenderDirectory {
@@ -46,10 +42,12 @@ class RenderDirectory {
   // line; a file whose line has neither (of an older previzd) is decoded instead, and its line gets
   // them. A frame that is not whole is no longer finished: rejected() names it. A stop ends the
   // reading with previz::Error, and no line is changed. Throws previz::Error, too, where one of its
-  // own files is a link.
+  // own files is a link. With `sample_range`, frames have sums of this range in place of pictures:
+  // NNNN.sums.exr, or no file where the plate passes through untouched.
   RenderDirectory(const set::Output& output, const std::string& settings, bool force,
                   const session::TakeClock& clock = {}, FrameRange range = all_frames,
-                  const std::stop_token& stop = {});
+                  const std::stop_token& stop = {},
+                  std::optional<render::SampleRange> sample_range = {});
 
   // Returns null if the frame is still to be rendered. A frame is finished if its line and all the
   // files that the set asks for are there, and, within the range, are whole. The record is valid
@@ -104,7 +102,9 @@ class RenderDirectory {
 
  private:
   std::filesystem::path file(std::uint64_t frame, const char* extension) const;
-  std::vector<const char*> extensions() const;  // of the files that the set asks for
+  // Of the files that a frame has.
+  std::vector<const char*> extensions(FrameStatus status) const;
+  void write_files(const pipeline::Shot& shot, const set::Set& set) const;
   void begin(const std::string& settings, bool force, FrameRange range,
              const std::stop_token& stop);
   std::string differences_from(const std::string& settings) const;
@@ -115,6 +115,7 @@ class RenderDirectory {
 
   const set::Output output_;
   const session::TakeClock clock_;
+  const std::optional<render::SampleRange> sample_range_;
   std::vector<std::string> notes_;
   std::mutex mutex_;  // of all below
   std::optional<FolderLocks> locks_;

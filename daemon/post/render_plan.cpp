@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "daemon/post/render_folder.hpp"
+#include "daemon/post/sample_ranges.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
@@ -31,6 +32,7 @@ void override_take(pipeline::Take& take, const RenderOptions& options) {
   if (options.exr) set.output.exr = *options.exr;
   if (options.png) set.output.png = *options.png;
   if (options.video) set.output.video = *options.video;
+  if (options.sample_range) set.output.video = false;
 }
 
 // A session from elsewhere does not choose where files are written.
@@ -61,6 +63,7 @@ std::string settings_of(const pipeline::Take& take, const set::Set& set,
   json["seconds"] = set.quality.seconds;
   json["seed"] = set.estimation.seed;
   json["estimator"] = set::name_of(set.estimation.estimator);
+  if (options.sample_range) json["sample_range"] = to_string(*options.sample_range);
   json["set"] = take.set_text;
   if (with) json["with"] = with->text;
   for (const set::Object& object : set.objects)
@@ -105,6 +108,7 @@ RenderPlan plan_render(const RenderOptions& options) {
   set::Set& set = plan.take.set;
   override_take(plan.take, options);
   check_directory(set, options);
+  if (options.sample_range) check_sample_range(*options.sample_range, set.quality);
   if (!options.directory)
     set.output.directory = render_folder(options.session, plan.take.session.info.take.has_value(),
                                          set.output.directory);
