@@ -123,7 +123,8 @@ void write_sums_exr(const std::filesystem::path& path, const RangeSums& sums) {
     header.channels().insert(channel.name(), Imf::Channel(Imf::FLOAT));
   header.insert("software", Imf::StringAttribute("previzd " PREVIZ_VERSION));
   header.insert("previz.frame", Imf::StringAttribute(std::to_string(sums.frame)));
-  header.insert("previz.sample_range", Imf::StringAttribute(to_string(sums.range)));
+  header.insert("previz.sample_range", Imf::StringAttribute(std::to_string(sums.range.index) + "/" +
+                                                            std::to_string(sums.range.count)));
   header.insert("previz.samples", Imf::StringAttribute(std::to_string(sums.sums.samples)));
   for (const NamedCounter& counter : sample_counters)
     header.insert(std::string("previz.") + counter.name,
