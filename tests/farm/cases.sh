@@ -13,7 +13,7 @@ slow=("${demo[@]}" --scale 0.1 --spp 64 --no-video)
 case_cluster() {
   start_cluster
   # shellcheck disable=SC2016  # the task's shell expands it
-  printf '%s\n' '#!/bin/bash' 'echo "task $SLURM_ARRAY_TASK_ID on $SLURMD_NODENAME begins"' 'sleep 18' \
+  printf '%s\n' '#!/bin/bash' 'echo "task $SLURM_ARRAY_TASK_ID on $SLURMD_NODENAME begins"' 'sleep 14.25' \
     'echo "task $SLURM_ARRAY_TASK_ID on $SLURMD_NODENAME ends"' >"$folder/task.sh"
   render=$(sbatch --parsable --array=0-1 --open-mode=append --output="$folder/%a.log" "$folder/task.sh")
   expect "two tasks run" await 20 two_run
@@ -21,13 +21,15 @@ case_cluster() {
   lost=$(task_on 1)
   node cut-node 1
   declare_lost 1
-  expect "the task of a cut node runs a second time" await 30 grep --quiet "task $lost on node3 begins" "$folder/$lost.log"
-  expect "the first copy runs on" node on-node 1 pgrep --exact sleep --full --list-full 'sleep 18'
+  expect "the task of a cut node runs a second time" await 30 \
+    grep --quiet "task $lost on node3 begins" "$folder/$lost.log"
+  expect "the first copy runs on" node on-node 1 pgrep --full 'sleep 14.25'
   node kill-node 2
-  expect "a node without power runs nothing" [ "$(pgrep --full --count 'sleep 18')" -le 2 ]
+  expect "a node without power runs nothing" [ "$(pgrep --full --count 'sleep 14.25')" -le 2 ]
   declare_lost 2
   node start-node 2
-  expect "the task of node2 runs again" await 60 grep --quiet "task $((1 - lost)) on node. ends" "$folder/$((1 - lost)).log"
+  expect "the task of node2 runs again" await 60 \
+    grep --quiet "task $((1 - lost)) on node. ends" "$folder/$((1 - lost)).log"
   expect "the array ends" await 60 has_left "$render"
 }
 two_run() { [[ -n $(task_on 1) && -n $(task_on 2) ]]; }
@@ -138,7 +140,7 @@ case_corrupted() {
   scontrol release "$check"
   await_end
   expect "the check does not pass" fails has_passed
-  expect "the check names frame 2 alone" [ "$(tr -c '0-9\n' ' ' <"$job/missing.json" | grep --only-matching --word-regexp --count '0*2')" -ge 1 ]
+  expect "the check names frame 2" grep --word-regexp '0*2' "$job/missing.json"
   retry_renders_what_is_missing
   expect "the bits are those of one run" same_render "$out/reference/quick" "$pictures"
 
@@ -170,7 +172,8 @@ case_missing_take() {
   cp --recursive config/demo "$folder/demo"
   start_cluster
   node on-node 1 mount -t tmpfs none "$folder/demo/session"
-  submit "$folder/demo/session" --set "$folder/demo/demo.toml" --scale 0.1 --spp 4 --chunk 2 --job "$job" --out "$pictures"
+  submit "$folder/demo/session" --set "$folder/demo/demo.toml" --scale 0.1 --spp 4 --chunk 2 --job "$job" \
+    --out "$pictures"
   expect "status names the take that node1 lacks" await 90 job_says "$folder/demo/session"
   node on-node 1 umount "$folder/demo/session"
   await_end
@@ -229,7 +232,8 @@ case_two_takes() {
     cp --recursive config/demo/session "$folder/$take"
   done
   start_cluster
-  submit "$folder/first" "$folder/second" --set config/demo/demo.toml --scale 0.1 --spp 4 --chunk 3 --job "$job" --out "$pictures"
+  submit "$folder/first" "$folder/second" --set config/demo/demo.toml --scale 0.1 --spp 4 --chunk 3 --job "$job" \
+    --out "$pictures"
   expect "the check ends within 300 s" await 300 all_have_left
   for take in first second; do
     expect "the bits of $take are those of one run" same_frames "$out/reference/quick" "$pictures/$take"
@@ -237,11 +241,12 @@ case_two_takes() {
 }
 all_have_left() { [[ -z $(squeue --noheader --format=%i) ]]; }
 
-# What is written without a cluster: a plan that submits nothing, and templates that any Open Job Description farm reads.
+# What is written without a cluster: a plan that submits nothing, and templates for farms that read Open Job
+# Description.
 case_without_cluster() {
   local odd=$folder/$'a "take\'s"\n$HOME %j'
   cp --recursive config/demo "$odd"
-  PATH=/usr/bin:/bin SLURM_CONF=/nonexistent timeout 30 "$previzd" farm "${quick[@]}" --chunk 2 --job "$job" --out "$pictures" --dry-run
+  SLURM_CONF=/nonexistent timeout 30 "$previzd" farm "${quick[@]}" --chunk 2 --job "$job" --out "$pictures" --dry-run
   expect "no picture is made" [ ! -e "$pictures/0000.exr" ]
   timeout 30 "$previzd" farm "${quick[@]}" --chunk 2 --job "$folder/job2" --out "$pictures" --openjd "$folder/demo.yaml"
   expect "the template is right" "$here/check_openjd.py" "$folder/demo.yaml"

@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# A real Slurm cluster on this machine, without systemd: munged, slurmctld and one slurmd a node, on loopback only. As root.
+# A real Slurm cluster on this machine, without systemd: munged, slurmctld and one slurmd a node, on loopback. As root.
 #   tests/farm/cluster.sh up DIR NODES             starts it and waits until every node is idle; . DIR/env then makes
 #                                                  sbatch, squeue and the others talk to it
-#   tests/farm/cluster.sh kill-node DIR K          the power of node K fails: its daemon, its steps and all that they run end
+#   tests/farm/cluster.sh kill-node DIR K          the power of node K fails: all that runs there ends
 #   tests/farm/cluster.sh cut-node DIR K           its network fails: only its slurmd ends, its steps run on
 #   tests/farm/cluster.sh start-node DIR K         the node is back, with the steps that a cut has left running
-#   tests/farm/cluster.sh on-node DIR K COMMAND... runs a command on the node, which sees processes and mounts of its own
+#   tests/farm/cluster.sh on-node DIR K COMMAND... runs a command among the node's processes and mounts
 #   tests/farm/cluster.sh down DIR                 ends all of it; the logs, the queue and the spool folders stay in DIR
 # Each node is a PID and a mount namespace, so that killing its first process ends all that it runs, and a disk can be
 # missing on one node. DIR is at most 50 plain characters long, since Slurm's sockets lie in it.
@@ -86,8 +86,11 @@ on_node() {
   nsenter --target "$first" --pid --mount -- "${@:2}"
 }
 
-# shellcheck disable=SC2016  # the node's shell expands it
-has_daemon() { on_node "$1" bash -c 'read -r comm <"/proc/$(<"$1")/comm" && [[ $comm == slurmd ]]' - "$dir/run/slurmd_node$1.pid" 2>/dev/null; }
+has_daemon() {
+  # shellcheck disable=SC2016  # the node's shell expands it
+  on_node "$1" bash -c 'read -r comm <"/proc/$(<"$1")/comm" && [[ $comm == slurmd ]]' - \
+    "$dir/run/slurmd_node$1.pid" 2>/dev/null
+}
 
 # The first process waits for nothing and adopts, as a machine's does, what the steps leave behind.
 start_node() {

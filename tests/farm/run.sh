@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # `previzd farm` on a real Slurm cluster of three nodes that runs on this machine (cluster.sh): the pictures of the demo
-# take, from tasks that fail in every way that cases.sh can think of, are held against those of one `previzd render`, bit
-# for bit. As root; installs Slurm with the first run. Ten minutes on two cores.
+# take, from tasks that fail in the ways of cases.sh, are held against those of one `previzd render`, bit for bit. As
+# root; installs Slurm with the first run. Ten minutes on two cores.
 #   tests/farm/run.sh            all cases
 #   tests/farm/run.sh CASE...    cases by the names that cases.sh gives them: cluster, array, power, network, ...
 # PREVIZ_BUILD names a build to use in place of build/release, CLUSTER_PORT the first of the ports (cluster.sh).
@@ -174,6 +174,7 @@ for name in "${cases[@]}"; do
 done
 
 mkdir -p "$out"
+/usr/bin/python3 -B "$here/test_check_openjd.py" --quiet
 failures=0
 for name in "${cases[@]}"; do run_case "$name"; done
 echo "farm: $((${#cases[@]} - failures)) of ${#cases[@]} cases passed in $SECONDS s; logs are in $out"
