@@ -7,8 +7,9 @@
 #   tests/farm/cluster.sh start-node DIR K         the node is back, with the steps that a cut has left running
 #   tests/farm/cluster.sh on-node DIR K COMMAND... runs a command among the node's processes and mounts
 #   tests/farm/cluster.sh down DIR                 ends all of it; the logs, the queue and the spool folders stay in DIR
-# Each node is a PID and a mount namespace, so that killing its first process ends all that it runs, and a disk can be
-# missing on one node. DIR is at most 50 plain characters long, since Slurm's sockets lie in it.
+# Each node has PID, mount and UTS namespaces of its own, so that killing its first process ends all that it runs, a
+# disk can be missing on it, and its host name is its own. Processes of two nodes may have the same number.
+# DIR is at most 50 plain characters long, since Slurm's sockets lie in it.
 # Variables: CLUSTER_PORT, the controller's (26900; node K has the one K above, srun those from 100 above),
 # CLUSTER_CPUS of a node (1), CLUSTER_MEMORY_MB of a node (16384), CLUSTER_CONF, a file of further lines for slurm.conf.
 set -euo pipefail
@@ -78,12 +79,13 @@ first_process() {
 }
 
 has_power() { [[ -n $(first_process "$1") ]]; }
+has_name() { [[ $(on_node "$1" hostname 2>/dev/null) == "node$1" ]]; }
 
 on_node() {
   local first
   first=$(first_process "$1")
   [[ -n $first ]] || fail "node$1 has no power; start it by: cluster.sh start-node $dir $1"
-  nsenter --target "$first" --pid --mount -- "${@:2}"
+  nsenter --target "$first" --pid --uts --mount -- "${@:2}"
 }
 
 has_daemon() {
@@ -95,9 +97,10 @@ has_daemon() {
 # The first process waits for nothing and adopts, as a machine's does, what the steps leave behind.
 start_node() {
   if ! has_power "$1"; then
-    launch "node$1" unshare --pid --fork --kill-child=KILL --mount-proc --propagation slave \
-      bash -c 'sleep infinity & wait'
-    await 10 has_power "$1" || fail "node$1 gets no namespaces of its own; see $dir/log/node$1.out"
+    # shellcheck disable=SC2016  # the node's shell expands it
+    launch "node$1" unshare --pid --uts --fork --kill-child=KILL --mount-proc --propagation slave \
+      bash -c 'mount --bind "$2" /etc/hosts; hostname "$1"; sleep infinity & wait' - "node$1" "$dir/hosts"
+    await 10 has_name "$1" || fail "node$1 gets no namespaces of its own; see $dir/log/node$1.out"
   fi
   ! has_daemon "$1" || fail "node$1 runs already"
   rm -f "$dir/run/slurmd_node$1.pid"
@@ -177,7 +180,7 @@ SlurmdPidFile=$dir/run/slurmd_%n.pid
 SlurmdLogFile=$dir/log/slurmd_%n.log
 END_OF_CONF
   for ((k = 1; k <= nodes; ++k)); do
-    echo "NodeName=node$k NodeHostname=$host NodeAddr=127.0.0.1 Port=$((port + k)) CPUs=${CLUSTER_CPUS:-1}" \
+    echo "NodeName=node$k NodeHostname=node$k NodeAddr=127.0.0.1 Port=$((port + k)) CPUs=${CLUSTER_CPUS:-1}" \
       "RealMemory=${CLUSTER_MEMORY_MB:-16384} State=UNKNOWN"
   done
   echo "PartitionName=main Nodes=ALL Default=YES MaxTime=INFINITE State=UP"
@@ -204,6 +207,7 @@ up() {
   [[ -e $dir/munge/key ]] || (umask 077 && head --bytes=1024 /dev/urandom >"$dir/munge/key")
   write_configuration >"$dir/slurm.conf"
   for ((k = 1; k <= nodes; ++k)); do mkdir -p "$dir/spool/node$k"; done
+  { cat /etc/hosts; for ((k = 1; k <= nodes; ++k)); do echo "127.0.0.1 node$k"; done; } >"$dir/hosts"
   echo "export SLURM_CONF=$dir/slurm.conf" >"$dir/env"
 
   trap down EXIT  # where one of them does not start, the others end

@@ -12,6 +12,8 @@ here=$PWD/tests/farm
 out=$PWD/build/farm
 build=$(realpath "${PREVIZ_BUILD:-build/release}")
 previzd=$build/daemon/previzd
+# A task that finds its node at fault waits this long before it is requeued.
+export PREVIZ_FARM_WAIT_S=3
 export MESA_SHADER_CACHE_DIR=${MESA_SHADER_CACHE_DIR:-$PWD/build/mesa_shader_cache}
 
 # shellcheck source=tests/farm/cases.sh
