@@ -301,6 +301,11 @@ void add_commands(CLI::App& app, CommandLine& said) {
   calibrate::add_calibrate(app, said.calibrate);
   add_model(app, said.model);
   print::add_print(app, said.print);
+  farm::add_farm(app, said.farm, [](CLI::App& command, post::RenderOptions& options) {
+    add_render_options(command, options,
+                       "Folder for the pictures, with a subfolder for each of several takes "
+                       "(default: the set's output.directory)");
+  });
   add_takes(app, said.takes);
 }
 

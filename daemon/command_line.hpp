@@ -11,6 +11,7 @@
 #include "daemon/exchange/camera_track.hpp"
 #include "daemon/exchange/import.hpp"
 #include "daemon/exchange/take_track.hpp"
+#include "daemon/farm/command_line.hpp"
 #include "daemon/model/model.hpp"
 #include "daemon/post/render.hpp"
 #include "daemon/post/render_takes.hpp"
@@ -38,6 +39,7 @@ struct CommandLine {
   print::Commands print;
   TakesCommands takes;
   post::RenderOptions merge;
+  farm::Commands farm;
 };
 
 // Adds all subcommands and options to `app`, which writes what it parses into `said`; `said` must

@@ -53,6 +53,12 @@ int do_track(exchange::TrackOptions& options, const StopOnSignal& stop) {
   return exchange::track_take(options, std::cout);
 }
 
+int do_farm(const CLI::App& app, farm::Commands& commands, const StopOnSignal& stop) {
+  const int status =
+      farm::do_farm(app, commands, isatty(STDOUT_FILENO) != 0, std::cout, stop.token());
+  return stop.received() ? 128 + stop.received() : status;
+}
+
 int do_import(const exchange::ImportOptions& options) {
   const exchange::ImportReport report = exchange::import_session(options);
   for (const std::string& note : report.notes) report::log({report::Severity::info, "", note});
@@ -153,6 +159,7 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("model")) return model::make_model(said.model, std::cout), 0;
     if (app.got_subcommand("devices")) return do_devices(said.learn, said.rules, stop);
     if (app.got_subcommand("export")) return do_export(said.export_take, stop);
+    if (app.got_subcommand("farm")) return do_farm(app, said.farm, stop);
     if (app.got_subcommand("import")) return do_import(said.import_session);
     if (app.got_subcommand("print")) return print::do_print(app, said.print, std::cout);
     if (app.got_subcommand("render")) return do_render(said.render, said.render_takes, stop);

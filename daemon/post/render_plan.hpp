@@ -5,7 +5,7 @@
 #include <string>
 
 #include "daemon/pipeline/take.hpp"
-#include "daemon/post/render.hpp"
+#include "daemon/post/render_options.hpp"
 #include "daemon/set/load.hpp"
 #include "drivers/session/timecode.hpp"
 

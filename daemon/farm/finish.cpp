@@ -1,0 +1,208 @@
+#include "daemon/farm/finish.hpp"
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <ostream>
+#include <utility>
+
+#include "daemon/farm/settings.hpp"
+#include "daemon/post/render_directory.hpp"
+#include "daemon/post/render_plan.hpp"
+#include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
+#include "drivers/session/files.hpp"
+
+namespace previz::farm {
+namespace {
+
+set::Output output_of(const JobTake& take, const std::filesystem::path& folder, bool video) {
+  return {folder, take.exr, take.png, video};
+}
+
+// Finds out about one take.
+class TakeProof {
+ public:
+  TakeProof(const JobFolder& folder, const Job& job, std::size_t take, std::ostream& out,
+            const std::stop_token& stop)
+      : folder_(folder),
+        job_(job),
+        take_(job.takes.at(take)),
+        index_(take),
+        out_(out),
+        stop_(stop),
+        pictures_(output_of(take_, take_.pictures, false), take_.settings, false, {}, take_.frames,
+                  stop) {}
+
+  void run(Proof& proof);
+
+ private:
+  void collect(std::size_t chunk);
+  std::string why_not_ours(std::size_t chunk) const;
+  std::string why_missing(std::size_t chunk) const;
+  bool is_wanted_device(const post::FinishedFrame& frame) const {
+    return job_.any_device || frame.made_on.is_gpu == job_.on_gpu;
+  }
+
+  const JobFolder& folder_;
+  const Job& job_;
+  const JobTake& take_;
+  const std::size_t index_;
+  std::ostream& out_;
+  const std::stop_token& stop_;
+  post::RenderDirectory pictures_;
+  std::map<std::size_t, std::string> faults_;  // by chunk: why its frames stay where they are
+};
+
+// Returns why the frames of a chunk's folder are not taken over; empty: they may be.
+std::string TakeProof::why_not_ours(std::size_t chunk) const {
+  const std::filesystem::path file = folder_.chunk(chunk) / "render.json";
+  const std::string settings = session::read_plain_file(file);
+  if (!same_settings(settings, take_.settings))
+    return file.string() +
+           ": these frames were rendered with other settings or another version of "
+           "previzd: " +
+           difference_words(settings, take_.settings);
+  return "";
+}
+
+void TakeProof::collect(std::size_t chunk) {
+  const std::filesystem::path folder = folder_.chunk(chunk);
+  std::error_code unknown;
+  if (!std::filesystem::exists(folder / "render.json", unknown)) return;
+  if (std::string why = why_not_ours(chunk); !why.empty()) {
+    faults_[chunk] = std::move(why);
+    return;
+  }
+  const Chunk& plan = job_.chunks[chunk];
+  post::RenderDirectory part(output_of(take_, folder, false),
+                             session::read_plain_file(folder / "render.json"), false, {},
+                             plan.frames, stop_);
+  if (part.has_others()) {
+    faults_[chunk] = "is being rendered";
+    return;
+  }
+  for (const auto& [why, frames] : part.rejected())
+    faults_[chunk] = post::frames_words(frames) + ": " + why;
+  const auto foreign = [&](const post::FinishedFrame& frame) { return !is_wanted_device(frame); };
+  for (const post::FinishedFrame& frame : part.reject(foreign))
+    faults_[chunk] = "frame " + std::to_string(frame.frame) + ": was rendered on " +
+                     frame.made_on.device + ", and the job is rendered on " +
+                     (job_.on_gpu ? "graphics cards" : "processors") + "; --any-device allows both";
+  pictures_.adopt(part);
+}
+
+std::string TakeProof::why_missing(std::size_t chunk) const {
+  if (const auto fault = faults_.find(chunk); fault != faults_.end()) return fault->second;
+  const std::optional<TaskState> state = folder_.read_state(chunk);
+  if (!state) return "not begun";
+  if (!state->message.empty()) return "on " + state->host + ": " + state->message;
+  switch (state->outcome) {
+    case TaskOutcome::done:
+      return "not there any more, after they were rendered on " + state->host;
+    case TaskOutcome::stopped:
+      return "stopped on " + state->host;
+    default:
+      return "ended on " + state->host + " without a word: killed, or the machine failed";
+  }
+}
+
+void TakeProof::run(Proof& proof) {
+  for (const auto& [why, frames] : pictures_.rejected())
+    out_ << take_.pictures.string() << ": " << post::frames_words(frames) << ": " << why
+         << std::endl;
+  std::map<std::string, MissingFrames> missing;
+  std::set<std::string> cards;
+  for (std::size_t chunk = 0; chunk < job_.chunks.size(); ++chunk) {
+    const Chunk& plan = job_.chunks[chunk];
+    if (plan.take != index_ || plan.kind == ChunkKind::sums) continue;
+    collect(chunk);
+    for (std::uint64_t frame = plan.frames.first; frame <= plan.frames.last; ++frame) {
+      if (const post::FinishedFrame* finished = pictures_.finished(frame)) {
+        cards.insert(finished->made_on.device);
+        continue;
+      }
+      MissingFrames& these = missing[why_missing(chunk)];
+      these.take = index_;
+      these.frames.push_back(frame);
+      proof.chunks.insert(chunk);
+    }
+  }
+  for (auto& [why, frames] : missing) {
+    frames.why = why;
+    proof.missing.push_back(std::move(frames));
+  }
+  if (cards.size() < 2) return;
+  std::string names;
+  for (const std::string& card : cards) add_to_list(names, card.empty() ? "unknown" : card);
+  proof.notes.push_back(take_.pictures.string() + ": rendered on " + names +
+                        ", whose pictures differ in the last bits");
+}
+
+}  // namespace
+
+Proof prove(const JobFolder& folder, const Job& job, std::ostream& out,
+            const std::stop_token& stop) {
+  Proof proof;
+  for (std::size_t take = 0; take < job.takes.size(); ++take)
+    TakeProof(folder, job, take, out, stop).run(proof);
+  // A frame that is merged again needs its sums again, unless they are there.
+  std::set<std::size_t> sums;
+  for (const std::size_t merge : proof.chunks)
+    for (std::size_t chunk = 0; chunk < job.first_merge(); ++chunk)
+      if (is_merged_of(job, merge, chunk)) sums.insert(chunk);
+  proof.chunks.insert(sums.begin(), sums.end());
+  return proof;
+}
+
+void complete(const JobFolder& folder, const Job& job, std::ostream& out) {
+  for (const JobTake& take : job.takes) {
+    if (!take.video) continue;
+    post::RenderOptions options = folder.render_options(job, take);
+    options.directory = take.pictures;
+    options.frames = take.frames;
+    const post::RenderPlan plan = post::plan_render(options);
+    post::RenderDirectory pictures(output_of(take, take.pictures, true), take.settings, false,
+                                   plan.clock, {1, 0});
+    std::vector<post::FinishedFrame> frames;
+    for (std::uint64_t frame = take.frames.first; frame <= take.frames.last; ++frame)
+      if (const post::FinishedFrame* finished = pictures.finished(frame))
+        frames.push_back(*finished);
+    pictures.write_video(frames, out);
+  }
+  for (std::size_t chunk = 0; chunk < job.chunks.size(); ++chunk) {
+    std::error_code stays;
+    std::filesystem::remove_all(folder.chunk(chunk), stays);
+  }
+}
+
+void write_missing(const JobFolder& folder, const Job& job, const Proof& proof) {
+  if (proof.missing.empty()) {
+    std::error_code stays;
+    std::filesystem::remove(folder.missing_file(), stays);
+    return;
+  }
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const MissingFrames& missing : proof.missing)
+    json.push_back({{"take", job.takes[missing.take].session.string()},
+                    {"frames", missing.frames},
+                    {"why", missing.why}});
+  session::replace_file(folder.missing_file(),
+                        json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
+void print_missing(const JobFolder& folder, const Job& job, const Proof& proof, std::ostream& out) {
+  for (const std::string& note : proof.notes) out << note << std::endl;
+  std::size_t count = 0;
+  for (const MissingFrames& missing : proof.missing) {
+    count += missing.frames.size();
+    out << job.takes[missing.take].session.filename().string() << ": "
+        << post::frames_words(missing.frames) << ": " << missing.why << std::endl;
+  }
+  if (count > 0)
+    out << folder.path().string() << ": " << count << (count == 1 ? " frame is" : " frames are")
+        << " missing; `previzd farm retry` with this folder renders them" << std::endl;
+}
+
+}  // namespace previz::farm

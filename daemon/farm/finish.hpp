@@ -1,0 +1,46 @@
+// The last step of a job: moves what the tasks have made into the folder of finished pictures, and
+// proves that every frame is there and whole.
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <set>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "daemon/farm/folder.hpp"
+#include "daemon/farm/job.hpp"
+
+namespace previz::farm {
+
+// Frames of a take that are missing, and why.
+struct MissingFrames {
+  std::size_t take = 0;
+  std::vector<std::uint64_t> frames;
+  std::string why;
+};
+
+struct Proof {
+  std::vector<MissingFrames> missing;
+  std::set<std::size_t> chunks;  // that have a missing frame, and those that they are merged of
+  // Remarks that stop nothing: pictures of several models of graphics cards.
+  std::vector<std::string> notes;
+};
+
+// Looks at every file of every frame, by the SHA-256 in its line; what is not whole is no longer
+// finished. Chunks that a process is at stay as they are, and so do frames of other settings, of
+// another version or, unless the plan allows it, of another kind of device: these are missing.
+// Throws previz::Error where a folder cannot be read or written, or on a stop.
+Proof prove(const JobFolder& folder, const Job& job, std::ostream& out,
+            const std::stop_token& stop);
+
+// Writes the review videos of the takes and removes what is left of the chunks.
+void complete(const JobFolder& folder, const Job& job, std::ostream& out);
+
+// Writes JOB/missing.json, or removes it if nothing is missing.
+void write_missing(const JobFolder& folder, const Job& job, const Proof& proof);
+// Prints what is missing, a line a reason.
+void print_missing(const JobFolder& folder, const Job& job, const Proof& proof, std::ostream& out);
+
+}  // namespace previz::farm

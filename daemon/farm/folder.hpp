@@ -1,0 +1,94 @@
+// The folder of a job, which all its machines see:
+//   JOB/job.json            the plan (Job)
+//   JOB/set/                the set file, the overlay and the files that the set names
+//   JOB/tasks.sh, finish.sh what the scheduler starts
+//   JOB/loop.sh             the same for people without a scheduler
+//   JOB/chunks/0003/        the pictures of a chunk, as `previzd render` leaves them, until the
+//   last
+//                           step has moved them into the folder of finished pictures
+//   JOB/state/0003.json     what the task of that chunk said last (TaskState)
+//   JOB/log/                a log a task
+//   JOB/submitted.json      the scheduler's numbers of the job
+//   JOB/stopped.txt         why no further task starts; absent: they do
+//   JOB/missing.json        what the last step found missing; absent: nothing, or it has not run
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/farm/job.hpp"
+
+namespace previz::farm {
+
+// What became of a task.
+enum class TaskOutcome {
+  running,
+  done,
+  stopped,  // by a signal; what was finished is on disk
+  machine,  // the machine is at fault: another one, or a later time, mends it (exit status 75)
+  job       // the job is at fault: no machine can do it (exit status 1)
+};
+
+struct TaskState {
+  TaskOutcome outcome = TaskOutcome::running;
+  std::string host;
+  std::int64_t pid = 0;
+  std::string since;    // "2026-11-28 20:03:11 UTC"
+  std::string message;  // one line: why it is not done
+};
+
+// The words for an outcome in JOB/state and in `farm status --json`: "running", "done", "stopped",
+// "machine", "job".
+const char* name_of(TaskOutcome outcome);
+
+// The scheduler's numbers of what was submitted last.
+struct Submitted {
+  std::vector<std::uint64_t> tasks;     // arrays, in the order of their chunks
+  std::optional<std::uint64_t> finish;  // the last step
+};
+
+class JobFolder {
+ public:
+  explicit JobFolder(std::filesystem::path folder);
+
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path plan() const { return path_ / "job.json"; }
+  std::filesystem::path chunk(std::size_t chunk) const;
+  std::filesystem::path task_script() const { return path_ / "tasks.sh"; }
+  std::filesystem::path finish_script() const { return path_ / "finish.sh"; }
+  std::filesystem::path loop_script() const { return path_ / "loop.sh"; }
+  std::filesystem::path stopped_file() const { return path_ / "stopped.txt"; }
+  std::filesystem::path missing_file() const { return path_ / "missing.json"; }
+  std::filesystem::path state_file(std::size_t chunk) const;
+  // Returns the place of a file that the plan names.
+  std::filesystem::path place(const std::string& in_folder) const { return path_ / in_folder; }
+
+  // Whatever follows reads and replaces plain files only, and throws previz::Error naming the file
+  // where another thing is in its place or it cannot be read or written.
+
+  // Throws also if the folder holds no job.
+  Job read_plan() const;
+  // Returns what the task said last; nothing if it said nothing yet, or half of it.
+  std::optional<TaskState> read_state(std::size_t chunk) const;
+  void write_state(std::size_t chunk, const TaskState& state) const;
+  Submitted read_submitted() const;
+  void write_submitted(const Submitted& submitted) const;
+  // Returns why no further task starts; empty: they do.
+  std::string read_stopped() const;
+
+  // Returns the options by which the plan renders a take, without the frames and the folder for
+  // them.
+  post::RenderOptions render_options(const Job& job, const JobTake& take) const;
+
+  // Returns the name by which the scheduler knows the job's parts: "previz-" and eight hexadecimal
+  // digits of the folder's hash.
+  std::string name() const;
+
+ private:
+  std::filesystem::path path_;  // absolute
+};
+
+}  // namespace previz::farm

@@ -1,0 +1,43 @@
+// What `previzd farm` and its subcommands are asked for.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "daemon/farm/job.hpp"
+#include "daemon/post/render_options.hpp"
+
+namespace previz::farm {
+
+struct FarmOptions {
+  std::vector<std::filesystem::path> takes;
+  post::RenderOptions render;                // without a session
+  std::optional<std::filesystem::path> job;  // folder; absent: beside the first take's pictures
+  Division division;
+  Wishes wishes;
+  std::optional<bool> on_gpu;  // absent: as this computer's own device is
+  bool any_device = false;
+  std::filesystem::path program;                // previzd on the machines; empty: where this one is
+  std::vector<std::string> sbatch;              // arguments for sbatch
+  bool dry_run = false;                         // nothing is written or submitted, all is printed
+  std::optional<std::filesystem::path> openjd;  // the job becomes this template, not Slurm's
+  std::stop_token stop;
+};
+
+// A job that is there.
+struct JobOptions {
+  std::filesystem::path job;
+  bool any_paths = false;  // allowed_pictures()
+  // For retry().
+  std::filesystem::path program;
+  std::vector<std::string> sbatch;
+  // For print_status().
+  bool json = false;
+  bool terminal = false;
+  std::stop_token stop;
+};
+
+}  // namespace previz::farm

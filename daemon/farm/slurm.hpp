@@ -1,0 +1,46 @@
+// Speaks with Slurm by its programs: sbatch, squeue, scontrol, scancel.
+#pragma once
+
+#include <cstdint>
+#include <iosfwd>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "daemon/farm/folder.hpp"
+#include "daemon/farm/job.hpp"
+#include "daemon/farm/scripts.hpp"
+
+namespace previz::farm {
+
+bool has_slurm();
+
+// Submits these chunks, by the scripts in the folder, as arrays, merges after all others, and the
+// last step after all of them, and writes their numbers into the job's folder; prints them. Throws
+// previz::Error with sbatch's own words if one is refused; those before it are then cancelled.
+void submit_chunks(const JobFolder& folder, const Job& job, const std::set<std::size_t>& chunks,
+                   const std::vector<std::string>& more, std::ostream& out);
+// Writes the scripts into the job's folder.
+void write_scripts(const JobFolder& folder, const Job& job, const ScriptPlaces& places);
+// Prints the scripts and the commands that submit_chunks() would write and run.
+void print_submission(const JobFolder& folder, const Job& job, const ScriptPlaces& places,
+                      const std::vector<std::string>& more, std::ostream& out);
+
+// A part of a job in the queue.
+struct QueuedTask {
+  std::optional<std::size_t> chunk;  // absent: the last step
+  std::string state;                 // as squeue(1) has it: "RUNNING", "PENDING"
+  std::string node, reason;
+};
+// Returns what is in the queue or runs of what was submitted last; nothing where the numbers are
+// another job's. Throws previz::Error where Slurm does not answer.
+std::vector<QueuedTask> queued_tasks(const JobFolder& folder);
+// Cancels all of that. Throws likewise.
+void cancel_tasks(const JobFolder& folder);
+
+// Returns the numbers as sbatch takes them: "0-12,17".
+std::string index_list(const std::set<std::size_t>& indices);
+
+}  // namespace previz::farm

@@ -1,0 +1,43 @@
+// Renders a chunk of a job, as every task does.
+#pragma once
+
+#include <iosfwd>
+#include <stop_token>
+
+#include "daemon/farm/folder.hpp"
+#include "daemon/farm/machine.hpp"
+
+namespace previz::farm {
+
+struct TaskOptions {
+  std::filesystem::path job;
+  std::size_t chunk = 0;
+  // The pictures may lie where the plan says, wherever that is (allowed_pictures()).
+  bool any_paths = false;
+  // Leaves a chunk alone that another machine is at; otherwise it waits, and takes over what that
+  // one does not finish.
+  bool not_if_taken = false;
+  std::stop_token stop;
+};
+
+// The exit status of a task.
+namespace task_status {
+inline constexpr int done = 0;
+inline constexpr int job_fault = 1;  // no retry mends it
+inline constexpr int machine_fault =
+    75;  // EX_TEMPFAIL of sysexits.h: another machine, or time, does
+}  // namespace task_status
+
+// Throws previz::Error if the pictures of the take would be written outside of the job's folder and
+// of the one that it lies in, unless `any_paths`: a plan that came from elsewhere does not choose
+// where files are written.
+void allowed_pictures(const JobFolder& folder, const JobTake& take, bool any_paths);
+
+// Renders what is missing of a chunk into the chunk's own folder. Two tasks with one chunk share
+// its frames, or, where the file system has no locks, both render them, to the same bits. What a
+// task of the same chunk has finished before is kept if it is whole. All that can be known is
+// checked before the first frame, and the outcome is written into the job's folder; `out` gets the
+// same line. Returns a status of task_status; a stop counts as done.
+int run_task(const TaskOptions& options, const Machine& machine, std::ostream& out);
+
+}  // namespace previz::farm

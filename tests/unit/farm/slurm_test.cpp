@@ -1,0 +1,129 @@
+// What Slurm's programs are asked, and what their answers mean. In their place stand scripts that
+// write down their arguments; tests/farm does the same with a real cluster.
+#include "daemon/farm/slurm.hpp"
+
+#include "tests/support/environment_variable.hpp"
+#include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
+
+namespace previz::farm::slurm_test {
+
+class Slurm : public testing::Test {
+ protected:
+  Slurm() {
+    job_.chunks.resize(2500);
+    session::write_content(folder_.plan(), "");
+    stand_in("scontrol", "echo 'MaxArraySize            = 1001'");
+    stand_in("sbatch",
+             "n=$(cat \"$HERE/n\" 2>/dev/null || echo 16); n=$((n + 1)); echo $n > \"$HERE/n\"; "
+             "echo $n");
+    stand_in("scancel", "");
+    write_scripts(folder_, job_, {"/usr/bin/previzd", folder_.path(), false});
+  }
+  // Puts a script in the place of a program; it appends its name and arguments to `calls`.
+  void stand_in(const std::string& name, const std::string& body) {
+    const std::filesystem::path file = directory_ / "bin" / name;
+    session::write_content(file, "#!/bin/sh\nHERE='" + directory_.path().string() + "'\necho \"" +
+                                     name + " $*\" >> \"$HERE/calls\"\n" + body + "\n");
+    std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+  }
+  std::string calls() const { return session::content_of(directory_ / "calls"); }
+
+  test::TemporaryDirectory directory_;
+  const test::EnvironmentVariable path_{"PATH",
+                                        (directory_ / "bin").string() + ":" + std::getenv("PATH")};
+  const JobFolder folder_{directory_ / "a job"};
+  Job job_;
+  std::ostringstream out_;
+};
+
+TEST_F(Slurm, GetsArraysThatItAllowsAndTheLastStepAfterThem) {
+  job_.wishes = {8, "render", "1:00:00", ""};
+  std::set<std::size_t> chunks;
+  for (std::size_t i = 0; i < 2500; ++i) chunks.insert(i);
+  submit_chunks(folder_, job_, chunks, {"--account=film"}, out_);
+  EXPECT_EQ(out_.str(), "render: job 17\nrender: job 18\nrender: job 19\ncheck: job 20\n");
+  const std::string all = calls();
+  EXPECT_THAT(all, HasSubstr("--array=0-1000%8 "));
+  EXPECT_THAT(all, HasSubstr("--array=0-497%8 "));
+  EXPECT_THAT(all, HasSubstr("--partition=render --time=1:00:00 --account=film "));
+  EXPECT_THAT(all, HasSubstr("tasks.sh 2002\n"));
+  EXPECT_THAT(all, HasSubstr("--dependency=afterany:17:18:19 --account=film "));
+  const Submitted submitted = folder_.read_submitted();
+  EXPECT_EQ(submitted.tasks, (std::vector<std::uint64_t>{17, 18, 19}));
+  EXPECT_EQ(submitted.finish, 20u);
+}
+
+TEST_F(Slurm, IsAskedForAGraphicsCardOrAWholeProcessor) {
+  submit_chunks(folder_, job_, {0}, {}, out_);
+  EXPECT_THAT(calls(), AllOf(HasSubstr("--exclusive --mem=0"), Not(HasSubstr("--gres"))));
+  job_.on_gpu = true;
+  submit_chunks(folder_, job_, {3, 7, 8, 9}, {}, out_);
+  EXPECT_THAT(calls(), AllOf(HasSubstr("--gres=gpu:1"), HasSubstr("--array=3,7-9 ")));
+}
+
+TEST_F(Slurm, MergesAfterAllSums) {
+  for (std::size_t i = 2000; i < 2500; ++i) job_.chunks[i].kind = ChunkKind::merge;
+  submit_chunks(folder_, job_, {0, 1, 2001, 2002}, {}, out_);
+  EXPECT_EQ(out_.str(), "render: job 17\nmerge: job 18\nmerge: job 19\ncheck: job 20\n");
+  EXPECT_THAT(calls(), HasSubstr("--dependency=afterany:17 "));
+  EXPECT_THAT(calls(), HasSubstr("--dependency=afterany:17:18:19 "));
+}
+
+// One array was taken and the next is refused: nothing stays in the queue.
+TEST_F(Slurm, ThatRefusesAPartGetsNothing) {
+  stand_in("sbatch",
+           "[ -e \"$HERE/first\" ] && { echo 'sbatch: error: Invalid partition' >&2; exit 1; }; "
+           "touch \"$HERE/first\"; echo '17;cluster'");
+  EXPECT_EQ(
+      test::error_of([&] {
+        submit_chunks(folder_, job_, {0, 1500}, {}, out_);
+      }),
+      "sbatch does not take the job: sbatch: error: Invalid partition; nothing was submitted");
+  EXPECT_THAT(calls(), HasSubstr("scancel 17\n"));
+  EXPECT_TRUE(folder_.read_submitted().tasks.empty());
+}
+
+TEST_F(Slurm, SaysWhichTasksRun) {
+  submit_chunks(folder_, job_, {0, 1500}, {}, out_);
+  stand_in("squeue",
+           "echo '17_0|0|RUNNING|node2|None'; echo '18_499|1001|PENDING||Priority'; "
+           "echo '19||PENDING||Dependency'");
+  const std::vector<QueuedTask> tasks = queued_tasks(folder_);
+  ASSERT_EQ(tasks.size(), 3u);
+  EXPECT_EQ(tasks[0].chunk, 0u);
+  EXPECT_EQ(tasks[0].node, "node2");
+  EXPECT_EQ(tasks[1].chunk, 1500u);
+  EXPECT_EQ(tasks[1].reason, "Priority");
+  EXPECT_FALSE(tasks[2].chunk);
+  EXPECT_THAT(calls(), HasSubstr("--jobs=17,18,19 --name=" + folder_.name() + " "));
+}
+
+// Ended long ago, or not at all to be asked.
+TEST_F(Slurm, ThatForgotAJobIsNoError) {
+  EXPECT_TRUE(queued_tasks(folder_).empty());  // nothing was submitted
+  submit_chunks(folder_, job_, {0}, {}, out_);
+  stand_in("squeue", "echo 'slurm_load_jobs error: Invalid job id specified' >&2; exit 1");
+  EXPECT_TRUE(queued_tasks(folder_).empty());
+  stand_in("squeue",
+           "echo 'slurm_load_jobs error: Unable to contact slurm controller' >&2; exit 1");
+  EXPECT_THAT(test::error_of([&] { queued_tasks(folder_); }), HasSubstr("Unable to contact"));
+}
+
+// The numbers come from a file in the folder: they are given along with the job's name.
+TEST_F(Slurm, CancelsOnlyWhatHasTheJobsName) {
+  EXPECT_THAT(test::error_of([&] { cancel_tasks(folder_); }), HasSubstr("was not submitted"));
+  session::write_content(folder_.path() / "submitted.json", R"({"tasks": [1, 2], "finish": 3})");
+  cancel_tasks(folder_);
+  EXPECT_THAT(calls(), HasSubstr("scancel --name=" + folder_.name() + " 1 2 3\n"));
+  session::write_content(folder_.path() / "submitted.json", R"({"tasks": ["--user=root"]})");
+  EXPECT_THAT(test::error_of([&] { cancel_tasks(folder_); }), HasSubstr("cannot be understood"));
+}
+
+TEST_F(Slurm, IsNotEverywhere) {
+  EXPECT_TRUE(has_slurm());
+  const test::EnvironmentVariable nowhere("PATH", directory_.path().string());
+  EXPECT_FALSE(has_slurm());
+}
+
+}  // namespace previz::farm::slurm_test

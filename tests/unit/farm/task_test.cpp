@@ -1,0 +1,298 @@
+// A whole job on a small take, without a scheduler: plan, tasks, last step. What stands in
+// JOB/state and JOB/missing.json is what the crew reads in the morning.
+#include "daemon/farm/task.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/farm/farm.hpp"
+#include "daemon/farm/finish.hpp"
+#include "daemon/farm/plan.hpp"
+#include "daemon/farm/status.hpp"
+#include "daemon/post/folder_locks.hpp"
+#include "daemon/post/render.hpp"
+#include "drivers/session/files.hpp"
+#include "tests/support/environment_variable.hpp"
+#include "tests/support/session_fixture.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/test.hpp"
+
+namespace previz::farm::task_test {
+
+using session::content_of;
+using session::write_content;
+
+class FarmTask : public testing::Test {
+ protected:
+  FarmTask() {
+    test::write_small_take(directory_.path());
+    options_.takes = {directory_ / "session"};
+    options_.render.directory = directory_ / "out";
+    options_.render.video = true;
+    options_.job = directory_ / "job";
+    options_.on_gpu = false;
+    options_.any_device = true;  // these tests run on whatever there is
+    options_.division.chunk = 3;
+    machine_ = this_machine();
+    machine_.open_device = [](const render::DeviceOptions& options) {
+      static const std::shared_ptr<render::Device> device = render::open_device(options);
+      return device;
+    };
+  }
+  void submit() { farm::submit(options_, out_); }
+  int run(std::size_t chunk) {
+    TaskOptions task;
+    task.job = folder_.path();
+    task.chunk = chunk;
+    return run_task(task, machine_, out_);
+  }
+  int finish() {
+    JobOptions job;
+    job.job = folder_.path();
+    out_.str("");
+    return farm::finish(job, out_);
+  }
+  void run_all() {
+    for (std::size_t chunk = 0; chunk < folder_.read_plan().chunks.size(); ++chunk)
+      EXPECT_EQ(run(chunk), task_status::done) << out_.str();
+  }
+  // Renders the take in one run beside the job's pictures, and compares every file.
+  void expect_pictures_of_one_run(post::RenderOptions options) {
+    options.session = directory_ / "session";
+    options.directory = directory_ / "one";
+    std::ostringstream out;
+    post::render_session(options, out);
+    std::size_t files = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(directory_ / "one")) {
+      const std::string name = entry.path().filename().string();
+      if (name == "render.lock" || name == "frames.jsonl") continue;
+      ++files;
+      EXPECT_TRUE(content_of(entry.path()) == content_of(directory_ / "out" / name)) << name;
+    }
+    EXPECT_EQ(files, std::size_t{2 * test::small_take_frames + 2});  // render.json and the video
+  }
+  static std::string state_of(const std::optional<TaskState>& state) {
+    return state ? std::string(name_of(state->outcome)) + ": " + state->message : "none";
+  }
+
+  test::TemporaryDirectory directory_;
+  const test::EnvironmentVariable nowhere_{"PATH", "/nowhere"};  // there is no Slurm
+  const JobFolder folder_{directory_ / "job"};
+  FarmOptions options_;
+  Machine machine_;
+  std::ostringstream out_;
+};
+
+TEST_F(FarmTask, MakesThePicturesOfOneRun) {
+  submit();
+  EXPECT_THAT(out_.str(), HasSubstr("8 frames of 1 take in 3 tasks"));
+  EXPECT_THAT(out_.str(), HasSubstr("There is no Slurm here"));
+  run_all();
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  EXPECT_FALSE(std::filesystem::exists(folder_.missing_file()));
+  EXPECT_FALSE(std::filesystem::exists(folder_.chunk(0)));
+  expect_pictures_of_one_run({});
+}
+
+TEST_F(FarmTask, MergesSampleRangesToThePicturesOfOneRun) {
+  options_.render.samples = 256;
+  options_.render.neighbours = 0;
+  options_.division.sample_ranges = 4;
+  submit();
+  EXPECT_EQ(folder_.read_plan().chunks.size(), std::size_t{3 * 4 + 3});
+  run_all();
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  post::RenderOptions one;
+  one.samples = 256;
+  one.neighbours = 0;
+  expect_pictures_of_one_run(one);
+}
+
+TEST_F(FarmTask, OfFramesThatCannotBeDividedIsRefusedBeforeTheNight) {
+  options_.division.sample_ranges = 4;
+  EXPECT_THAT(test::error_of([&] { submit(); }), HasSubstr("--neighbours 0"));
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "job"));
+}
+
+TEST_F(FarmTask, IsRenderedWithTheSetAsItWas) {
+  std::filesystem::copy_file(directory_ / "set.toml", directory_ / "other.toml");
+  options_.render.set_file = directory_ / "other.toml";
+  submit();
+  std::filesystem::remove(directory_ / "other.toml");
+  std::filesystem::remove(directory_ / "card.gltf");
+  run_all();
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+}
+
+// The set is the take's own, and was changed by hand after the job was made.
+TEST_F(FarmTask, OfAnotherSetStopsTheJob) {
+  submit();
+  const std::filesystem::path file = directory_ / "session/session.toml";
+  std::string text = content_of(file);
+  text.replace(text.find("samples = 2"), 11, "samples = 3");
+  write_content(file, text);
+  EXPECT_EQ(run(0), task_status::job_fault);
+  EXPECT_THAT(
+      state_of(folder_.read_state(0)),
+      AllOf(StartsWith("job: "), HasSubstr("was changed since the job was made (samples is")));
+  EXPECT_EQ(run(1), task_status::job_fault);
+  EXPECT_THAT(out_.str(), HasSubstr("the job was stopped by chunk 0: "));
+  EXPECT_EQ(state_of(folder_.read_state(1)), "none");
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "out/0000.exr"));
+}
+
+TEST_F(FarmTask, OnAMachineThatCannotIsForAnother) {
+  submit();
+  machine_.host = "node2";
+  machine_.software = "previzd 0.0";
+  EXPECT_EQ(run(1), task_status::machine_fault);
+  EXPECT_THAT(state_of(folder_.read_state(1)),
+              StartsWith("machine: previzd 0.0 is installed here"));
+  machine_ = this_machine();
+  machine_.open_device = [](const auto&) -> std::shared_ptr<render::Device> {
+    throw Error("no Vulkan device");
+  };
+  EXPECT_EQ(run(2), task_status::machine_fault);
+  EXPECT_EQ(state_of(folder_.read_state(2)), "machine: no Vulkan device");
+  JobOptions asked;
+  asked.job = folder_.path();
+  print_status(asked, out_);
+  EXPECT_THAT(out_.str(), HasSubstr("0 of 8 frames done, 0 tasks running, 2 failed"));
+  EXPECT_THAT(out_.str(), HasSubstr("task 1, frames 3 to 5 of session: node2: previzd 0.0 is"));
+}
+
+TEST_F(FarmTask, ThatIsMissingIsNamedAndTriedAgain) {
+  submit();
+  EXPECT_EQ(run(0), task_status::done);
+  EXPECT_EQ(run(2), task_status::done);
+  EXPECT_EQ(finish(), task_status::machine_fault);
+  EXPECT_THAT(out_.str(), HasSubstr("session: frames 3 to 5: not begun"));
+  EXPECT_THAT(out_.str(), HasSubstr("3 frames are missing; `previzd farm retry`"));
+  const auto missing = nlohmann::json::parse(content_of(folder_.missing_file()));
+  EXPECT_EQ(missing[0]["frames"], (std::vector<int>{3, 4, 5}));
+  const auto before = std::filesystem::last_write_time(directory_ / "out/0000.exr");
+  run_all();
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  EXPECT_EQ(std::filesystem::last_write_time(directory_ / "out/0000.exr"), before);
+  EXPECT_FALSE(std::filesystem::exists(folder_.missing_file()));
+}
+
+// Before the last step and after it.
+TEST_F(FarmTask, WhosePictureWasDamagedIsFoundAndTriedAgain) {
+  submit();
+  run_all();
+  write_content(folder_.chunk(0) / "0001.exr", "damaged");
+  EXPECT_EQ(finish(), task_status::machine_fault);
+  EXPECT_THAT(out_.str(), HasSubstr("session: frame 1: frame 1: its .exr has another size"));
+  EXPECT_EQ(run(0), task_status::done);
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  write_content(directory_ / "out/0004.png", "damaged");
+  EXPECT_EQ(finish(), task_status::machine_fault);
+  EXPECT_EQ(run(1), task_status::done);
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  expect_pictures_of_one_run({});
+}
+
+// After a failure of the network two machines may have one task.
+TEST_F(FarmTask, ThatRunsTwiceDoesNoHarm) {
+  submit();
+  const std::jthread other([&] {
+    TaskOptions task;
+    task.job = folder_.path();
+    std::ostringstream out;
+    EXPECT_EQ(run_task(task, machine_, out), task_status::done) << out.str();
+  });
+  EXPECT_EQ(run(0), task_status::done) << out_.str();
+}
+
+TEST_F(FarmTask, ThatIsAtWorkIsLeftAloneByTheLastStep) {
+  submit();
+  run_all();
+  post::FolderLocks other(folder_.chunk(1));
+  {
+    const post::FolderLocks::Transaction transaction(other);
+    other.join();
+  }
+  EXPECT_EQ(finish(), task_status::machine_fault);
+  EXPECT_THAT(out_.str(), HasSubstr("session: frames 3 to 5: is being rendered"));
+}
+
+TEST_F(FarmTask, OfAnotherKindOfDeviceIsNotTaken) {
+  options_.any_device = false;
+  options_.on_gpu = render::is_gpu(*machine_.open_device({}));
+  submit();
+  run_all();
+  const std::filesystem::path file = folder_.chunk(2) / "frames.jsonl";
+  std::string lines = content_of(file);
+  const std::string is = options_.on_gpu.value() ? "true" : "false",
+                    is_not = is == "true" ? "false" : "true";
+  lines.replace(lines.find("\"is_gpu\":" + is), 9 + is.size(), "\"is_gpu\":" + is_not);
+  write_content(file, lines);
+  EXPECT_EQ(finish(), task_status::machine_fault);
+  EXPECT_THAT(out_.str(), HasSubstr("session: frame 6: frame 6: was rendered on "));
+  EXPECT_THAT(out_.str(), HasSubstr("--any-device allows both"));
+}
+
+// A plan that came from elsewhere chooses neither a place nor a program.
+TEST_F(FarmTask, WritesBesideTheJobOnlyUnlessItIsAllowed) {
+  test::TemporaryDirectory elsewhere;
+  options_.render.directory = elsewhere / "out";
+  submit();
+  EXPECT_EQ(run(0), task_status::job_fault);
+  EXPECT_THAT(out_.str(), HasSubstr("is not beside the job's folder"));
+  JobOptions job;
+  job.job = folder_.path();
+  EXPECT_THAT(test::error_of([&] { farm::finish(job, out_); }), HasSubstr("--any-paths"));
+  EXPECT_FALSE(std::filesystem::exists(elsewhere / "out/0000.exr"));
+}
+
+TEST_F(FarmTask, OfALinkedPlanIsRefused) {
+  submit();
+  std::filesystem::rename(folder_.plan(), directory_ / "plan.json");
+  std::filesystem::create_symlink(directory_ / "plan.json", folder_.plan());
+  EXPECT_EQ(run(0), task_status::job_fault);
+  EXPECT_THAT(out_.str(), HasSubstr("job.json: is a link"));
+}
+
+TEST_F(FarmTask, OfASecondJobInOneFolderIsRefused) {
+  submit();
+  EXPECT_THAT(test::error_of([&] { submit(); }), HasSubstr("a job is there already"));
+}
+
+TEST_F(FarmTask, LeavesOutWhatIsRenderedAlready) {
+  post::RenderOptions before = options_.render;
+  before.session = directory_ / "session";
+  before.frames = post::FrameRange{0, 4};
+  std::ostringstream out;
+  post::render_session(before, out);
+  submit();
+  EXPECT_EQ(run(1), task_status::done);
+  EXPECT_FALSE(std::filesystem::exists(folder_.chunk(1) / "0003.exr"));
+  EXPECT_TRUE(std::filesystem::exists(folder_.chunk(1) / "0005.exr"));
+  EXPECT_EQ(run(2), task_status::done);
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+}
+
+TEST_F(FarmTask, OfManyFramesIsPlannedInLittleTimeAndSpace) {
+  std::set<std::uint64_t> frames;
+  for (std::uint64_t frame = 0; frame < 10'000; ++frame) frames.insert(frame);
+  Job job;
+  job.takes.emplace_back();
+  job.takes[0].session = job.takes[0].pictures = "/a";
+  job.takes[0].frames = {0, 9'999};
+  Division division;
+  division.chunk = 1;
+  divide(frames, 0, 1, division, job.chunks);
+  const std::string text = to_json(job);
+  EXPECT_LT(text.size(), 2'000'000u);
+  EXPECT_EQ(job_from_json(text, "plan").chunks.size(), 10'000u);
+}
+
+TEST_F(FarmTask, DryRunWritesNothing) {
+  options_.dry_run = true;
+  submit();
+  EXPECT_THAT(out_.str(), HasSubstr("sbatch --parsable --array=0-2 "));
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "job"));
+  EXPECT_FALSE(std::filesystem::exists(directory_ / "out"));
+}
+
+}  // namespace previz::farm::task_test
