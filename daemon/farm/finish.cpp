@@ -13,6 +13,7 @@
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
+#include "drivers/session/timecode.hpp"
 
 namespace previz::farm {
 namespace {
@@ -140,6 +141,26 @@ void TakeProof::run(Proof& proof) {
                         ", whose pictures differ in the last bits");
 }
 
+// Makes the video of a take, and puts its lines in the order of the frames.
+void complete_take(const JobFolder& folder, const Job& job, const JobTake& take,
+                   std::ostream& out) {
+  session::TakeClock clock;
+  if (take.video) {
+    post::RenderOptions options = folder.render_options(job, take);
+    options.directory = take.pictures;
+    options.frames = take.frames;
+    clock = post::plan_render(options).clock;
+  }
+  constexpr post::FrameRange none{1, 0};  // all were looked at a moment ago
+  post::RenderDirectory pictures(output_of(take, take.pictures, take.video), take.settings, false,
+                                 clock, none);
+  if (!take.video) return;
+  std::vector<post::FinishedFrame> frames;
+  for (std::uint64_t frame = take.frames.first; frame <= take.frames.last; ++frame)
+    if (const post::FinishedFrame* finished = pictures.finished(frame)) frames.push_back(*finished);
+  pictures.write_video(frames, out);
+}
+
 }  // namespace
 
 Proof prove(const JobFolder& folder, const Job& job, std::ostream& out,
@@ -157,20 +178,7 @@ Proof prove(const JobFolder& folder, const Job& job, std::ostream& out,
 }
 
 void complete(const JobFolder& folder, const Job& job, std::ostream& out) {
-  for (const JobTake& take : job.takes) {
-    if (!take.video) continue;
-    post::RenderOptions options = folder.render_options(job, take);
-    options.directory = take.pictures;
-    options.frames = take.frames;
-    const post::RenderPlan plan = post::plan_render(options);
-    post::RenderDirectory pictures(output_of(take, take.pictures, true), take.settings, false,
-                                   plan.clock, {1, 0});
-    std::vector<post::FinishedFrame> frames;
-    for (std::uint64_t frame = take.frames.first; frame <= take.frames.last; ++frame)
-      if (const post::FinishedFrame* finished = pictures.finished(frame))
-        frames.push_back(*finished);
-    pictures.write_video(frames, out);
-  }
+  for (const JobTake& take : job.takes) complete_take(folder, job, take, out);
   for (std::size_t chunk = 0; chunk < job.chunks.size(); ++chunk) {
     std::error_code stays;
     std::filesystem::remove_all(folder.chunk(chunk), stays);

@@ -28,9 +28,8 @@ constexpr std::uint64_t exr_bytes_a_pixel = 4 * 44, png_bytes_a_pixel = 6;
 
 // Returns how many sample ranges a frame can be divided into with these settings.
 int most_sample_ranges(const set::Quality& quality) {
-  const bool is_fixed = quality.error <= 0 && quality.seconds <= 0 &&
-                        !pipeline::spreads_samples(quality) && post::neighbours_of(quality) == 0;
-  return is_fixed ? render::part_count(quality.samples) : 1;
+  const bool divides = pipeline::has_fixed_samples(quality) && post::neighbours_of(quality) == 0;
+  return divides ? render::part_count(quality.samples) : 1;
 }
 
 std::uint64_t frame_bytes(const post::RenderPlan& plan, double scale) {

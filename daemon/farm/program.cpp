@@ -6,8 +6,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 
@@ -68,21 +70,29 @@ bool read_some(const OwnedDescriptor& from, std::string& text) {
   return true;
 }
 
-void read_both(Pipe& out, Pipe& errors, ProgramResult& result) {
+// Reads both until their ends; returns false if that is not within `patience`.
+bool read_both(Pipe& out, Pipe& errors, ProgramResult& result, std::chrono::milliseconds patience) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point end = Clock::now() + patience;
   while (out.read || errors.read) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - Clock::now());
+    if (left.count() <= 0) return false;
     std::array<pollfd, 2> ends{pollfd{out.read ? out.read.get() : -1, POLLIN, 0},
                                pollfd{errors.read ? errors.read.get() : -1, POLLIN, 0}};
-    if (::poll(ends.data(), ends.size(), -1) < 0 && errno != EINTR) break;
+    if (::poll(ends.data(), ends.size(), static_cast<int>(left.count())) < 0 && errno != EINTR)
+      return false;
     if (ends[0].revents != 0 && !read_some(out.read, result.out)) out.read = OwnedDescriptor();
     if (ends[1].revents != 0 && !read_some(errors.read, result.errors))
       errors.read = OwnedDescriptor();
   }
+  return true;
 }
 
 }  // namespace
 
 std::string ProgramResult::why() const {
   if (!is_there) return "it is not installed";
+  if (is_late) return "no answer in time";
   std::string last;
   for (std::size_t begin = 0; begin < errors.size();) {
     const std::size_t end = std::min(errors.find('\n', begin), errors.size());
@@ -92,7 +102,8 @@ std::string ProgramResult::why() const {
   return last.empty() ? "exit status " + std::to_string(status) : last;
 }
 
-ProgramResult run_program(const std::string& program, const std::vector<std::string>& arguments) {
+ProgramResult run_program(const std::string& program, const std::vector<std::string>& arguments,
+                          std::chrono::milliseconds patience) {
   Pipe out = make_pipe(), errors = make_pipe();
   pid_t pid = -1;
   ProgramResult result;
@@ -104,7 +115,8 @@ ProgramResult run_program(const std::string& program, const std::vector<std::str
   if (error != 0) throw Error(program + ": cannot be started: " + std::strerror(error));
   out.write = OwnedDescriptor();
   errors.write = OwnedDescriptor();
-  read_both(out, errors, result);
+  result.is_late = !read_both(out, errors, result, patience);
+  if (result.is_late) ::kill(pid, SIGKILL);
   int status = 0;
   while (::waitpid(pid, &status, 0) < 0 && errno == EINTR) {
   }

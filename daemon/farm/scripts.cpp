@@ -30,20 +30,35 @@ std::string call(const ScriptPlaces& places, const std::string& what) {
   return "\"$previzd\" farm " + what + (places.any_paths ? " --any-paths" : "");
 }
 
-void add_common(const JobFolder& folder, const Job& job, std::vector<std::string>& arguments) {
+// Slurm replaces what follows a % in the name of a log, and nothing in one with a backslash.
+bool is_plain(const std::filesystem::path& path) {
+  return path.string().find_first_of("%\\") == std::string::npos;
+}
+
+// Returns a line by which a script writes its own log, where Slurm cannot.
+std::string own_log(const ScriptPlaces& places, const std::string& name) {
+  return is_plain(places.job) ? "" : "exec >>\"$job/log/" + name + "\" 2>&1\n";
+}
+
+void add_common(const JobFolder& folder, const Job& job, const std::string& log,
+                std::vector<std::string>& arguments) {
+  const bool plain = is_plain(folder.path());
   arguments.push_back("--job-name=" + folder.name());
-  arguments.push_back("--chdir=" + folder.path().string());
+  arguments.push_back("--chdir=" + (plain ? folder.path().string() : "/"));
+  arguments.push_back("--output=" + (plain ? "log/" + log : "/dev/null"));
   arguments.push_back("--open-mode=append");
   arguments.push_back("--requeue");
-  if (job.on_gpu) {
-    arguments.push_back("--gres=gpu:1");
-  } else {  // all of a processor, and the memory beside it
-    arguments.push_back("--exclusive");
-    if (job.wishes.memory.empty()) arguments.push_back("--mem=0");
-  }
   if (!job.wishes.partition.empty()) arguments.push_back("--partition=" + job.wishes.partition);
   if (!job.wishes.time.empty()) arguments.push_back("--time=" + job.wishes.time);
-  if (!job.wishes.memory.empty()) arguments.push_back("--mem=" + job.wishes.memory);
+}
+
+// A graphics card, or all of a processor and the memory beside it.
+void add_device(const Job& job, std::vector<std::string>& arguments) {
+  arguments.emplace_back(job.on_gpu ? "--gres=gpu:1" : "--exclusive");
+  if (!job.wishes.memory.empty())
+    arguments.push_back("--mem=" + job.wishes.memory);
+  else if (!job.on_gpu)
+    arguments.emplace_back("--mem=0");
 }
 
 std::string dependency(const std::vector<std::string>& after) {
@@ -78,8 +93,8 @@ std::string slurm_tasks(const ScriptPlaces& places) {
          R"sh(task=$((SLURM_ARRAY_TASK_ID + ${1:-0}))
 # Slurm gives a task processors, and only some sites hold it to them.
 [[ -z ${SLURM_CPUS_ON_NODE:-} ]] || export LP_NUM_THREADS=$SLURM_CPUS_ON_NODE
-)sh" + call(places, "task \"$job\" \"$task\"") +
-         " &" + "\n" + wait_for_previzd +
+)sh" + own_log(places, "$(printf %04d \"$task\").log") +
+         call(places, "task \"$job\" \"$task\"") + " &" + "\n" + wait_for_previzd +
          R"sh(if [[ $status == 75 && ${SLURM_RESTART_COUNT:-0} -lt 3 ]]; then
   # This machine stays taken for a while, so that it does not refuse one task after the other.
   sleep "${PREVIZ_FARM_WAIT_S:-120}"
@@ -92,7 +107,7 @@ exit "$status"
 
 std::string slurm_finish(const ScriptPlaces& places) {
   return head(places, "The last step of a job: proves that every frame is there and whole.") +
-         call(places, "finish \"$job\"") + "\n";
+         own_log(places, "finish.log") + call(places, "finish \"$job\"") + "\n";
 }
 
 std::string shell_loop(const ScriptPlaces& places, const Job& job) {
@@ -154,9 +169,8 @@ std::vector<std::string> sbatch_arguments(const JobFolder& folder, const Job& jo
                       (job.wishes.at_once > 0 ? "%" + std::to_string(job.wishes.at_once) : ""));
   arguments.push_back("--comment=" + std::to_string(offset));  // by which squeue names the chunk
   // %4a has at least four digits, as the chunks have.
-  arguments.push_back(offset == 0 ? "--output=log/%4a.log"
-                                  : "--output=log/" + std::to_string(offset) + "+%4a.log");
-  add_common(folder, job, arguments);
+  add_common(folder, job, (offset == 0 ? "" : std::to_string(offset) + "+") + "%4a.log", arguments);
+  add_device(job, arguments);
   if (!after.empty()) arguments.push_back(dependency(after));
   arguments.insert(arguments.end(), more.begin(), more.end());
   arguments.push_back(folder.task_script().string());
@@ -167,8 +181,8 @@ std::vector<std::string> sbatch_arguments(const JobFolder& folder, const Job& jo
 std::vector<std::string> sbatch_finish_arguments(const JobFolder& folder, const Job& job,
                                                  const std::vector<std::string>& after,
                                                  const std::vector<std::string>& more) {
-  std::vector<std::string> arguments{"--parsable", "--output=log/finish.log"};
-  add_common(folder, job, arguments);
+  std::vector<std::string> arguments{"--parsable"};
+  add_common(folder, job, "finish.log", arguments);
   arguments.push_back(dependency(after));
   arguments.insert(arguments.end(), more.begin(), more.end());
   arguments.push_back(folder.finish_script().string());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <ostream>
 #include <sstream>
 
@@ -24,7 +25,8 @@ std::optional<std::uint64_t> number_in(const std::string& text) {
 
 // Returns how many numbers an array may have.
 std::size_t array_size() {
-  const ProgramResult config = run_program("scontrol", {"show", "config"});
+  // Where there is no cluster to be asked, it looks for one for half a minute.
+  const ProgramResult config = run_program("scontrol", {"show", "config"}, std::chrono::seconds(5));
   std::istringstream lines(config.out);
   for (std::string line; std::getline(lines, line);) {
     if (!line.starts_with("MaxArraySize")) continue;

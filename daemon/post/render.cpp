@@ -228,15 +228,21 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
   return frames.left();
 }
 
-// Throws previz::Error if the memory that the neighbours take is not there.
-void check_neighbours(const RenderOptions& options, const pipeline::Take& take,
-                      const render::Device& device) {
+// Throws previz::Error if the memory that the neighbours take is not there, or that the parts of
+// the samples' sums do.
+void check_memory(const RenderOptions& options, const pipeline::Take& take,
+                  const render::Device& device) {
   const int neighbours = neighbours_of(take.set.quality);
-  if (neighbours == 0) return;
+  const int parts = pipeline::has_fixed_samples(take.set.quality)
+                        ? render::part_count(take.set.quality.samples)
+                        : 1;
+  if (neighbours == 0 && parts == 1) return;
   const PinholeIntrinsics picture = pipeline::scaled(take.observer, options.scale).intrinsics;
   const std::uint64_t free_bytes =
       options.free_memory ? *options.free_memory
                           : output::free_memory_bytes().value_or(output::memory_bytes());
+  render::refuse_too_many_parts(picture.width, picture.height, parts, free_bytes);
+  if (neighbours == 0) return;
   render::refuse_too_many_neighbours(picture.width, picture.height,
                                      {neighbours, take.observer_stream->records().size()},
                                      render::memory_of(device), free_bytes);
@@ -258,7 +264,7 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
       options.open_device ? options.open_device
                           : render::open_device(render::options_for(
                                 options.device, take.set.quality.hardware_rays));
-  check_neighbours(options, take, *device);
+  check_memory(options, take, *device);
   out << take.session.info.name << ": " << to_do.size() << " frames of "
       << size_words(pipeline::scaled(take.observer, options.scale).intrinsics) << ", "
       << quality_words(take.set.quality)

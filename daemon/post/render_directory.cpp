@@ -291,7 +291,7 @@ std::vector<FinishedFrame> RenderDirectory::reject(
   return rejected;
 }
 
-std::size_t RenderDirectory::adopt(const RenderDirectory& from) {
+std::size_t RenderDirectory::adopt(RenderDirectory& from) {
   const std::lock_guard guard(mutex_);
   const FolderLocks::Transaction transaction(*locks_);
   read_lines();
@@ -313,7 +313,18 @@ std::size_t RenderDirectory::adopt(const RenderDirectory& from) {
   }
   session::sync_names(path());
   lines_state_ = state_of(path() / lines_name);
+  from.forget(taken);
   return taken.size();
+}
+
+// Takes away the lines of frames whose files have gone.
+void RenderDirectory::forget(const std::vector<FinishedFrame>& frames) {
+  const std::lock_guard guard(mutex_);
+  const FolderLocks::Transaction transaction(*locks_);
+  read_lines();
+  for (const FinishedFrame& frame : frames) finished_.erase(frame.frame);
+  write_lines();
+  lines_state_ = state_of(path() / lines_name);
 }
 
 std::string RenderDirectory::settings() const {

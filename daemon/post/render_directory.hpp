@@ -87,10 +87,11 @@ class RenderDirectory {
   void write(const pipeline::Shot& shot, const set::Set& set, const MadeOn& made_on = {});
 
   // Takes over what is finished in the range of another folder: the lines, then the files, which
-  // are moved, or copied and compared where it is on another file system. Frames that are finished
-  // here stay as they are, in both folders. Whoever calls has found the settings of both the same.
-  // What a crash interrupts, the next call completes. Returns the number of frames taken over.
-  std::size_t adopt(const RenderDirectory& from);
+  // are moved, or copied and compared where it is on another file system; the other folder then has
+  // neither. Frames that are finished here stay as they are, in both folders. Whoever calls has
+  // found the settings of both the same. What a crash interrupts, the next call completes. Returns
+  // the number of frames taken over.
+  std::size_t adopt(RenderDirectory& from);
 
   // Encodes the pictures of these frames to review.mp4 (or .mkv) and names the codec on `out`.
   std::filesystem::path write_video(const std::vector<FinishedFrame>& frames,
@@ -110,6 +111,7 @@ class RenderDirectory {
   std::string differences_from(const std::string& settings) const;
   void read_lines();
   void write_lines() const;
+  void forget(const std::vector<FinishedFrame>& frames);
   void verify(FrameRange range, const std::stop_token& stop);
   void reject_without_line(FrameRange range);
 

@@ -1,6 +1,7 @@
 #include "daemon/render/picture_memory.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cstdio>
 #include <glm/vec2.hpp>
 #include <string>
@@ -91,6 +92,21 @@ std::uint64_t kept_bytes(int width, int height, const Averaging& averaging) {
       static_cast<std::uint64_t>(averaging.each_side) + 1 + finished, averaging.take_frames);
   return pixels_of(width, height) *
          (averaging.frames() * (sum_bytes + plate_bytes) + waiting * bare_layer_bytes);
+}
+
+std::uint64_t part_bytes(int width, int height, int parts) {
+  if (parts < 2) return 0;
+  return pixels_of(width, height) * sum_bytes *
+         static_cast<std::uint64_t>(std::bit_width(static_cast<unsigned>(parts)));
+}
+
+void refuse_too_many_parts(int width, int height, int parts, std::uint64_t free_bytes) {
+  const std::uint64_t needed = part_bytes(width, height, parts);
+  if (needed <= free_bytes) return;
+  throw Error("a picture of " + size_words(width, height) + " with so many samples takes " +
+              gigabytes(needed) + " of the computer's memory for the parts of their sum, and " +
+              gigabytes(free_bytes) +
+              " are free; make the picture smaller (--scale), or give fewer samples (--spp)");
 }
 
 void refuse_too_many_neighbours(int width, int height, const Averaging& averaging,

@@ -51,4 +51,10 @@ std::uint64_t kept_bytes(int width, int height, const Averaging& averaging);
 void refuse_too_many_neighbours(int width, int height, const Averaging& averaging,
                                 const PictureMemory& memory, std::uint64_t free_bytes);
 
+// Returns how many bytes of the computer's memory the sums of a picture's parts take, where its
+// samples are summed in this many (SumTree): one for each level of the tree.
+std::uint64_t part_bytes(int width, int height, int parts);
+// Throws previz::Error where they are more than `free_bytes`.
+void refuse_too_many_parts(int width, int height, int parts, std::uint64_t free_bytes);
+
 }  // namespace previz::render

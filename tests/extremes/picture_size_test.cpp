@@ -127,4 +127,15 @@ TEST(PictureSize, OfMoreThanTheDeviceHoldsIsRefusedByTheRenderer) {
   }
 }
 
+// 16 parts are summed in a tree of five levels, each with 176 bytes a pixel.
+TEST(PictureSize, WhosePartsHaveNoRoomIsRefused) {
+  EXPECT_EQ(render::part_bytes(3840, 2160, 16), 5ull * 176 * 3840 * 2160);
+  EXPECT_EQ(render::part_bytes(3840, 2160, 1), 0u);
+  const std::string refusal =
+      test::error_of([] { render::refuse_too_many_parts(3840, 2160, 16, 4'000'000'000); });
+  EXPECT_THAT(refusal, HasSubstr("takes 7.3 GB of the computer's memory"));
+  EXPECT_THAT(refusal, HasSubstr("4 GB are free; make the picture smaller (--scale)"));
+  render::refuse_too_many_parts(3840, 2160, 16, 8'000'000'000);
+}
+
 }  // namespace previz::test::picture_size_test

@@ -2,6 +2,7 @@
 // write down their arguments; tests/farm does the same with a real cluster.
 #include "daemon/farm/slurm.hpp"
 
+#include "daemon/farm/program.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
@@ -46,7 +47,8 @@ TEST_F(Slurm, GetsArraysThatItAllowsAndTheLastStepAfterThem) {
   const std::string all = calls();
   EXPECT_THAT(all, HasSubstr("--array=0-1000%8 "));
   EXPECT_THAT(all, HasSubstr("--array=0-497%8 "));
-  EXPECT_THAT(all, HasSubstr("--partition=render --time=1:00:00 --account=film "));
+  EXPECT_THAT(all,
+              HasSubstr("--partition=render --time=1:00:00 --exclusive --mem=0 --account=film "));
   EXPECT_THAT(all, HasSubstr("tasks.sh 2002\n"));
   EXPECT_THAT(all, HasSubstr("--dependency=afterany:17:18:19 --account=film "));
   const Submitted submitted = folder_.read_submitted();
@@ -118,6 +120,15 @@ TEST_F(Slurm, CancelsOnlyWhatHasTheJobsName) {
   EXPECT_THAT(calls(), HasSubstr("scancel --name=" + folder_.name() + " 1 2 3\n"));
   session::write_content(folder_.path() / "submitted.json", R"({"tasks": ["--user=root"]})");
   EXPECT_THAT(test::error_of([&] { cancel_tasks(folder_); }), HasSubstr("cannot be understood"));
+}
+
+// Its daemon may be down, and its programs then wait for minutes.
+TEST_F(Slurm, ThatHangsIsNotWaitedFor) {
+  stand_in("hang", "exec sleep 60");
+  const ProgramResult result = run_program("hang", {}, std::chrono::milliseconds(50));
+  EXPECT_TRUE(result.is_late);
+  EXPECT_FALSE(result.is_good());
+  EXPECT_EQ(result.why(), "no answer in time");
 }
 
 TEST_F(Slurm, IsNotEverywhere) {

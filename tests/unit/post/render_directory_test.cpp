@@ -113,8 +113,13 @@ TEST_F(RenderDirectoryTest, TakesOverWhatAnotherFolderHas) {
   }
   open().write(sample_shot(1), set_, {"the first", false});
   const std::string exr = content_of(directory_ / "part/0002.exr");
-  const RenderDirectory from(part, settings, false, {}, {0, 2});
-  EXPECT_EQ(open().adopt(from), 2u);
+  {
+    RenderDirectory from(part, settings, false, {}, {0, 2});
+    EXPECT_EQ(open().adopt(from), 2u);
+  }
+  RenderDirectory left(part, settings, false);
+  EXPECT_EQ(finished(left, 3), "nyny");
+  EXPECT_TRUE(left.rejected().empty());
   EXPECT_EQ(content_of(directory_ / "out/0002.exr"), exr);
   EXPECT_FALSE(std::filesystem::exists(directory_ / "part/0002.exr"));
   EXPECT_FALSE(std::filesystem::exists(directory_ / "part/0002.png"));
@@ -123,7 +128,7 @@ TEST_F(RenderDirectoryTest, TakesOverWhatAnotherFolderHas) {
   EXPECT_EQ(finished(again, 3), "yyyn");
   EXPECT_EQ(again.finished(1)->made_on.device, "the first");
   EXPECT_TRUE(again.rejected().empty());
-  EXPECT_EQ(open().adopt(RenderDirectory(part, settings, false, {}, {0, 2})), 0u);
+  EXPECT_EQ(open().adopt(left), 1u);
 }
 
 // A crash after the lines were written, and before all files were moved.
@@ -138,7 +143,8 @@ TEST_F(RenderDirectoryTest, GoesOnWithWhatItHadBegunToTakeOver) {
                              std::filesystem::copy_options::overwrite_existing);
   for (const char* name : {"0000.exr", "0000.png"})
     std::filesystem::rename(directory_ / "part" / name, directory_ / "out" / name);
-  EXPECT_EQ(open().adopt(RenderDirectory(part, settings, false)), 1u);
+  RenderDirectory from(part, settings, false);
+  EXPECT_EQ(open().adopt(from), 1u);
   EXPECT_EQ(finished(open(), 1), "yy");
 }
 
