@@ -169,11 +169,13 @@ Proof prove(const JobFolder& folder, const Job& job, std::ostream& out,
   for (std::size_t take = 0; take < job.takes.size(); ++take)
     TakeProof(folder, job, take, out, stop).run(proof);
   // A frame that is merged again needs its sums again, unless they are there.
-  std::set<std::size_t> sums;
-  for (const std::size_t merge : proof.chunks)
-    for (std::size_t chunk = 0; chunk < job.first_merge(); ++chunk)
-      if (is_merged_of(job, merge, chunk)) sums.insert(chunk);
-  proof.chunks.insert(sums.begin(), sums.end());
+  const std::size_t merges = job.first_merge();
+  std::set<std::pair<std::size_t, std::uint64_t>> merged;  // take and first frame
+  for (auto at = proof.chunks.lower_bound(merges); at != proof.chunks.end(); ++at)
+    merged.emplace(job.chunks[*at].take, job.chunks[*at].frames.first);
+  for (std::size_t chunk = 0; chunk < merges && !merged.empty(); ++chunk)
+    if (merged.contains({job.chunks[chunk].take, job.chunks[chunk].frames.first}))
+      proof.chunks.insert(chunk);
   return proof;
 }
 

@@ -98,7 +98,7 @@ post::RenderOptions Task::render_options() const {
   if (chunk_.kind == ChunkKind::sums)
     options.sample_range = render::SampleRange{chunk_.range, job_.sample_ranges};
   if (chunk_.kind == ChunkKind::merge)
-    for (std::size_t other = 0; other < job_.first_merge(); ++other)
+    for (std::size_t other = 0; other < options_.chunk; ++other)
       if (is_merged_of(job_, options_.chunk, other))
         options.sums_from.push_back(folder_.chunk(other));
   options.open_device = device_;
