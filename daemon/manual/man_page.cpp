@@ -42,6 +42,12 @@ std::string joined(const Words& words, const std::string& separator, Style style
   return out;
 }
 
+// "previzd farm" has the page previzd-farm.
+std::string page_name(std::string path) {
+  std::ranges::replace(path, ' ', '-');
+  return path;
+}
+
 void head(std::ostream& out, const std::string& name, int section, const std::string& about) {
   std::string title = name;
   std::ranges::transform(title, title.begin(), [](unsigned char c) { return std::toupper(c); });
@@ -76,10 +82,17 @@ void print(std::ostream& out, const Option& option) {
 // "previzd render [OPTION...] session"
 std::string usage(const Command& command) {
   std::string line = fmt::format("{} [{}...]", bold(command.path), italic("OPTION"));
-  if (!command.subcommands.empty()) line += fmt::format(" {}", italic("COMMAND"));
   for (const Option& option : command.options)
     if (option.positional) line += fmt::format(" {}", term_of(option));
   return line;
+}
+
+// Returns how a program or a command with commands of its own is called: with one of them, or, if
+// it has an argument, also without.
+std::string usage_with_commands(const Command& command) {
+  const bool has_argument = std::ranges::any_of(command.options, &Option::positional);
+  return (has_argument ? usage(command) + "\n.br\n" : "") +
+         fmt::format("{} [{}...] {}", bold(command.path), italic("OPTION"), italic("COMMAND"));
 }
 
 void print(std::ostream& out, const Command& command) {
@@ -121,8 +134,8 @@ std::string man_page(const std::vector<Command>& commands, int section,
                      const std::vector<Chapter>& chapters) {
   std::ostringstream out;
   const Command& program = commands.front();
-  head(out, program.path, section, program.about);
-  out << ".SH SYNOPSIS\n" << usage(program) << "\n.SH OPTIONS\n";
+  head(out, page_name(program.path), section, program.about);
+  out << ".SH SYNOPSIS\n" << usage_with_commands(program) << "\n.SH OPTIONS\n";
   print(out, program);
   out << ".SH COMMANDS\n";
   for (const Command& command : commands)

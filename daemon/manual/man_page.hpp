@@ -17,7 +17,8 @@ struct Chapter {
   bool is_list = false;
 };
 
-// Returns the page of a program: what it does, its commands with their options, and `chapters`.
+// Returns the page of a program, or of a command of one: what it does, its commands with their
+// options, and `chapters`. The program or command itself comes first in `commands`.
 std::string man_page(const std::vector<Command>& commands, int section,
                      const std::vector<Chapter>& chapters);
 

@@ -6,6 +6,7 @@
 #include "daemon/control/request.hpp"
 #include "daemon/manual/command.hpp"
 #include "daemon/manual/completion.hpp"
+#include "daemon/manual/farm_chapters.hpp"
 #include "daemon/manual/man_page.hpp"
 #include "daemon/set/actions.hpp"
 
@@ -17,6 +18,28 @@ std::vector<Command> previzd_commands() {
   CommandLine said;
   add_commands(app, said);
   return commands_of(app);
+}
+
+bool is_of_farm(const Command& command) {
+  return command.path == "previzd farm" || command.path.starts_with("previzd farm ");
+}
+
+// Returns the commands of previzd(8), where `farm` is one line: it has a page of its own.
+std::vector<Command> general_commands() {
+  std::vector<Command> commands = previzd_commands();
+  for (Command& command : commands)
+    if (command.path == "previzd farm")
+      command = {"previzd farm", command.about + ". See previzd-farm(1)", {}, {}};
+  std::erase_if(commands, [](const Command& command) {
+    return is_of_farm(command) && command.path != "previzd farm";
+  });
+  return commands;
+}
+
+std::vector<Command> farm_commands() {
+  std::vector<Command> commands = previzd_commands();
+  std::erase_if(commands, [](const Command& command) { return !is_of_farm(command); });
+  return commands;
 }
 
 std::vector<Command> previzctl_commands() {
@@ -63,6 +86,8 @@ previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with 
 previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
 previzd render takes/12A_take003 --frames 40 --spp 4096 --neighbours 0 --sample-range 1/2 --out first: Renders the first half of a heavy frame's samples, while another computer renders 2/2.
 previzd merge takes/12A_take003 first second --frames 40 --spp 4096 --neighbours 0 --out renders/12A_take003: Makes the picture of both halves. If both computers have the same graphics card and driver, it is the picture of one, to the last bit.
+previzd farm takes/12A_take003 --out renders/12A_take003 --nodes 3: Divides the rendering of a take between three machines, by Slurm where it is installed, and otherwise by a script to be started on each. previzd-farm(1) has the rest.
+previzd farm status renders/12A_take003.farm: Says how many frames are done, which tasks have failed, where and why, and how long the rest takes.
 previzd bench --page bench.html: Measures what this machine can do, in two minutes at most, and writes a page about it. The first thing to run on a new machine.
 previzd bench --no-hardware-rays: Measures it without the hardware that a graphics card may have for rays, to see what that brings.
 previzd bench desk.toml --json bench.json: Also measures the frames of a set, whose newest take is used, and writes all figures as JSON.
@@ -202,10 +227,11 @@ Chapter see_also(const std::string& pages) {
 
 std::vector<Page> man_pages() {
   return {{"previzd.8",
-           man_page(previzd_commands(), 8,
+           man_page(general_commands(), 8,
                     {service_chapter, examples_chapter, tags_chapter, model_chapter, lenses_chapter,
                      glossary_chapter, previzd_cameras, previzd_files, previzd_formats,
-                     previzd_status, see_also("previzctl(1), previz-set(5)")})},
+                     previzd_status, see_also("previzctl(1), previzd-farm(1), previz-set(5)")})},
+          {"previzd-farm.1", man_page(farm_commands(), 1, farm_chapters())},
           {"previzctl.1", man_page(previzctl_commands(), 1,
                                    {{"ACTIONS", actions_text()},
                                     previzctl_status,

@@ -1,4 +1,4 @@
-// Builds the three manual pages and the two shell completions that are installed with previzd.
+// Builds the four manual pages and the two shell completions that are installed with previzd.
 #pragma once
 
 #include <string>

@@ -73,6 +73,41 @@ TEST(ManualPages, ShowHowEachCommandIsCalled) {
   EXPECT_THAT(text, HasSubstr("\\fB\\-\\-estimator\\fR \\fBpaired\\fR|\\fBdifference\\fR\n"));
 }
 
+std::vector<Command> previzd_commands() {
+  CLI::App app{"", "previzd"};
+  CommandLine said;
+  add_commands(app, said);
+  return commands_of(app);
+}
+
+TEST(ManualPages, OfTheFarmHasEachOfItsCommandsAndOptions) {
+  const std::string text = page(man_pages(), "previzd-farm.1");
+  EXPECT_THAT(text, HasSubstr(".SH NAME\nprevizd\\-farm \\- Render takes on many machines"));
+  int commands = 0;
+  for (const Command& command : previzd_commands()) {
+    if (command.path != "previzd farm" && !command.path.starts_with("previzd farm ")) continue;
+    SCOPED_TRACE(command.path);
+    ++commands;
+    const std::size_t begin = text.find("\\fB" + command.path + "\\fR [");
+    ASSERT_NE(begin, std::string::npos);
+    const std::string after = text.substr(begin);
+    for (const Option& option : command.options)
+      for (std::string name : option.names) {
+        for (std::size_t at = 0; (at = name.find('-', at)) != std::string::npos; at += 2)
+          name.insert(at, "\\");
+        EXPECT_THAT(after, HasSubstr("\\f" + std::string(option.positional ? "I" : "B") + name));
+      }
+  }
+  EXPECT_EQ(commands, 6);
+}
+
+TEST(ManualPages, LeaveTheFarmsOptionsToItsOwnPage) {
+  const std::string text = page(man_pages(), "previzd.8");
+  EXPECT_THAT(text, HasSubstr(".SS \\fBprevizd farm\\fR"));
+  EXPECT_THAT(text, HasSubstr("See previzd\\-farm(1)."));
+  EXPECT_THAT(text, Not(HasSubstr("openjd")));
+}
+
 // Returns the terms of the list in a section of a page, without roff's escapes.
 std::vector<std::string> terms_of(const std::string& text, const std::string& section) {
   std::istringstream lines(text);
@@ -91,8 +126,11 @@ std::vector<std::string> terms_of(const std::string& text, const std::string& se
 }
 
 TEST(ManualPages, HaveExamplesThatTheCommandLineUnderstands) {
-  const std::vector<std::string> examples = terms_of(page(man_pages(), "previzd.8"), "EXAMPLES");
+  std::vector<std::string> examples = terms_of(page(man_pages(), "previzd.8"), "EXAMPLES");
   EXPECT_GE(examples.size(), 8u);
+  const std::vector<std::string> of_farm = terms_of(page(man_pages(), "previzd-farm.1"), "EXAMPLE");
+  EXPECT_GE(of_farm.size(), 5u);
+  examples.insert(examples.end(), of_farm.begin(), of_farm.end());
   for (const std::string& example : examples) {
     SCOPED_TRACE(example);
     CLI::App app{"", "previzd"};
