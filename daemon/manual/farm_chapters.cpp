@@ -27,13 +27,13 @@ Where there are fewer frames than machines, a frame's samples are divided into r
 The same without a job: `previzd render TAKE --sample-range 1/2 --out first` on one machine, 2/2 on another, then `previzd merge TAKE first second` with the same options. The merged picture is that of one run, to the last bit, if the machines have the same kind of graphics card and driver.
 )"},
       {"MACHINES THAT DIFFER", R"(
-A task that finds its machine unfit ends with 75 before the first frame, and `previzd farm status` shows its reason. The machine stays taken for two minutes, so that it does not refuse one task after the other, and Slurm gives the task to a machine again, three times at most.
+A task that finds its machine unfit ends with 75 before the first frame, and `previzd farm status` shows its reason. The machine stays taken for two minutes, so that it does not refuse one task after the other, and Slurm gives the task to a machine again, three times at most. The last two of these are faults of the job, and a task ends with 1.
 version: "previzd 0.1.0 is installed here, and the job was made with previzd 0.2.0": pictures of two versions may differ. Install the version of the job; the package previzd-farm has all that a machine needs.
 take: "the take is not found": its disk is not mounted on that machine, or at another place than where the job was made.
 room: "12 MB are free, and a frame may need 190 MB": of the disk of the job or of the pictures. Make room, then call `previzd farm retry`.
 clock: "the clock here is 300 s behind that of the job's disk": more than a minute. Set it, best by NTP (timedatectl).
-device: the job is rendered on graphics cards, and Vulkan finds none on that machine, or the other way round. Their pictures differ in the last bits, which shows as a step between two frames. Take the machine out of the partition, or make the job with `--any-device`. Cards of several models are no fault; the last step remarks on them.
-set: "the take, its set, or a file that it names was changed since the job was made": no machine can render this job to its end. The task ends with 1, tasks that wait are cancelled, stopped.txt has the reason, and the job is to be made again.
+device: the job is rendered on graphics cards, and Vulkan finds none on that machine, or the other way round. Their pictures differ in the last bits. Take the machine out of the partition, or make the job with `--any-device`. Cards of several models are no fault; the last step remarks on them.
+set: "the take, its set, or a file that it names was changed since the job was made": no machine can render this job to its end. Tasks that wait are cancelled, stopped.txt has the reason, and the job must be made again.
 folder: "is not beside the job's folder": a job that came from elsewhere does not choose where files are written. If it is yours, `--any-paths` allows it.
 )"},
       {"WITHOUT SLURM", R"(
