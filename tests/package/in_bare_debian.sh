@@ -10,6 +10,42 @@ fail() {
 }
 files() { find / -xdev \( -path /proc -o -path /sys -o -path /tmp -o -path /dev \) -prune -o -print | sort; }
 
+# purges_without_trace PACKAGE: whether a purge leaves nothing of what PACKAGE.deb installs.
+purges_without_trace() {
+  files >before
+  dpkg --install "$1.deb"
+  dpkg --purge "$1"
+  files >after
+  # Both lists are sorted. dpkg's own records and the backups of the user lists are not the package's.
+  comm -13 before after >new
+  sed -i -e '\|/var/lib/dpkg|d' -e '\|/etc/group-|d' -e '\|/etc/passwd-|d' -e '/shadow-/d' new
+  [[ ! -s new ]] || fail "purge left: $(cat new)"
+}
+
+step "install on a farm's computer"
+apt-get install --quiet=2 ./previzd-farm.deb >apt.log 2>&1 || { cat apt.log; fail "the farm's does not install"; }
+previzd --version
+previzd farm --help >/dev/null
+[[ -z $(find / -xdev -path /tmp -prune -o -path '*/system/previz*' -print) ]] || fail "the farm's has a systemd unit"
+[[ ! -e /etc/previzd && ! -e /var/lib/previzd ]] || fail "the farm's has the rig's folders"
+! id previz 2>/dev/null || fail "the farm's made the user previz"
+bash -c 'source /usr/share/bash-completion/completions/previzd; complete -p previzd' >/dev/null
+
+step "a job without a scheduler"
+previzd farm demo/session --set demo/demo.toml --frames 0-1 --scale 0.1 --spp 1 --cpu --out finished | tee plan
+grep -qF 'There is no Slurm here' plan || fail "the plan does not say how the job is started"
+bash finished.farm/loop.sh
+for file in 0000.png 0000.exr 0001.png 0001.exr; do
+  [[ -s finished/$file ]] || fail "the job has not made $file"
+done
+previzd farm status finished.farm | grep -qF '2 of 2 frames done' || fail "the job is not done"
+
+step "purge the farm's"
+dpkg --purge previzd-farm
+purges_without_trace previzd-farm
+# What the rig's package needs is not to be there for the farm's sake.
+apt-get autoremove --purge --quiet=2 >apt.log 2>&1 || { cat apt.log; fail "autoremove fails"; }
+
 step "install"
 apt-get install --quiet=2 ./previzd.deb >apt.log 2>&1 || { cat apt.log; fail "does not install"; }
 previzd --version
@@ -58,11 +94,11 @@ dpkg --purge previzd
 rm -r /var/lib/previzd
 
 step "install, and purge"
-files >before
-dpkg --install previzd.deb
-dpkg --purge previzd
-files >after
-# Both lists are sorted. dpkg's own records and the backups of the user lists are not the package's.
-comm -13 before after >new
-sed -i -e '\|/var/lib/dpkg|d' -e '\|/etc/group-|d' -e '\|/etc/passwd-|d' -e '/shadow-/d' new
-[[ ! -s new ]] || fail "purge left: $(cat new)"
+purges_without_trace previzd
+
+step "the rig's in the place of the farm's"
+dpkg --install previzd-farm.deb
+! dpkg --install previzd.deb 2>refusal || fail "both packages are installed"
+grep -q 'conflict' refusal || fail "the packages do not conflict: $(cat refusal)"
+apt-get install --quiet=2 ./previzd.deb >apt.log 2>&1 || { cat apt.log; fail "the farm's is in the way"; }
+[[ ! -e /usr/share/doc/previzd-farm ]] || fail "the farm's stayed beside the rig's"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# The Debian package, as a rig gets it: builds it, asks lintian, and installs, upgrades, removes and
-# purges it in a bare Debian 12 that is made for this and thrown away. Takes three minutes and the
-# network; as root, or as anyone who may make user namespaces.
-#   tests/package/run.sh [previzd.deb]      a package that is there already, instead of building one
+# The Debian packages, as a rig and a farm's computer get them: builds them, asks lintian, and installs,
+# upgrades, removes and purges them in a bare Debian 12 that is made for this and thrown away. Takes
+# three minutes and the network; as root, or as anyone who may make user namespaces.
+#   tests/package/run.sh [previzd.deb previzd-farm.deb]      packages that are there, instead of a build
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 here=tests/package
@@ -11,10 +11,12 @@ trap 'rm -rf "$work"' EXIT
 
 if [[ $# -gt 0 ]]; then
   cp "$1" "$work/previzd.deb"
+  cp "$2" "$work/previzd-farm.deb"
 else
   cmake --preset release --log-level=WARNING
   cmake --build --preset release --parallel "$(nproc)" --target deb
   cp build/release/previzd_*.deb "$work/previzd.deb"
+  cp build/release/previzd-farm_*.deb "$work/previzd-farm.deb"
 fi
 
 version=$(dpkg-deb --field "$work/previzd.deb" Version)
@@ -25,7 +27,22 @@ if [[ $version != "$logged" ]]; then
 fi
 dpkg-deb --raw-extract "$work/previzd.deb" "$work/unpacked"
 "$here/hardened.sh" "$work"/unpacked/usr/{bin/previz{d,ctl},libexec/previzd/previzd-aravis}
-lintian --fail-on error --info "$work/previzd.deb"
+lintian --fail-on error --info "$work/previzd.deb" "$work/previzd-farm.deb"
+
+# A farm's computer starts no rig: of the files, only the program, its pages and its completion.
+dpkg-deb --raw-extract "$work/previzd-farm.deb" "$work/farm"
+(cd "$work/farm" && find . -type f -not -path './DEBIAN/md5sums' | sort) >"$work/farm_files"
+diff - "$work/farm_files" <<'FILES'
+./DEBIAN/control
+./usr/bin/previzd
+./usr/share/bash-completion/completions/previzd
+./usr/share/doc/previzd-farm/changelog.gz
+./usr/share/doc/previzd-farm/copyright
+./usr/share/man/man1/previzd-farm.1.gz
+./usr/share/man/man5/previz-set.5.gz
+./usr/share/man/man8/previzd.8.gz
+FILES
+cmp "$work/farm/usr/bin/previzd" "$work/unpacked/usr/bin/previzd"
 
 # The same package with a later version and another default set: what an upgrade brings.
 dpkg-deb --raw-extract "$work/previzd.deb" "$work/later"
@@ -38,7 +55,8 @@ sources=$work/debian.sources
 cat /etc/apt/sources.list.d/*.sources >"$sources"
 mmdebstrap --quiet --variant=minbase --format=null --aptopt='APT::Install-Recommends "false"' \
   --customize-hook='mkdir "$1/tmp/package"' \
-  --customize-hook="copy-in $work/previzd.deb $work/later.deb $here/in_bare_debian.sh /tmp/package" \
+  --customize-hook="copy-in $work/previzd.deb $work/later.deb $work/previzd-farm.deb /tmp/package" \
+  --customize-hook="copy-in $here/in_bare_debian.sh config/demo /tmp/package" \
   --customize-hook='chroot "$1" bash /tmp/package/in_bare_debian.sh' \
   bookworm - "$sources"
 echo "tests/package: passed"
