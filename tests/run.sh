@@ -31,7 +31,7 @@
 #   mutations  breaks each promise of the fault table once, and looks whether its test fails
 #              (tests/mutations/run.sh)
 #   soak       half an hour of a whole rig (tests/soak)
-#   package    builds the .deb and installs it in a bare Debian (tests/package/run.sh)
+#   package    builds the packages and installs them in a bare Debian (tests/package/run.sh)
 #   farm       renders on a Slurm cluster on this machine, and brings faults upon its tasks
 #              (tests/farm/run.sh), and tests the checker of Open Job Description templates
 #   rig_vm     runs the drivers, then the package, on a rig in a VM, and brings faults upon it
