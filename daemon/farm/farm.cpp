@@ -7,6 +7,7 @@
 #include <set>
 
 #include "daemon/farm/finish.hpp"
+#include "daemon/farm/machine.hpp"
 #include "daemon/farm/plan.hpp"
 #include "daemon/farm/scripts.hpp"
 #include "daemon/farm/slurm.hpp"
@@ -41,7 +42,7 @@ ScriptPlaces places_of(const JobFolder& folder, const Job& job,
     return !session::lies_within(folder.path().parent_path(), take.pictures);
   };
   return {program.empty() ? own_program() : program, folder.path(),
-          std::ranges::any_of(job.takes, lies_elsewhere)};
+          job.render.any_paths || std::ranges::any_of(job.takes, lies_elsewhere)};
 }
 
 std::uint64_t frames_of(const Job& job) {
@@ -150,10 +151,6 @@ void print_json(const Job& job, const JobStatus& status, std::ostream& out) {
   out << json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
 }
 
-void check_places(const JobFolder& folder, const Job& job, bool any_paths) {
-  for (const JobTake& take : job.takes) allowed_pictures(folder, take, any_paths);
-}
-
 }  // namespace
 
 void submit(const FarmOptions& options, std::ostream& out) {
@@ -209,10 +206,11 @@ void cancel(const JobOptions& options, std::ostream& out) {
 void retry(const JobOptions& options, std::ostream& out) {
   const JobFolder folder(options.job);
   const Job job = folder.read_plan();
-  check_places(folder, job, options.any_paths);
+  check_paths(folder, job, options.any_paths);
   refuse_while_queued(status_of(folder, job), folder);
   std::error_code stays;
   std::filesystem::remove(folder.stopped_file(), stays);
+  const JobLock lock(folder, options.stop);
   const Proof proof = prove(folder, job, out, options.stop);
   write_missing(folder, job, proof);
   print_missing(folder, job, proof, out);
@@ -232,14 +230,27 @@ void retry(const JobOptions& options, std::ostream& out) {
 int finish(const JobOptions& options, std::ostream& out) {
   const JobFolder folder(options.job);
   const Job job = folder.read_plan();
-  check_places(folder, job, options.any_paths);
-  const Proof proof = prove(folder, job, out, options.stop);
-  write_missing(folder, job, proof);
-  print_missing(folder, job, proof, out);
-  if (!proof.missing.empty()) return task_status::machine_fault;
-  complete(folder, job, out);
-  out << folder.path().string() << ": every frame is there and whole" << std::endl;
-  return task_status::done;
+  check_paths(folder, job, options.any_paths);
+  const Machine machine = this_machine();
+  TaskState state = state_now(TaskOutcome::running, machine.host, "");
+  try {
+    folder.write_finish_state(state);
+    const int status = run_finish(folder, job, out, options.stop);
+    folder.write_finish_state(
+        state_now(status == task_status::done ? TaskOutcome::done : TaskOutcome::machine,
+                  machine.host, status == task_status::done ? "" : "frames are missing"));
+    return status;
+  } catch (const JobFault&) {
+    throw;
+  } catch (const Error& error) {
+    out << error.what() << std::endl;
+    try {
+      folder.write_finish_state(state_now(TaskOutcome::machine, machine.host, error.what()));
+    } catch (const Error& full) {
+      out << full.what() << std::endl;
+    }
+    return task_status::machine_fault;
+  }
 }
 
 }  // namespace previz::farm

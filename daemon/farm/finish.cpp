@@ -8,7 +8,10 @@
 #include <utility>
 
 #include "daemon/farm/settings.hpp"
+#include "daemon/farm/task.hpp"
+#include "daemon/post/folder_locks.hpp"
 #include "daemon/post/render_directory.hpp"
+#include "daemon/post/render_files.hpp"
 #include "daemon/post/render_plan.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
@@ -76,14 +79,15 @@ void TakeProof::collect(std::size_t chunk) {
     faults_[chunk] = std::move(why);
     return;
   }
-  const Chunk& plan = job_.chunks[chunk];
-  post::RenderDirectory part(output_of(take_, folder, false),
-                             session::read_plain_file(folder / "render.json"), false, {},
-                             plan.frames, stop_);
-  if (part.has_others()) {
+  if (folder_.is_taken(chunk)) {
     faults_[chunk] = "is being rendered";
     return;
   }
+  const Chunk& plan = job_.chunks[chunk];
+  post::take_back(folder, take_.pictures);
+  post::RenderDirectory part(output_of(take_, folder, false),
+                             session::read_plain_file(folder / "render.json"), false, {},
+                             plan.frames, stop_);
   for (const auto& [why, frames] : part.rejected())
     faults_[chunk] = post::frames_words(frames) + ": " + why;
   const auto foreign = [&](const post::FinishedFrame& frame) { return !is_wanted_device(frame); };
@@ -141,6 +145,21 @@ void TakeProof::run(Proof& proof) {
                         ", whose pictures differ in the last bits");
 }
 
+// Removes what `previzd render` leaves in a folder, and the folder if nothing else is in it.
+void remove_chunk(const std::filesystem::path& folder) {
+  session::remove_dead_drafts(folder);
+  std::error_code code;
+  for (std::filesystem::directory_iterator entry(folder, code), end; !code && entry != end;
+       entry.increment(code)) {
+    const std::string name = entry->path().filename().string();
+    const bool is_ours = name == post::settings_name || name == post::lines_name ||
+                         name == post::FolderLocks::file_name || post::frame_of(name);
+    std::error_code stays;
+    if (is_ours && !entry->is_directory(stays)) std::filesystem::remove(entry->path(), stays);
+  }
+  std::filesystem::remove(folder, code);
+}
+
 // Makes the video of a take, and puts its lines in the order of the frames.
 void complete_take(const JobFolder& folder, const Job& job, const JobTake& take,
                    std::ostream& out) {
@@ -154,6 +173,7 @@ void complete_take(const JobFolder& folder, const Job& job, const JobTake& take,
   constexpr post::FrameRange none{1, 0};  // all were looked at a moment ago
   post::RenderDirectory pictures(output_of(take, take.pictures, take.video), take.settings, false,
                                  clock, none);
+  pictures.put_in_order();
   if (!take.video) return;
   std::vector<post::FinishedFrame> frames;
   for (std::uint64_t frame = take.frames.first; frame <= take.frames.last; ++frame)
@@ -181,10 +201,7 @@ Proof prove(const JobFolder& folder, const Job& job, std::ostream& out,
 
 void complete(const JobFolder& folder, const Job& job, std::ostream& out) {
   for (const JobTake& take : job.takes) complete_take(folder, job, take, out);
-  for (std::size_t chunk = 0; chunk < job.chunks.size(); ++chunk) {
-    std::error_code stays;
-    std::filesystem::remove_all(folder.chunk(chunk), stays);
-  }
+  for (std::size_t chunk = 0; chunk < job.chunks.size(); ++chunk) remove_chunk(folder.chunk(chunk));
 }
 
 void write_missing(const JobFolder& folder, const Job& job, const Proof& proof) {
@@ -213,6 +230,18 @@ void print_missing(const JobFolder& folder, const Job& job, const Proof& proof, 
   if (count > 0)
     out << folder.path().string() << ": " << count << (count == 1 ? " frame is" : " frames are")
         << " missing; `previzd farm retry` with this folder renders them" << std::endl;
+}
+
+int run_finish(const JobFolder& folder, const Job& job, std::ostream& out,
+               const std::stop_token& stop) {
+  const JobLock lock(folder, stop);
+  const Proof proof = prove(folder, job, out, stop);
+  write_missing(folder, job, proof);
+  print_missing(folder, job, proof, out);
+  if (!proof.missing.empty()) return task_status::machine_fault;
+  complete(folder, job, out);
+  out << folder.path().string() << ": every frame is there and whole" << std::endl;
+  return task_status::done;
 }
 
 }  // namespace previz::farm

@@ -1,9 +1,19 @@
 #include "daemon/farm/folder.hpp"
 
+#include <fcntl.h>
+#include <fmt/chrono.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <chrono>
+#include <ctime>
 #include <nlohmann/json.hpp>
+#include <thread>
 
+#include "daemon/post/folder_locks.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
@@ -12,15 +22,20 @@ namespace previz::farm {
 namespace {
 
 constexpr std::array<const char*, 5> outcomes{"running", "done", "stopped", "machine", "job"};
-// What a job of a million chunks takes, and more than any that is not made to fill the memory.
-constexpr std::uintmax_t most_bytes = std::uintmax_t{1} << 28;
+// What a job of a million chunks takes, and more than a state or a reason ever does.
+constexpr std::uintmax_t most_plan_bytes = std::uintmax_t{1} << 27, most_state_bytes = 1 << 16;
 
 bool is_there(const std::filesystem::path& file) {
   std::error_code unknown;
   return std::filesystem::exists(std::filesystem::symlink_status(file, unknown));
 }
 
-std::string read_small(const std::filesystem::path& file) {
+// Returns whether the folder can be looked into, so that what is not found in it is not there.
+bool can_be_entered(const std::filesystem::path& folder) {
+  return ::access(folder.c_str(), R_OK | X_OK) == 0;
+}
+
+std::string read_at_most(const std::filesystem::path& file, std::uintmax_t most_bytes) {
   std::error_code unknown;
   const std::uintmax_t bytes = std::filesystem::file_size(file, unknown);
   if (!unknown && bytes > most_bytes) throw Error(file.string() + ": is too large for such a file");
@@ -33,13 +48,29 @@ std::string text_of(const nlohmann::ordered_json& json) {
 
 }  // namespace
 
+std::string one_line(std::string text) {
+  while (text.ends_with('\n')) text.pop_back();
+  for (char& c : text)
+    if (static_cast<unsigned char>(c) < ' ' || c == 0x7f) c = ' ';
+  return text;
+}
+
 const char* name_of(TaskOutcome outcome) {
   return outcomes.at(static_cast<std::size_t>(outcome));
+}
+
+TaskState state_now(TaskOutcome outcome, const std::string& host, const std::string& message) {
+  return {outcome, host, ::getpid(),
+          fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(std::time(nullptr))),
+          one_line(message)};
 }
 
 JobFolder::JobFolder(std::filesystem::path folder)
     : path_(std::filesystem::absolute(folder).lexically_normal()) {
   if (!path_.has_filename()) path_ = path_.parent_path();  // "JOB/"
+  std::error_code unknown;
+  const std::filesystem::path real = std::filesystem::weakly_canonical(path_, unknown);
+  if (!unknown) path_ = real;
 }
 
 std::filesystem::path JobFolder::chunk(std::size_t chunk) const {
@@ -51,18 +82,54 @@ std::filesystem::path JobFolder::state_file(std::size_t chunk) const {
 }
 
 Job JobFolder::read_plan() const {
-  if (!is_there(plan()))
-    throw Error(path_.string() +
-                ": holds no job (no job.json); give the folder that "
-                "`previzd farm` named when it submitted the job");
-  return job_from_json(read_small(plan()), plan().string());
+  struct stat found {};
+  if (::stat(plan().c_str(), &found) != 0 && errno == ENOENT && can_be_entered(path_))
+    throw JobFault(path_.string() +
+                   ": holds no job (no job.json); give the folder that `previzd farm` named when "
+                   "it submitted the job");
+  if (const std::string why = session::why_not_plain(plan()); !why.empty())
+    throw JobFault(plan().string() + ": " + why);
+  refuse_links();
+  return job_from_json(read_at_most(plan(), most_plan_bytes), plan().string());
+}
+
+// A job's folder may come from elsewhere, and what is written and removed below it must be in it.
+void JobFolder::refuse_links() const {
+  const auto refuse = [](const std::filesystem::path& folder) {
+    std::error_code unknown;
+    const auto kind = std::filesystem::symlink_status(folder, unknown).type();
+    if (kind != std::filesystem::file_type::directory &&
+        kind != std::filesystem::file_type::not_found && kind != std::filesystem::file_type::none)
+      throw JobFault(folder.string() +
+                     ": is a link, or no folder, by which files would be written elsewhere; "
+                     "remove it, or make the job again");
+  };
+  for (const char* name : {"chunks", "log", "set", "set/with", "state"}) refuse(path_ / name);
+  std::error_code unreadable;
+  for (const auto& entry : std::filesystem::directory_iterator(path_ / "chunks", unreadable))
+    refuse(entry.path());
 }
 
 std::optional<TaskState> JobFolder::read_state(std::size_t chunk) const {
-  const std::filesystem::path file = state_file(chunk);
+  return read_state_in(state_file(chunk));
+}
+
+void JobFolder::write_state(std::size_t chunk, const TaskState& state) const {
+  write_state_in(state_file(chunk), state);
+}
+
+std::optional<TaskState> JobFolder::read_finish_state() const {
+  return read_state_in(path_ / "state" / "finish.json");
+}
+
+void JobFolder::write_finish_state(const TaskState& state) const {
+  write_state_in(path_ / "state" / "finish.json", state);
+}
+
+std::optional<TaskState> JobFolder::read_state_in(const std::filesystem::path& file) const {
   if (!is_there(file)) return std::nullopt;
   try {
-    const auto json = nlohmann::json::parse(read_small(file));
+    const auto json = nlohmann::json::parse(read_at_most(file, most_state_bytes));
     TaskState state;
     const auto outcome = std::ranges::find(outcomes, json.at("outcome").get<std::string_view>());
     if (outcome == outcomes.end()) return std::nullopt;
@@ -77,20 +144,20 @@ std::optional<TaskState> JobFolder::read_state(std::size_t chunk) const {
   }
 }
 
-void JobFolder::write_state(std::size_t chunk, const TaskState& state) const {
+void JobFolder::write_state_in(const std::filesystem::path& file, const TaskState& state) const {
   const nlohmann::ordered_json json{{"outcome", name_of(state.outcome)},
                                     {"host", state.host},
                                     {"pid", state.pid},
                                     {"since", state.since},
                                     {"message", state.message}};
-  session::replace_file(state_file(chunk), text_of(json));
+  session::replace_file(file, text_of(json));
 }
 
 Submitted JobFolder::read_submitted() const {
   const std::filesystem::path file = path_ / "submitted.json";
   if (!is_there(file)) return {};
   try {
-    const auto json = nlohmann::json::parse(read_small(file));
+    const auto json = nlohmann::json::parse(read_at_most(file, most_state_bytes));
     Submitted submitted;
     json.at("tasks").get_to(submitted.tasks);
     if (json.contains("finish")) submitted.finish = json.at("finish").get<std::uint64_t>();
@@ -107,7 +174,16 @@ void JobFolder::write_submitted(const Submitted& submitted) const {
 }
 
 std::string JobFolder::read_stopped() const {
-  return is_there(stopped_file()) ? read_small(stopped_file()) : "";
+  return is_there(stopped_file()) ? read_at_most(stopped_file(), most_state_bytes) : "";
+}
+
+bool JobFolder::is_taken(std::size_t chunk) const {
+  std::error_code unknown;
+  if (!std::filesystem::exists(this->chunk(chunk) / post::FolderLocks::file_name, unknown))
+    return false;
+  post::FolderLocks locks(this->chunk(chunk));
+  const post::FolderLocks::Transaction transaction(locks);
+  return !locks.others().empty();
 }
 
 post::RenderOptions JobFolder::render_options(const Job& job, const JobTake& take) const {
@@ -127,6 +203,19 @@ std::string JobFolder::name() const {
   session::Sha256 hash;
   hash.add(path_.string());
   return "previz-" + hash.text().substr(0, 8);
+}
+
+JobLock::JobLock(const JobFolder& folder, const std::stop_token& stop)
+    : file_(folder.path() / "job.lock", O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK) {
+  struct flock whole {};
+  whole.l_type = F_WRLCK;
+  whole.l_whence = SEEK_SET;
+  while (::fcntl(file_.get(), F_OFD_SETLK, &whole) != 0) {
+    if (errno != EAGAIN && errno != EACCES && errno != EINTR) return;
+    if (stop.stop_requested())
+      throw Error(folder.path().string() + ": interrupted while another last step was at work");
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
 }
 
 }  // namespace previz::farm

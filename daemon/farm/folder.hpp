@@ -3,23 +3,26 @@
 //   JOB/set/                the set file, the overlay and the files that the set names
 //   JOB/tasks.sh, finish.sh what the scheduler starts
 //   JOB/loop.sh             the same for people without a scheduler
-//   JOB/chunks/0003/        the pictures of a chunk, as `previzd render` leaves them, until the
-//   last
-//                           step has moved them into the folder of finished pictures
+//   JOB/chunks/0003/        a chunk's pictures, as `previzd render` leaves them; the last step
+//                           moves them into the folder of finished pictures
 //   JOB/state/0003.json     what the task of that chunk said last (TaskState)
+//   JOB/state/finish.json   what the last step said last
 //   JOB/log/                a log a task
 //   JOB/submitted.json      the scheduler's numbers of the job
 //   JOB/stopped.txt         why no further task starts; absent: they do
+//   JOB/job.lock            the last step and a retry lock it: one is at work at a time
 //   JOB/missing.json        what the last step found missing; absent: nothing, or it has not run
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "daemon/farm/job.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::farm {
 
@@ -39,6 +42,12 @@ struct TaskState {
   std::string since;    // "2026-11-28 20:03:11 UTC"
   std::string message;  // one line: why it is not done
 };
+
+// Returns the text on one line, without what a terminal would take for a command.
+std::string one_line(std::string text);
+
+// Returns what a process says now; `message` is put on one line.
+TaskState state_now(TaskOutcome outcome, const std::string& host, const std::string& message);
 
 // The words for an outcome in JOB/state and in `farm status --json`: "running", "done", "stopped",
 // "machine", "job".
@@ -69,15 +78,23 @@ class JobFolder {
   // Whatever follows reads and replaces plain files only, and throws previz::Error naming the file
   // where another thing is in its place or it cannot be read or written.
 
-  // Throws also if the folder holds no job.
+  // Throws JobFault if the folder holds no job, or if one of its own folders is a link, so that
+  // files would be written where it leads.
   Job read_plan() const;
   // Returns what the task said last; nothing if it said nothing yet, or half of it.
   std::optional<TaskState> read_state(std::size_t chunk) const;
   void write_state(std::size_t chunk, const TaskState& state) const;
+  // The same of the last step.
+  std::optional<TaskState> read_finish_state() const;
+  void write_finish_state(const TaskState& state) const;
   Submitted read_submitted() const;
   void write_submitted(const Submitted& submitted) const;
   // Returns why no further task starts; empty: they do.
   std::string read_stopped() const;
+
+  // Returns whether a process is at work on the chunk, on whatever machine. False where the file
+  // system has no locks by which that is known.
+  bool is_taken(std::size_t chunk) const;
 
   // Returns the options by which the plan renders a take, without the frames and the folder for
   // them.
@@ -88,7 +105,23 @@ class JobFolder {
   std::string name() const;
 
  private:
-  std::filesystem::path path_;  // absolute
+  std::optional<TaskState> read_state_in(const std::filesystem::path& file) const;
+  void write_state_in(const std::filesystem::path& file, const TaskState& state) const;
+  void refuse_links() const;
+
+  std::filesystem::path path_;  // absolute, without links, so that all names of the folder are one
+};
+
+// Held by the last step and by a retry while they move and compare pictures, so that neither takes
+// the other for a task.
+class JobLock {
+ public:
+  // Waits for it; throws previz::Error on a stop. Where the file system has no locks it is not
+  // waited for.
+  JobLock(const JobFolder& folder, const std::stop_token& stop);
+
+ private:
+  session::OpenFile file_;
 };
 
 }  // namespace previz::farm

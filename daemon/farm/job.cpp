@@ -15,6 +15,7 @@ namespace {
 
 constexpr int format = 1;
 constexpr std::size_t most_chunks = 1'000'000;
+constexpr std::uint64_t most_frames = 10'000'000;  // of a take: four days of it
 constexpr std::array<const char*, 3> kinds{"pictures", "sums", "merge"};
 // Enough for four tasks a machine: one that ends early takes another one.
 constexpr std::uint64_t chunks_a_machine = 4;
@@ -61,12 +62,16 @@ post::RenderOptions options_of(const Json& json) {
   if (options.samples && (*options.samples < 1 || *options.samples > 1'000'000))
     throw Error("\"samples\" is not in 1 to 1000000");
   get(json, "error", options.error);
+  if (options.error && !(*options.error >= 0 && *options.error <= 1))
+    throw Error("\"error\" is not in 0 to 1");
   get(json, "adaptive", options.adaptive);
   get(json, "denoise", options.denoise);
   get(json, "neighbours", options.neighbours);
   if (options.neighbours && (*options.neighbours < 0 || *options.neighbours > 4))
     throw Error("\"neighbours\" is not in 0 to 4");
   get(json, "seconds", options.seconds);
+  if (options.seconds && !(*options.seconds >= 0 && *options.seconds <= 86'400))
+    throw Error("\"seconds\" is not in 0 to 86400");
   get(json, "seed", options.seed);
   if (json.contains("estimator"))
     options.estimator = json.at("estimator") == set::name_of(set::Estimator::paired)
@@ -79,14 +84,21 @@ post::RenderOptions options_of(const Json& json) {
   return options;
 }
 
+// Returns a number that an int holds; a reader that cuts it would take 4294967297 for 1.
+int whole_number(const Json& json) {
+  const auto number = json.get<std::int64_t>();
+  if (number < 0 || number > std::numeric_limits<int>::max())
+    throw Error(std::to_string(number) + " is not a number that it may have");
+  return static_cast<int>(number);
+}
+
 Json range_json(const post::FrameRange& range) {
   return {range.first, range.last};
 }
 
 post::FrameRange range_of(const Json& json) {
   const post::FrameRange range{json.at(0), json.at(1)};
-  constexpr std::uint64_t most = std::uint64_t{1} << 40;
-  if (range.first > range.last || range.last >= most)
+  if (range.first > range.last || range.last >= most_frames)
     throw Error("a range of frames runs from " + std::to_string(range.first) + " to " +
                 std::to_string(range.last));
   return range;
@@ -110,14 +122,16 @@ std::string place_in_folder(const Json& json) {
 JobTake take_of(const Json& json) {
   JobTake take;
   take.session = absolute_path(json.at("session"));
-  json.at("start_ns").get_to(take.start_ns);
   take.pictures = absolute_path(json.at("pictures"));
   take.frames = range_of(json.at("frames"));
   json.at("settings").get_to(take.settings);
+  if (!Json::accept(take.settings) || !Json::parse(take.settings).is_object())
+    throw Error("the settings of a take are no JSON object");
   json.at("exr").get_to(take.exr);
   json.at("png").get_to(take.png);
   json.at("video").get_to(take.video);
   json.at("frame_bytes").get_to(take.frame_bytes);
+  json.at("hardware_rays").get_to(take.hardware_rays);
   return take;
 }
 
@@ -129,12 +143,36 @@ Chunk chunk_of(const Json& json, const Job& job) {
   const auto kind = std::ranges::find(kinds, json.at("kind").get<std::string_view>());
   if (kind == kinds.end()) throw Error("a chunk is of an unknown kind");
   chunk.kind = static_cast<ChunkKind>(kind - kinds.begin());
-  chunk.range = json.value("range", 0);
+  chunk.range = json.contains("range") ? whole_number(json.at("range")) : 0;
   const bool has_range = chunk.kind == ChunkKind::sums;
   if (has_range ? chunk.range < 1 || chunk.range > job.sample_ranges : chunk.range != 0)
     throw Error("a chunk is of sample range " + std::to_string(chunk.range) + " of " +
                 std::to_string(job.sample_ranges));
   return chunk;
+}
+
+// Throws unless the chunks have every frame of every take once, in their order: as pictures, or
+// merged and in every sample range.
+void check_cover(const Job& job) {
+  const auto refuse = [](std::uint64_t frame) {
+    throw Error("its chunks do not have every frame once: frame " + std::to_string(frame) +
+                " is not where it belongs");
+  };
+  const bool in_ranges = job.first_merge() < job.chunks.size();
+  std::vector<std::vector<std::uint64_t>> next;  // frame, by take and range
+  for (const JobTake& take : job.takes)
+    next.emplace_back(in_ranges ? job.sample_ranges + 1 : 1, take.frames.first);
+  for (const Chunk& chunk : job.chunks) {
+    const auto range = static_cast<std::size_t>(chunk.range);
+    const bool is_pictures = chunk.kind == ChunkKind::pictures;
+    if (range >= next[chunk.take].size() || is_pictures == in_ranges) refuse(chunk.frames.first);
+    if (chunk.frames.first != next[chunk.take][range]) refuse(chunk.frames.first);
+    next[chunk.take][range] = chunk.frames.last + 1;
+  }
+  for (std::size_t take = 0; take < job.takes.size(); ++take)
+    for (const std::uint64_t frame : next[take])
+      if (frame != job.takes[take].frames.last + 1) refuse(frame);
+  if (job.takes.empty()) throw Error("it has no take");
 }
 
 Job read(const Json& json) {
@@ -151,7 +189,7 @@ Job read(const Json& json) {
     job.set_assets[name] = place_in_folder(place);
   json.at("on_gpu").get_to(job.on_gpu);
   json.at("any_device").get_to(job.any_device);
-  json.at("sample_ranges").get_to(job.sample_ranges);
+  job.sample_ranges = whole_number(json.at("sample_ranges"));
   if (job.sample_ranges < 1 || job.sample_ranges > 1024 ||
       !std::has_single_bit(static_cast<unsigned>(job.sample_ranges)))
     throw Error("\"sample_ranges\" is " + std::to_string(job.sample_ranges));
@@ -166,6 +204,7 @@ Job read(const Json& json) {
   for (const Json& chunk : json.at("chunks")) job.chunks.push_back(chunk_of(chunk, job));
   for (std::size_t i = job.first_merge(); i < job.chunks.size(); ++i)
     if (job.chunks[i].kind != ChunkKind::merge) throw Error("its chunks are not in their order");
+  check_cover(job);
   return job;
 }
 
@@ -195,14 +234,14 @@ std::string to_json(const Job& job) {
   json["takes"] = Json::array();
   for (const JobTake& take : job.takes)
     json["takes"].push_back({{"session", take.session.string()},
-                             {"start_ns", take.start_ns},
                              {"pictures", take.pictures.string()},
                              {"frames", range_json(take.frames)},
                              {"settings", take.settings},
                              {"exr", take.exr},
                              {"png", take.png},
                              {"video", take.video},
-                             {"frame_bytes", take.frame_bytes}});
+                             {"frame_bytes", take.frame_bytes},
+                             {"hardware_rays", take.hardware_rays}});
   json["chunks"] = Json::array();
   for (const Chunk& chunk : job.chunks) {
     Json one{{"take", chunk.take},
@@ -223,9 +262,9 @@ Job job_from_json(const std::string& text, const std::string& name) {
   try {
     return read(Json::parse(text));
   } catch (const nlohmann::json::exception& error) {
-    throw Error(name + ": is not a job's plan: " + error.what());
+    throw JobFault(name + ": is not a job's plan: " + error.what());
   } catch (const Error& error) {
-    throw Error(name + ": is not a job's plan: " + error.what());
+    throw JobFault(name + ": is not a job's plan: " + error.what());
   }
 }
 

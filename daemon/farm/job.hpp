@@ -14,19 +14,26 @@
 
 #include "daemon/post/finished_frame.hpp"
 #include "daemon/post/render_options.hpp"
+#include "drivers/error.hpp"
 
 namespace previz::farm {
+
+// What is wrong with a job on every machine, so that no retry mends it.
+class JobFault : public Error {
+ public:
+  using Error::Error;
+};
 
 // A take of the job.
 struct JobTake {
   std::filesystem::path session;   // absolute
-  std::int64_t start_ns = 0;       // timestamp of its first frame, by which it is known again
   std::filesystem::path pictures;  // folder of the finished pictures, absolute
   post::FrameRange frames;         // that are wanted
   std::string settings;            // the text of its render.json
   // Which files a frame has; a PNG also where there is a video, which is made of them.
   bool exr = true, png = true, video = true;
   std::uint64_t frame_bytes = 0;  // that the files of a frame take at most
+  bool hardware_rays = true;      // quality.hardware_rays of its set
 };
 
 // What a task makes of its frames.
@@ -68,15 +75,15 @@ struct Job {
   std::size_t first_merge() const;
 };
 
-// These write the plan as JSON and read it back. from_json() throws previz::Error that begins with
-// `name` and says what is wrong: not JSON, of another format, a number out of its range, a chunk of
-// a take that there is not.
+// These write the plan as JSON and read it back. job_from_json() throws JobFault that begins with
+// `name` and says what is wrong: not JSON, of another format, a number out of its range, or chunks
+// that are not the frames of the takes, each once.
 std::string to_json(const Job& job);
 Job job_from_json(const std::string& text, const std::string& name);
 
 // Returns the number of the chunk as its folder and its log have it: at least four digits.
 std::string chunk_number(std::size_t chunk);
-// Returns "frames 12 to 15 of 12A_take003", "frame 7 of 12A_take003, samples 2 of 4".
+// Returns "frames 12 to 15 of 12A_take003", "frame 7 of 12A_take003, sample range 2 of 4".
 std::string words_of(const Job& job, const Chunk& chunk);
 
 // What is asked for when frames are divided.

@@ -96,8 +96,10 @@ std::string why_not_here(const JobFolder& folder, const Job& job, const Chunk& c
   return "";
 }
 
-std::shared_ptr<render::Device> open_wanted_device(const Job& job, const Machine& machine) {
-  std::shared_ptr<render::Device> device = machine.open_device(job.render.device);
+std::shared_ptr<render::Device> open_wanted_device(const Job& job, const JobTake& take,
+                                                   const Machine& machine) {
+  std::shared_ptr<render::Device> device =
+      machine.open_device(render::options_for(job.render.device, take.hardware_rays));
   if (!job.any_device && render::is_gpu(*device) != job.on_gpu)
     throw Error(render::device_name(*device) + ": the job is rendered on " +
                 (job.on_gpu ? "graphics cards, and there is none here that Vulkan can use"

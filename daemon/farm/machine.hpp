@@ -32,7 +32,9 @@ Machine this_machine();
 std::string why_not_here(const JobFolder& folder, const Job& job, const Chunk& chunk,
                          const Machine& machine, const std::filesystem::path& written);
 
-// Opens the device that the job wants; throws previz::Error that says what is missing here.
-std::shared_ptr<render::Device> open_wanted_device(const Job& job, const Machine& machine);
+// Opens the device that the job wants for a take; throws previz::Error that says what is missing
+// here.
+std::shared_ptr<render::Device> open_wanted_device(const Job& job, const JobTake& take,
+                                                   const Machine& machine);
 
 }  // namespace previz::farm

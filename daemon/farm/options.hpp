@@ -30,7 +30,7 @@ struct FarmOptions {
 // A job that is there.
 struct JobOptions {
   std::filesystem::path job;
-  bool any_paths = false;  // allowed_pictures()
+  bool any_paths = false;  // check_paths()
   // For retry().
   std::filesystem::path program;
   std::vector<std::string> sbatch;

@@ -44,7 +44,6 @@ JobTake job_take(const post::RenderPlan& plan, const post::RenderOptions& option
   JobTake take;
   take.session = std::filesystem::absolute(options.session).lexically_normal();
   if (!take.session.has_filename()) take.session = take.session.parent_path();  // "TAKE/"
-  take.start_ns = pipeline::start_of(plan.take);
   take.pictures = std::filesystem::absolute(output.directory).lexically_normal();
   take.frames = plan.range;
   take.settings = plan.settings;
@@ -52,6 +51,7 @@ JobTake job_take(const post::RenderPlan& plan, const post::RenderOptions& option
   take.png = output.png || output.video;
   take.video = output.video;
   take.frame_bytes = frame_bytes(plan, options.scale);
+  take.hardware_rays = plan.take.set.quality.hardware_rays;
   return take;
 }
 

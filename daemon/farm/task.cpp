@@ -1,10 +1,6 @@
 #include "daemon/farm/task.hpp"
 
-#include <fmt/chrono.h>
-#include <unistd.h>
-
 #include <chrono>
-#include <ctime>
 #include <map>
 #include <ostream>
 #include <thread>
@@ -23,19 +19,6 @@ namespace {
 // How long another machine is left alone before it is looked at again.
 constexpr std::chrono::seconds while_another_works(3);
 
-// A fault that every machine would have.
-class JobFault : public Error {
- public:
-  using Error::Error;
-};
-
-std::string one_line(std::string text) {
-  while (text.ends_with('\n')) text.pop_back();
-  for (char& c : text)
-    if (c == '\n') c = ' ';
-  return text;
-}
-
 class Task {
  public:
   Task(const TaskOptions& options, const Machine& machine, std::ostream& out)
@@ -44,7 +27,8 @@ class Task {
   int run();
 
  private:
-  void begin();
+  bool begin();
+  void check_sums() const;
   void render();
   post::RenderOptions render_options() const;
   void check_settings() const;
@@ -59,35 +43,51 @@ class Task {
   Chunk chunk_;
   std::shared_ptr<render::Device> device_;
   std::map<std::uint64_t, post::FinishedFrame> finished_;  // among the finished pictures
-  TaskState state_;
-  bool is_mine_ = false;    // the chunk is known, and its state is this task's to write
-  bool has_begun_ = false;  // frames are being rendered
+  bool is_mine_ = false;  // the chunk is known, and its state is this task's to write
 };
 
-// Throws JobFault, or previz::Error where another machine may do it.
-void Task::begin() {
-  try {
-    job_ = folder_.read_plan();
-    if (options_.chunk >= job_.chunks.size())
-      throw Error(folder_.plan().string() + ": has no chunk " + std::to_string(options_.chunk) +
-                  "; the last one is " + std::to_string(job_.chunks.size() - 1));
-    chunk_ = job_.chunks[options_.chunk];
-    allowed_pictures(folder_, job_.takes[chunk_.take], options_.any_paths);
-    if (const std::string why = folder_.read_stopped(); !why.empty())
-      throw Error("the job was stopped by " + one_line(why) + "; `previzd farm retry` goes on");
-  } catch (const Error& error) {
-    throw JobFault(error.what());
-  }
-  is_mine_ = true;
+// Returns false where another machine is at the chunk, and is to be left alone. Throws JobFault, or
+// previz::Error where another machine may do it.
+bool Task::begin() {
+  job_ = folder_.read_plan();
+  if (options_.chunk >= job_.chunks.size())
+    throw JobFault(folder_.plan().string() + ": has no chunk " + std::to_string(options_.chunk) +
+                   "; the last one is " + std::to_string(job_.chunks.size() - 1));
+  chunk_ = job_.chunks[options_.chunk];
+  check_paths(folder_, job_, options_.any_paths);
+  if (const std::string why = folder_.read_stopped(); !why.empty())
+    throw JobFault("the job was stopped: " + one_line(why) + "; `previzd farm retry` goes on");
   out_ << "chunk " << options_.chunk << ": " << words_of(job_, chunk_) << ", on " << machine_.host
        << std::endl;
+  if (options_.not_if_taken && folder_.is_taken(options_.chunk)) {
+    out_ << "another machine is rendering it" << std::endl;
+    return false;
+  }
+  is_mine_ = true;
   say(TaskOutcome::running, "");
   const std::string why =
       why_not_here(folder_, job_, chunk_, machine_, folder_.state_file(options_.chunk));
   if (!why.empty()) throw Error(why);
-  device_ = open_wanted_device(job_, machine_);
+  check_sums();
   const JobTake& take = job_.takes[chunk_.take];
-  finished_ = post::finished_frames({take.pictures, take.exr, take.png, false});
+  device_ = open_wanted_device(job_, take, machine_);
+  finished_ = post::finished_frames({take.pictures, take.exr, take.png, false},
+                                    /*has_sums=*/false, chunk_.frames);
+  return true;
+}
+
+// Throws unless the sums are there that this task merges.
+void Task::check_sums() const {
+  for (std::size_t other = 0; chunk_.kind == ChunkKind::merge && other < options_.chunk; ++other) {
+    if (!is_merged_of(job_, options_.chunk, other)) continue;
+    const Chunk& part = job_.chunks[other];
+    const auto there = post::finished_frames({folder_.chunk(other), true, false, false},
+                                             /*has_sums=*/true, part.frames);
+    if (there.size() <= part.frames.last - part.frames.first)
+      throw Error("chunk " + std::to_string(other) + " (" + words_of(job_, part) +
+                  ") is not rendered, so that there is nothing to merge; `previzd farm retry` "
+                  "renders it");
+  }
 }
 
 post::RenderOptions Task::render_options() const {
@@ -122,10 +122,7 @@ void Task::check_settings() const {
 
 void Task::render() {
   post::RenderOptions options = render_options();
-  options.on_begin = [this] {
-    check_settings();
-    has_begun_ = true;
-  };
+  options.on_begin = [this] { check_settings(); };
   for (;;) {
     const post::RenderReport report = post::render_session(options, out_);
     if (!report.failures.empty()) throw Error(report.failures.front());
@@ -135,12 +132,7 @@ void Task::render() {
 }
 
 void Task::say(TaskOutcome outcome, const std::string& message) {
-  state_.outcome = outcome;
-  state_.host = machine_.host;
-  state_.pid = ::getpid();
-  state_.since = fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(std::time(nullptr)));
-  state_.message = one_line(message);
-  folder_.write_state(options_.chunk, state_);
+  folder_.write_state(options_.chunk, state_now(outcome, machine_.host, message));
 }
 
 // The disk may be what is at fault.
@@ -159,26 +151,31 @@ int Task::fail(TaskOutcome outcome, const std::string& message) {
 
 int Task::run() {
   try {
-    begin();
+    if (!begin()) return task_status::done;
     render();
     say(options_.stop.stop_requested() ? TaskOutcome::stopped : TaskOutcome::done, "");
     return task_status::done;
   } catch (const JobFault& error) {
     return fail(TaskOutcome::job, error.what());
   } catch (const Error& error) {
-    const bool is_known = device_ && !has_begun_;
-    return fail(is_known ? TaskOutcome::job : TaskOutcome::machine, error.what());
+    if (!options_.stop.stop_requested()) return fail(TaskOutcome::machine, error.what());
+    fail(TaskOutcome::stopped, error.what());
+    return task_status::done;
   }
 }
 
 }  // namespace
 
-void allowed_pictures(const JobFolder& folder, const JobTake& take, bool any_paths) {
-  if (any_paths || session::lies_within(folder.path().parent_path(), take.pictures)) return;
-  throw Error(folder.plan().string() + ": the pictures would be written to " +
-              take.pictures.string() +
-              ", which is not beside the job's folder; if the job is yours, allow it with "
-              "--any-paths");
+void check_paths(const JobFolder& folder, const Job& job, bool any_paths) {
+  if (any_paths) return;
+  const std::string mine = "; if the job is yours, allow it with --any-paths";
+  for (const JobTake& take : job.takes)
+    if (!session::lies_within(folder.path().parent_path(), take.pictures))
+      throw JobFault(folder.plan().string() + ": the pictures would be written to " +
+                     take.pictures.string() + ", which is not beside the job's folder" + mine);
+  if (job.render.any_paths)
+    throw JobFault(folder.plan().string() +
+                   ": the takes' own sets may name files outside of the takes" + mine);
 }
 
 int run_task(const TaskOptions& options, const Machine& machine, std::ostream& out) {

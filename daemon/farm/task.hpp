@@ -12,7 +12,7 @@ namespace previz::farm {
 struct TaskOptions {
   std::filesystem::path job;
   std::size_t chunk = 0;
-  // The pictures may lie where the plan says, wherever that is (allowed_pictures()).
+  // The pictures may lie where the plan says, wherever that is (check_paths()).
   bool any_paths = false;
   // Leaves a chunk alone that another machine is at; otherwise it waits, and takes over what that
   // one does not finish.
@@ -28,10 +28,10 @@ inline constexpr int machine_fault =
     75;  // EX_TEMPFAIL of sysexits.h: another machine, or time, does
 }  // namespace task_status
 
-// Throws previz::Error if the pictures of the take would be written outside of the job's folder and
-// of the one that it lies in, unless `any_paths`: a plan that came from elsewhere does not choose
-// where files are written.
-void allowed_pictures(const JobFolder& folder, const JobTake& take, bool any_paths);
+// Throws JobFault if pictures would be written outside of the job's folder and of the one that it
+// lies in, or if the takes' own sets might name any file, unless `any_paths`: a plan that came from
+// elsewhere does not choose where files are written and read.
+void check_paths(const JobFolder& folder, const Job& job, bool any_paths);
 
 // Renders what is missing of a chunk into the chunk's own folder. Two tasks with one chunk share
 // its frames, or, where the file system has no locks, both render them, to the same bits. What a

@@ -104,7 +104,7 @@ void RenderDirectory::begin(const std::string& settings, bool force, FrameRange 
       finished_.clear();
     else
       finished_.erase(finished_.lower_bound(range.first), finished_.upper_bound(range.last));
-    write_lines();
+    write_lines(finished_);
   }
   if (is_new || !differ.empty()) session::replace_file(path() / settings_name, settings);
   locks_->join();
@@ -127,9 +127,9 @@ void RenderDirectory::read_lines() {
   lines_state_ = state;
 }
 
-void RenderDirectory::write_lines() const {
+void RenderDirectory::write_lines(const Frames& frames) const {
   std::string lines;
-  for (const auto& [frame, record] : finished_) lines += to_json(record) + "\n";
+  for (const auto& [frame, record] : frames) lines += to_json(record) + "\n";
   session::replace_file(path() / lines_name, lines);
 }
 
@@ -152,18 +152,21 @@ void RenderDirectory::verify(FrameRange range, const std::stop_token& stop) {
 
   const FolderLocks::Transaction transaction(*locks_, stop);
   read_lines();
+  bool has_changed = false;
   for (const auto& [frame, why] : why_not) {
     const auto now = finished_.find(frame);
     if (now == finished_.end() || to_json(now->second) != before[frame] ||
         locks_->is_at_another(frame))
       continue;
+    has_changed |= !why.empty() || now->second.files.empty();
     now->second = read[frame];
     if (why.empty()) continue;
     rejected_[why].push_back(frame);
     finished_.erase(now);
   }
   reject_without_line(range);
-  write_lines();
+  if (!has_changed) return;
+  write_lines(finished_);
   lines_state_ = state_of(path() / lines_name);
 }
 
@@ -305,33 +308,37 @@ std::size_t RenderDirectory::adopt(RenderDirectory& from) {
     add_to_list(lines, to_json(record), "\n");
   }
   if (taken.empty()) return 0;
-  append_line(path() / lines_name, lines);
-  for (const FinishedFrame& record : taken) {
+  for (const FinishedFrame& record : taken)
     for (const char* extension : extensions(record.status))
       move_file(from.file(record.frame, extension), file(record.frame, extension));
-    finished_[record.frame] = record;
-  }
   session::sync_names(path());
+  append_line(path() / lines_name, lines);
+  for (const FinishedFrame& record : taken) finished_[record.frame] = record;
   lines_state_ = state_of(path() / lines_name);
   from.forget(taken);
   return taken.size();
 }
 
-// Takes away the lines of frames whose files have gone.
+// Takes away the lines of frames whose files have gone. Those that reject() counts as not finished
+// stay.
 void RenderDirectory::forget(const std::vector<FinishedFrame>& frames) {
   const std::lock_guard guard(mutex_);
   const FolderLocks::Transaction transaction(*locks_);
-  read_lines();
-  for (const FinishedFrame& frame : frames) finished_.erase(frame.frame);
-  write_lines();
+  Frames lines = frames_in(path() / lines_name);
+  for (const FinishedFrame& frame : frames) {
+    lines.erase(frame.frame);
+    finished_.erase(frame.frame);
+  }
+  write_lines(lines);
   lines_state_ = state_of(path() / lines_name);
 }
 
-std::string RenderDirectory::settings() const {
-  const std::filesystem::path file = path() / settings_name;
-  std::error_code unknown;
-  if (!std::filesystem::exists(file, unknown) || !session::why_not_plain(file).empty()) return "";
-  return session::read_plain_file(file);
+void RenderDirectory::put_in_order() {
+  const std::lock_guard guard(mutex_);
+  const FolderLocks::Transaction transaction(*locks_);
+  read_lines();
+  write_lines(finished_);
+  lines_state_ = state_of(path() / lines_name);
 }
 
 std::filesystem::path RenderDirectory::write_video(const std::vector<FinishedFrame>& frames,

@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <functional>
 #include <iosfwd>
-#include <limits>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -19,6 +18,7 @@
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/post/finished_frame.hpp"
 #include "daemon/post/folder_locks.hpp"
+#include "daemon/post/render_files.hpp"
 #include "daemon/render/sample_sums.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/session/timecode.hpp"
@@ -31,8 +31,6 @@ enum class Claim { mine, finished, at_another };
 // claim(), release() and write() are for several threads at once.
 class RenderDirectory {
  public:
-  static constexpr FrameRange all_frames{0, std::numeric_limits<std::uint64_t>::max()};
-
   // Makes the directory. `settings` is JSON: an object whose values decide what the pictures look
   // like. If it holds frames made with other settings, throws previz::Error naming the differences;
   // with `force` all frames, or those of `range` if the settings are the same, count as not
@@ -65,7 +63,7 @@ class RenderDirectory {
   // Returns whether other processes were at work here when the folder was opened.
   bool has_others() const { return has_others_; }
   // Counts the frames of the range that are such as not finished, as long as this object lives, and
-  // returns them.
+  // returns them; their lines and files stay.
   std::vector<FinishedFrame> reject(const std::function<bool(const FinishedFrame&)>& is_such);
 
   // Takes a frame, so that no other process renders it.
@@ -89,17 +87,18 @@ class RenderDirectory {
   // Takes over what is finished in the range of another folder: the lines, then the files, which
   // are moved, or copied and compared where it is on another file system; the other folder then has
   // neither. Frames that are finished here stay as they are, in both folders. Whoever calls has
-  // found the settings of both the same. What a crash interrupts, the next call completes. Returns
+  // found the settings of both the same. A crash between
+  // the moves of a frame's files is mended by take_back(). Returns
   // the number of frames taken over.
   std::size_t adopt(RenderDirectory& from);
+  // Puts the lines in the order of the frames.
+  void put_in_order();
 
   // Encodes the pictures of these frames to review.mp4 (or .mkv) and names the codec on `out`.
   std::filesystem::path write_video(const std::vector<FinishedFrame>& frames,
                                     std::ostream& out) const;
 
   const std::filesystem::path& path() const { return output_.directory; }
-  // Returns the text of the settings in the folder; empty: there are none, or not in a plain file.
-  std::string settings() const;
 
  private:
   std::filesystem::path file(std::uint64_t frame, const char* extension) const;
@@ -110,7 +109,7 @@ class RenderDirectory {
              const std::stop_token& stop);
   std::string differences_from(const std::string& settings) const;
   void read_lines();
-  void write_lines() const;
+  void write_lines(const Frames& frames) const;
   void forget(const std::vector<FinishedFrame>& frames);
   void verify(FrameRange range, const std::stop_token& stop);
   void reject_without_line(FrameRange range);

@@ -130,11 +130,26 @@ Frames frames_in(const std::filesystem::path& lines) {
   return frames;
 }
 
-Frames finished_frames(const set::Output& output, bool has_sums) {
+Frames finished_frames(const set::Output& output, bool has_sums, FrameRange range) {
   Frames frames = frames_in(output.directory / lines_name);
-  std::erase_if(frames,
-                [&](const auto& entry) { return !has_files(output, has_sums, entry.second); });
+  std::erase_if(frames, [&](const auto& entry) {
+    return entry.first < range.first || entry.first > range.last ||
+           !has_files(output, has_sums, entry.second);
+  });
   return frames;
+}
+
+void take_back(const std::filesystem::path& folder, const std::filesystem::path& other) {
+  for (const auto& [frame, record] : frames_in(folder / lines_name))
+    for (const auto& [name, mark] : record.files) {
+      const std::filesystem::path here = folder / name, there = other / name;
+      std::error_code unknown;
+      if (!frame_of(name) ||
+          std::filesystem::exists(std::filesystem::symlink_status(here, unknown)) ||
+          !std::filesystem::is_regular_file(std::filesystem::symlink_status(there, unknown)))
+        continue;
+      if (mark_of(there) == mark) move_file(there, here);
+    }
 }
 
 void move_file(const std::filesystem::path& from, const std::filesystem::path& to) {

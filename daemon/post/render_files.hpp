@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -14,6 +15,7 @@
 
 namespace previz::post {
 
+inline constexpr FrameRange all_frames{0, std::numeric_limits<std::uint64_t>::max()};
 inline constexpr const char* settings_name = "render.json";
 inline constexpr const char* lines_name = "frames.jsonl";
 inline constexpr const char* sums_extension = ".sums.exr";
@@ -38,9 +40,14 @@ using Frames = std::map<std::uint64_t, FinishedFrame>;
 // cut may have left one half written: it counts for nothing. Throws previz::Error where the file
 // cannot be read, or is no plain file.
 Frames frames_in(const std::filesystem::path& lines);
-// Returns the frames of which the folder has a line and all files, without a look into these and
-// without a lock. Throws like frames_in().
-Frames finished_frames(const set::Output& output, bool has_sums = false);
+// Returns the frames of the range of which the folder has a line and all files, without a look into
+// these and without a lock. Throws like frames_in().
+Frames finished_frames(const set::Output& output, bool has_sums = false,
+                       FrameRange range = all_frames);
+
+// Moves files of frames that `folder` has a line of back into it, where they are in `other` as
+// their line says: a crash came between the moves of a frame's files from the one to the other.
+void take_back(const std::filesystem::path& folder, const std::filesystem::path& other);
 
 // Gives the file another name, which may be on another disk: it is then copied and compared. Throws
 // previz::Error.

@@ -27,7 +27,6 @@ Job small_job() {
   job.wishes = {12, "render", "4:00:00", "64G"};
   JobTake take;
   take.session = "/takes/a 'take'\nof two lines";
-  take.start_ns = 5;
   take.pictures = "/out/a";
   take.frames = {3, 4};
   take.settings = "{}";
@@ -76,6 +75,35 @@ TEST(JobPlan, ThatIsNotOneIsRefused) {
               HasSubstr("order"));
   EXPECT_THAT(refusal([](auto& json) { json["render"]["scale"] = 1e9; }), HasSubstr("scale"));
   EXPECT_THAT(refusal([](auto& json) { json["render"]["samples"] = -1; }), HasSubstr("samples"));
+  EXPECT_THAT(refusal([](auto& json) { json["render"]["seconds"] = 1e308; }), HasSubstr("seconds"));
+  EXPECT_THAT(refusal([](auto& json) { json["sample_ranges"] = 4'294'967'297; }),
+              HasSubstr("4294967297"));
+  EXPECT_THAT(refusal([](auto& json) { json["takes"][0]["settings"] = "garbage"; }),
+              HasSubstr("no JSON object"));
+}
+
+// Otherwise the last step would find every frame there that is in a chunk, and none that is not.
+TEST(JobPlan, HasEveryFrameOnce) {
+  const char* const once = "do not have every frame once";
+  EXPECT_THAT(refusal([](auto& json) { json["chunks"] = nlohmann::json::array(); }),
+              HasSubstr(once));
+  EXPECT_THAT(refusal([](auto& json) { json["chunks"].erase(9); }), HasSubstr(once));
+  EXPECT_THAT(refusal([](auto& json) { json["chunks"].erase(3); }), HasSubstr(once));
+  EXPECT_THAT(refusal([](auto& json) { json["chunks"].push_back(json["chunks"][9]); }),
+              HasSubstr(once));
+  EXPECT_THAT(refusal([](auto& json) {
+                json["takes"][0]["frames"] = {3, 1u << 23};
+              }),
+              HasSubstr(once));
+  EXPECT_THAT(refusal([](auto& json) {
+                json["chunks"][9]["frames"] = {4, 1ull << 39};
+              }),
+              HasSubstr("from 4 to"));
+  EXPECT_THAT(refusal([](auto& json) {
+                json["takes"] = nlohmann::json::array();
+                json["chunks"] = nlohmann::json::array();
+              }),
+              HasSubstr("it has no take"));
 }
 
 // A plan from elsewhere names files; none of them is outside of what the command line allows.

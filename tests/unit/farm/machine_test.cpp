@@ -69,10 +69,23 @@ TEST_F(MachineTest, WithoutTheKindOfDeviceMayNot) {
   job_.on_gpu = true;
   const render::DeviceOptions cpu{.name = "llvmpipe"};
   machine_.open_device = [&](const auto&) { return render::open_device(cpu); };
-  EXPECT_THAT(test::error_of([&] { open_wanted_device(job_, machine_); }),
+  EXPECT_THAT(test::error_of([&] { open_wanted_device(job_, job_.takes[0], machine_); }),
               HasSubstr("the job is rendered on graphics cards, and there is none here"));
   job_.any_device = true;
-  EXPECT_NE(open_wanted_device(job_, machine_), nullptr);
+  EXPECT_NE(open_wanted_device(job_, job_.takes[0], machine_), nullptr);
+}
+
+// A set that wants its rays traced without the card's units has the same pictures on a farm.
+TEST_F(MachineTest, TracesRaysAsTheSetSays) {
+  std::optional<bool> hardware;
+  machine_.open_device = [&](const render::DeviceOptions& options) {
+    hardware = options.hardware_rays;
+    return render::open_device(options);
+  };
+  job_.any_device = true;
+  job_.takes[0].hardware_rays = false;
+  open_wanted_device(job_, job_.takes[0], machine_);
+  EXPECT_EQ(hardware, false);
 }
 
 }  // namespace previz::farm::machine_test

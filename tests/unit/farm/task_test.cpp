@@ -39,8 +39,10 @@ class FarmTask : public testing::Test {
     };
   }
   void submit() { farm::submit(options_, out_); }
-  int run(std::size_t chunk) {
+  int run(std::size_t chunk, const std::stop_token& stop = {}, bool not_if_taken = false) {
     TaskOptions task;
+    task.stop = stop;
+    task.not_if_taken = not_if_taken;
     task.job = folder_.path();
     task.chunk = chunk;
     return run_task(task, machine_, out_);
@@ -117,10 +119,15 @@ TEST_F(FarmTask, IsRenderedWithTheSetAsItWas) {
   std::filesystem::copy_file(directory_ / "set.toml", directory_ / "other.toml");
   options_.render.set_file = directory_ / "other.toml";
   submit();
-  std::filesystem::remove(directory_ / "other.toml");
-  std::filesystem::remove(directory_ / "card.gltf");
+  std::filesystem::rename(directory_ / "other.toml", directory_ / "kept.toml");
+  std::filesystem::rename(directory_ / "card.gltf", directory_ / "kept.gltf");
   run_all();
   EXPECT_EQ(finish(), task_status::done) << out_.str();
+  std::filesystem::rename(directory_ / "kept.toml", directory_ / "other.toml");
+  std::filesystem::rename(directory_ / "kept.gltf", directory_ / "card.gltf");
+  post::RenderOptions one;
+  one.set_file = directory_ / "other.toml";
+  expect_pictures_of_one_run(one);
 }
 
 // The set is the take's own, and was changed by hand after the job was made.
@@ -135,7 +142,7 @@ TEST_F(FarmTask, OfAnotherSetStopsTheJob) {
       state_of(folder_.read_state(0)),
       AllOf(StartsWith("job: "), HasSubstr("was changed since the job was made (samples is")));
   EXPECT_EQ(run(1), task_status::job_fault);
-  EXPECT_THAT(out_.str(), HasSubstr("the job was stopped by chunk 0: "));
+  EXPECT_THAT(out_.str(), HasSubstr("the job was stopped: chunk 0: "));
   EXPECT_EQ(state_of(folder_.read_state(1)), "none");
   EXPECT_FALSE(std::filesystem::exists(directory_ / "out/0000.exr"));
 }
@@ -192,16 +199,133 @@ TEST_F(FarmTask, WhosePictureWasDamagedIsFoundAndTriedAgain) {
   expect_pictures_of_one_run({});
 }
 
+// A chunk of which some frames are there, so that these are looked at before the first one is
+// rendered.
+TEST_F(FarmTask, ThatIsStoppedAtItsStartStopsNoOther) {
+  submit();
+  run_all();
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_EQ(run(0, stop.get_token()), task_status::done);
+  EXPECT_THAT(state_of(folder_.read_state(0)), StartsWith("stopped: "));
+  EXPECT_EQ(folder_.read_stopped(), "");
+  EXPECT_EQ(run(0), task_status::done) << out_.str();
+}
+
+// The disk may be gone from this machine alone, in the middle of the take.
+TEST_F(FarmTask, ThatCannotReadTheTakeIsForAnotherMachine) {
+  submit();
+  std::filesystem::remove_all(directory_ / "session/observer.mkv");
+  EXPECT_EQ(run(0), task_status::machine_fault);
+  EXPECT_THAT(state_of(folder_.read_state(0)), StartsWith("machine: "));
+  EXPECT_EQ(folder_.read_stopped(), "");
+}
+
+TEST_F(FarmTask, ThatMergesWaitsForAllSums) {
+  options_.render.samples = 256;
+  options_.render.neighbours = 0;
+  options_.division.sample_ranges = 2;
+  options_.division.chunk = 4;
+  submit();  // sums: 0 to 3, merges: 4 and 5
+  for (const std::size_t chunk : {0, 2, 3}) EXPECT_EQ(run(chunk), task_status::done);
+  EXPECT_EQ(run(4), task_status::machine_fault);
+  EXPECT_EQ(state_of(folder_.read_state(4)),
+            "machine: chunk 1 (frames 0 to 3 of session, sample range 2 of 2) is not rendered, so "
+            "that there is nothing to merge; `previzd farm retry` renders it");
+  EXPECT_EQ(run(5), task_status::done) << out_.str();
+  EXPECT_EQ(finish(), task_status::machine_fault);
+  run_all();
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+}
+
+// Folders of the job that lead elsewhere: nothing is written or removed there.
+TEST_F(FarmTask, OfAJobWithLinksIsRefused) {
+  test::TemporaryDirectory victim;
+  std::filesystem::create_directories(victim / "0000");
+  write_content(victim / "0000/notes.txt", "mine");
+  submit();
+  run_all();
+  for (const char* name : {"chunks", "state", "log", "set", "chunks/0001"}) {
+    const std::filesystem::path place = folder_.place(name), kept = directory_ / "kept";
+    std::filesystem::rename(place, kept);
+    std::filesystem::create_directory_symlink(victim.path(), place);
+    EXPECT_EQ(run(0), task_status::job_fault) << name;
+    JobOptions job;
+    job.job = folder_.path();
+    EXPECT_THAT(test::error_of([&] { farm::finish(job, out_); }), HasSubstr("is a link")) << name;
+    std::filesystem::remove(place);
+    std::filesystem::rename(kept, place);
+  }
+  EXPECT_EQ(content_of(victim / "0000/notes.txt"), "mine");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(victim.path()), {}), 1);
+}
+
+// What others have put into a chunk's folder stays when the job is complete.
+TEST_F(FarmTask, RemovesItsOwnFilesOnly) {
+  submit();
+  run_all();
+  write_content(folder_.chunk(1) / "notes.txt", "mine");
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  EXPECT_EQ(content_of(folder_.chunk(1) / "notes.txt"), "mine");
+  EXPECT_FALSE(std::filesystem::exists(folder_.chunk(0)));
+}
+
+// The loop on several machines ends with the last step on each.
+TEST_F(FarmTask, IsFinishedByTwoMachinesAtOnce) {
+  submit();
+  run_all();
+  std::ostringstream out;
+  int other = -1;
+  {
+    const std::jthread second([&] {
+      JobOptions job;
+      job.job = folder_.path();
+      other = farm::finish(job, out);
+    });
+    EXPECT_EQ(finish(), task_status::done) << out_.str();
+  }
+  EXPECT_EQ(other, task_status::done) << out.str();
+  EXPECT_FALSE(std::filesystem::exists(folder_.missing_file()));
+  EXPECT_EQ(state_of(folder_.read_finish_state()), "done: ");
+  expect_pictures_of_one_run({});
+}
+
+TEST_F(FarmTask, ThatAnotherHasMayBeLeftToIt) {
+  submit();
+  std::filesystem::create_directories(folder_.chunk(1));
+  post::FolderLocks other(folder_.chunk(1));
+  {
+    const post::FolderLocks::Transaction transaction(other);
+    other.join();
+  }
+  EXPECT_EQ(run(1, {}, /*not_if_taken=*/true), task_status::done);
+  EXPECT_THAT(out_.str(), HasSubstr("another machine is rendering it"));
+  EXPECT_EQ(state_of(folder_.read_state(1)), "none");
+}
+
+// A job has one name, by whatever way it is reached.
+TEST_F(FarmTask, IsKnownThroughALink) {
+  submit();
+  std::filesystem::create_directory_symlink(directory_.path(), directory_ / "way");
+  EXPECT_EQ(JobFolder(directory_ / "way/job/").name(), folder_.name());
+  EXPECT_EQ(JobFolder(directory_ / "way/../job").name(), folder_.name());
+}
+
 // After a failure of the network two machines may have one task.
 TEST_F(FarmTask, ThatRunsTwiceDoesNoHarm) {
   submit();
-  const std::jthread other([&] {
-    TaskOptions task;
-    task.job = folder_.path();
-    std::ostringstream out;
-    EXPECT_EQ(run_task(task, machine_, out), task_status::done) << out.str();
-  });
-  EXPECT_EQ(run(0), task_status::done) << out_.str();
+  {
+    const std::jthread other([&] {
+      TaskOptions task;
+      task.job = folder_.path();
+      std::ostringstream out;
+      EXPECT_EQ(run_task(task, machine_, out), task_status::done) << out.str();
+    });
+    EXPECT_EQ(run(0), task_status::done) << out_.str();
+  }
+  run_all();
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  expect_pictures_of_one_run({});
 }
 
 TEST_F(FarmTask, ThatIsAtWorkIsLeftAloneByTheLastStep) {
@@ -281,6 +405,7 @@ TEST_F(FarmTask, OfManyFramesIsPlannedAndProvedInLittleTimeAndSpace) {
   job.takes.emplace_back();
   job.takes[0].session = job.takes[0].pictures = "/a";
   job.takes[0].frames = {0, 9'999};
+  job.takes[0].settings = "{}";
   Division division;
   division.chunk = 1;
   divide(frames, 0, 1, division, job.chunks);
@@ -289,7 +414,6 @@ TEST_F(FarmTask, OfManyFramesIsPlannedAndProvedInLittleTimeAndSpace) {
   Job read = job_from_json(text, "plan");
   EXPECT_EQ(read.chunks.size(), 10'000u);
   read.takes[0].pictures = directory_ / "out";
-  read.takes[0].settings = "{}";
   const Proof proof = prove(folder_, read, out_, {});
   EXPECT_EQ(proof.chunks.size(), 10'000u);
 }

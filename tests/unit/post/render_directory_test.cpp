@@ -4,6 +4,7 @@
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/post/render.hpp"
+#include "daemon/post/render_files.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
@@ -131,21 +132,46 @@ TEST_F(RenderDirectoryTest, TakesOverWhatAnotherFolderHas) {
   EXPECT_EQ(open().adopt(left), 1u);
 }
 
-// A crash after the lines were written, and before all files were moved.
-TEST_F(RenderDirectoryTest, GoesOnWithWhatItHadBegunToTakeOver) {
+// A crash after each of the moves of two frames of two files, and after the lines were written.
+TEST_F(RenderDirectoryTest, LosesNoFrameWhereACrashCutsTheTakingOver) {
   const set::Output part{directory_ / "part", true, true, false};
-  {
+  const std::vector<const char*> moves{"0000.exr", "0000.png", "0001.exr", "0001.png", ""};
+  for (std::size_t moved = 0; moved <= moves.size(); ++moved) {
+    std::filesystem::remove_all(directory_ / "part");
+    std::filesystem::remove_all(directory_ / "out");
+    {
+      RenderDirectory from(part, settings, false);
+      for (const std::uint64_t frame : {0, 1}) from.write(sample_shot(frame), set_);
+    }
+    open();
+    for (std::size_t i = 0; i < moved && *moves[i] != 0; ++i)
+      std::filesystem::rename(directory_ / "part" / moves[i], directory_ / "out" / moves[i]);
+    if (moved == moves.size())
+      std::filesystem::copy_file(directory_ / "part/frames.jsonl", directory_ / "out/frames.jsonl",
+                                 std::filesystem::copy_options::overwrite_existing);
+    take_back(directory_ / "part", directory_ / "out");
     RenderDirectory from(part, settings, false);
-    for (const std::uint64_t frame : {0, 1}) from.write(sample_shot(frame), set_);
+    RenderDirectory to = open();
+    to.adopt(from);
+    EXPECT_EQ(finished(to, 1), "yy") << moved;
+    EXPECT_TRUE(from.rejected().empty()) << moved;
+    EXPECT_EQ(finished(open(), 1), "yy") << moved;
   }
-  open();
-  std::filesystem::copy_file(directory_ / "part/frames.jsonl", directory_ / "out/frames.jsonl",
-                             std::filesystem::copy_options::overwrite_existing);
-  for (const char* name : {"0000.exr", "0000.png"})
-    std::filesystem::rename(directory_ / "part" / name, directory_ / "out" / name);
+}
+
+// The lines of what is not taken over stay, with their files.
+TEST_F(RenderDirectoryTest, KeepsWhatItCountsAsNotFinished) {
+  const set::Output part{directory_ / "part", true, true, false};
   RenderDirectory from(part, settings, false);
+  from.write(sample_shot(0), set_, {"a card", true});
+  from.write(sample_shot(1), set_, {"a processor", false});
+  const auto rejected =
+      from.reject([](const FinishedFrame& frame) { return frame.made_on.is_gpu; });
+  ASSERT_EQ(rejected.size(), 1u);
   EXPECT_EQ(open().adopt(from), 1u);
-  EXPECT_EQ(finished(open(), 1), "yy");
+  const RenderDirectory again(part, settings, false);
+  EXPECT_EQ(finished(again, 1), "yn");
+  EXPECT_TRUE(again.rejected().empty());
 }
 
 TEST_F(RenderDirectoryTest, UntouchedFrameSaysWhyAndHasNoPose) {
@@ -241,9 +267,7 @@ TEST_F(RenderDirectoryTest, AStopEndsTheCheckAndChangesNothing) {
   std::stop_source stop;
   stop.request_stop();
   const std::string lines = content_of(directory_ / "out/frames.jsonl");
-  EXPECT_THROW(
-      RenderDirectory(output_, settings, false, {}, RenderDirectory::all_frames, stop.get_token()),
-      Error);
+  EXPECT_THROW(RenderDirectory(output_, settings, false, {}, all_frames, stop.get_token()), Error);
   EXPECT_EQ(content_of(directory_ / "out/frames.jsonl"), lines);
 }
 
