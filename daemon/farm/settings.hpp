@@ -11,7 +11,7 @@ namespace previz::farm {
 // Returns whether the pictures are the same but for the range of samples, in which the chunks of a
 // take differ.
 bool same_settings(const std::string& one, const std::string& other);
-// Returns the first few that differ: "samples is 16 there and 64 now".
+// Returns those that differ: "samples is 16 there and 64 now".
 std::string difference_words(const std::string& there, const std::string& planned);
 
 // Returns whether `sums` is one of the chunks whose sums `merge` makes pictures of.

@@ -53,7 +53,7 @@ void take_back(const std::filesystem::path& folder, const std::filesystem::path&
 // previz::Error.
 void move_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
-// Returns the first few settings that differ: "samples is 16 there and 64 now". Both are objects.
+// Returns the settings that differ: "samples is 16 there and 64 now". Both are objects.
 std::string differences(const nlohmann::json& there, const nlohmann::json& now);
 
 // Returns the mark of a file that is there; throws previz::Error if it cannot be read.
