@@ -12,7 +12,7 @@ using Json = nlohmann::ordered_json;
 // Waits for previzd also where a signal to all processes of the job interrupts the waiting: it ends
 // by itself, with what it has finished on disk.
 constexpr const char* wait_for_previzd = R"sh(pid=$!
-trap : TERM INT
+trap 'is_ended=1' TERM INT
 while :; do
   wait "$pid"
   status=$?
@@ -40,14 +40,9 @@ std::string own_log(const ScriptPlaces& places, const std::string& name) {
   return is_plain(places.job) ? "" : "exec >>\"$job/log/" + name + "\" 2>&1\n";
 }
 
-void add_common(const JobFolder& folder, const Job& job, const std::string& log,
-                std::vector<std::string>& arguments) {
-  const bool plain = is_plain(folder.path());
-  arguments.push_back("--job-name=" + folder.name());
-  arguments.push_back("--chdir=" + (plain ? folder.path().string() : "/"));
-  arguments.push_back("--output=" + (plain ? "log/" + log : "/dev/null"));
-  arguments.push_back("--open-mode=append");
-  arguments.push_back("--requeue");
+// What the job asks for, which the user's own arguments may replace.
+void add_wishes_of(const Job& job, std::vector<std::string>& arguments) {
+  arguments.emplace_back("--requeue");
   if (!job.wishes.partition.empty()) arguments.push_back("--partition=" + job.wishes.partition);
   if (!job.wishes.time.empty()) arguments.push_back("--time=" + job.wishes.time);
 }
@@ -59,6 +54,17 @@ void add_device(const Job& job, std::vector<std::string>& arguments) {
     arguments.push_back("--mem=" + job.wishes.memory);
   else if (!job.on_gpu)
     arguments.emplace_back("--mem=0");
+}
+
+// What the job is found by, and its tasks find their way by: it stands after the user's own
+// arguments, of which sbatch takes the last.
+void add_fixed(const JobFolder& folder, const std::string& log,
+               std::vector<std::string>& arguments) {
+  const bool plain = is_plain(folder.path());
+  arguments.push_back("--job-name=" + folder.name());
+  arguments.push_back("--chdir=" + (plain ? folder.path().string() : "/"));
+  arguments.push_back("--output=" + (plain ? "log/" + log : "/dev/null"));
+  arguments.emplace_back("--open-mode=append");
 }
 
 std::string dependency(const std::vector<std::string>& after) {
@@ -91,14 +97,18 @@ std::string shell_word(const std::string& text) {
 std::string slurm_tasks(const ScriptPlaces& places) {
   return head(places, "A task of a Slurm array: renders the chunk of its number.") +
          R"sh(task=$((SLURM_ARRAY_TASK_ID + ${1:-0}))
+is_ended=
+log=$(printf %04d "$SLURM_ARRAY_TASK_ID").log
+[[ ${1:-0} == 0 ]] || log=$1+$log
 # Slurm gives a task processors, and only some sites hold it to them.
 [[ -z ${SLURM_CPUS_ON_NODE:-} ]] || export LP_NUM_THREADS=$SLURM_CPUS_ON_NODE
-)sh" + own_log(places, "$(printf %04d \"$task\").log") +
+)sh" + own_log(places, "$log") +
          call(places, "task \"$job\" \"$task\"") + " &" + "\n" + wait_for_previzd +
-         R"sh(if [[ $status == 75 && ${SLURM_RESTART_COUNT:-0} -lt 3 ]]; then
-  # This machine stays taken for a while, so that it does not refuse one task after the other.
-  sleep "${PREVIZ_FARM_WAIT_S:-120}"
-  scontrol requeue "$SLURM_JOB_ID" && sleep 60
+         R"sh(if [[ $status == 75 && -z $is_ended && ${SLURM_RESTART_COUNT:-0} -lt 3 ]]; then
+  # This machine stays taken for a while, so that it does not refuse one task after the other. A
+  # signal to this script or to the waiting ends the task: whoever cancels it wants it no more.
+  sleep "${PREVIZ_FARM_WAIT_S:-120}" &
+  wait $! && [[ -z $is_ended ]] && scontrol requeue "$SLURM_JOB_ID" && sleep 60
 fi
 [[ $status != 1 ]] || scancel --state=PENDING "$SLURM_ARRAY_JOB_ID"
 exit "$status"
@@ -114,12 +124,28 @@ std::string shell_loop(const ScriptPlaces& places, const Job& job) {
   const std::string last = std::to_string(job.chunks.size() - 1);
   return head(places,
               "Renders a job without a scheduler, on as many machines as it is started on.") +
-         "set -u\n# First what no other machine is at, then what others have left.\n"
-         "for waits in --not-if-taken ''; do\n  for task in $(seq 0 " +
-         last + "); do\n    " + call(places, "task \"$job\" \"$task\" $waits") +
-         "\n    status=$?\n    [[ $status == 0 || $status == 75 ]] || exit \"$status\"\n  "
-         "done\ndone\n" +
-         call(places, "finish \"$job\"") + "\n";
+         R"sh(set -u
+# Ctrl-C ends the loop, and not only the task in hand, which ends by itself with status 0.
+trap 'exit 130' INT
+trap 'exit 143' TERM
+# First what no other machine is at, then what others have left.
+for waits in --not-if-taken ''; do
+  for task in $(seq 0 )sh" +
+         last +
+         R"sh(); do
+    )sh" +
+         call(places, "task \"$job\" \"$task\" $waits") +
+         R"sh(
+    status=$?
+    if [[ $status == 75 ]]; then
+      echo "this machine leaves the loop, for the reason above; others go on with it, and the last" \
+        "of them does the last step. Start it here again once that is mended." >&2
+    fi
+    [[ $status == 0 ]] || exit "$status"
+  done
+done
+)sh" + call(places, "finish \"$job\"") +
+         "\n";
 }
 
 std::string openjd_template(const ScriptPlaces& places, const Job& job, const std::string& name) {
@@ -165,14 +191,15 @@ std::vector<std::string> sbatch_arguments(const JobFolder& folder, const Job& jo
                                           const std::vector<std::string>& after,
                                           const std::vector<std::string>& more) {
   std::vector<std::string> arguments{"--parsable"};
+  add_wishes_of(job, arguments);
+  add_device(job, arguments);
+  arguments.insert(arguments.end(), more.begin(), more.end());
+  // %4a has at least four digits, as the chunks have.
+  add_fixed(folder, (offset == 0 ? "" : std::to_string(offset) + "+") + "%4a.log", arguments);
   arguments.push_back("--array=" + indices +
                       (job.wishes.at_once > 0 ? "%" + std::to_string(job.wishes.at_once) : ""));
   arguments.push_back("--comment=" + std::to_string(offset));  // by which squeue names the chunk
-  // %4a has at least four digits, as the chunks have.
-  add_common(folder, job, (offset == 0 ? "" : std::to_string(offset) + "+") + "%4a.log", arguments);
-  add_device(job, arguments);
   if (!after.empty()) arguments.push_back(dependency(after));
-  arguments.insert(arguments.end(), more.begin(), more.end());
   arguments.push_back(folder.task_script().string());
   arguments.push_back(std::to_string(offset));
   return arguments;
@@ -182,9 +209,10 @@ std::vector<std::string> sbatch_finish_arguments(const JobFolder& folder, const 
                                                  const std::vector<std::string>& after,
                                                  const std::vector<std::string>& more) {
   std::vector<std::string> arguments{"--parsable"};
-  add_common(folder, job, "finish.log", arguments);
-  arguments.push_back(dependency(after));
+  add_wishes_of(job, arguments);
   arguments.insert(arguments.end(), more.begin(), more.end());
+  add_fixed(folder, "finish.log", arguments);
+  arguments.push_back(dependency(after));
   arguments.push_back(folder.finish_script().string());
   return arguments;
 }

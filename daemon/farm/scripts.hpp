@@ -24,13 +24,14 @@ std::string shell_word(const std::string& text);
 
 // Returns the script of a Slurm array: its task N renders chunk N plus the script's first argument.
 // Exit status 75 requeues the task, three times at most, after a wait on the machine that refused
-// it, so that a machine that refuses all tasks does not use them all up. Exit status 1 cancels the
-// tasks that have not begun.
+// it, so that a machine that refuses all tasks does not use them all up; a signal during the wait
+// ends the task for good. Exit status 1 cancels the tasks that have not begun.
 std::string slurm_tasks(const ScriptPlaces& places);
 // Returns the script of the last step.
 std::string slurm_finish(const ScriptPlaces& places);
 // Returns a script that renders all chunks, one after the other, and then does the last step. It
-// may run on several machines at once: each takes what no other is at.
+// may run on several machines at once: each takes what no other is at. A machine that refuses a
+// task leaves the loop, and the last step is for those that go through it.
 std::string shell_loop(const ScriptPlaces& places, const Job& job);
 
 // Returns an Open Job Description template, version 2023-09, in JSON, which is YAML as well: the
@@ -39,7 +40,8 @@ std::string shell_loop(const ScriptPlaces& places, const Job& job);
 std::string openjd_template(const ScriptPlaces& places, const Job& job, const std::string& name);
 
 // Returns the arguments of sbatch(1) for an array of the chunks in `indices`, such as "0-12,17",
-// counted from `offset`; `more` comes last.
+// counted from `offset`. Those in `more` replace what the job asks for, but not what it is found
+// by: name, folder, logs, comment, array and dependencies.
 std::vector<std::string> sbatch_arguments(const JobFolder& folder, const Job& job,
                                           const std::string& indices, std::size_t offset,
                                           const std::vector<std::string>& after,

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <exception>
+#include <filesystem>
+#include <functional>
 #include <ostream>
 #include <sstream>
 
@@ -65,47 +68,61 @@ std::string quoted_command(const std::vector<std::string>& arguments) {
   return text;
 }
 
-// Hands jobs over one after the other, or takes them all back.
-class Submission {
- public:
-  Submission(const JobFolder& folder, const Job& job, const std::vector<std::string>& more)
-      : folder_(folder), job_(job), more_(more) {}
+// Hands over one job with these arguments of sbatch, and returns the name by which others wait for
+// it.
+using Submit =
+    std::function<std::string(const char* about, const std::vector<std::string>& arguments)>;
 
-  // Returns the numbers of the arrays.
-  std::vector<std::string> add_arrays(const std::vector<Array>& arrays,
-                                      const std::vector<std::string>& after) {
-    std::vector<std::string> numbers;
-    for (const Array& array : arrays) {
-      const std::uint64_t number = sbatch(
-          sbatch_arguments(folder_, job_, index_list(array.indices), array.offset, after, more_));
-      numbers.push_back(std::to_string(number));
-      submitted_.tasks.push_back(number);
+// Hands over the arrays of these chunks, and then the last step.
+void for_each_job(const JobFolder& folder, const Job& job, const std::set<std::size_t>& chunks,
+                  const std::vector<std::string>& more, const Submit& submit) {
+  const std::size_t size = array_size();
+  std::vector<std::string> all;
+  const auto add_arrays = [&](const char* about, std::size_t first, std::size_t end) {
+    const std::vector<std::string> needed = all;
+    std::string before;
+    for (const Array& array : arrays_of(chunks, first, end, size)) {
+      std::vector<std::string> after = needed;
+      // Slurm limits each array by itself.
+      if (job.wishes.at_once > 0 && !before.empty()) after.push_back(before);
+      before = submit(about, sbatch_arguments(folder, job, index_list(array.indices), array.offset,
+                                              after, more));
+      all.push_back(before);
     }
-    return numbers;
-  }
-  void add_finish(const std::vector<std::string>& after) {
-    submitted_.finish = sbatch(sbatch_finish_arguments(folder_, job_, after, more_));
-  }
-  const Submitted& submitted() const { return submitted_; }
+  };
+  add_arrays("render", 0, job.first_merge());
+  add_arrays("merge", job.first_merge(), job.chunks.size());
+  submit("check", sbatch_finish_arguments(folder, job, all, more));
+}
 
- private:
-  std::uint64_t sbatch(const std::vector<std::string>& arguments) {
-    const ProgramResult result = run_program("sbatch", arguments);
-    const std::optional<std::uint64_t> number =
-        result.is_good() ? number_in(result.out) : std::nullopt;
-    if (number) return *number;
-    for (const std::uint64_t before : submitted_.tasks)
-      run_program("scancel", {std::to_string(before)});
-    throw Error("sbatch does not take the job: " +
-                (result.is_good() ? "it prints no number, but: " + result.out : result.why()) +
-                "; nothing was submitted");
-  }
+// Returns the number of the job that sbatch has taken.
+std::uint64_t submit_one(const std::vector<std::string>& arguments) {
+  const ProgramResult result = run_program("sbatch", arguments);
+  if (!result.is_good()) throw Error("sbatch does not take the job: " + result.why());
+  if (const std::optional<std::uint64_t> number = number_in(result.out)) return *number;
+  throw Error("sbatch does not take the job: it prints no number, but: " + result.out);
+}
 
-  const JobFolder& folder_;
-  const Job& job_;
-  const std::vector<std::string>& more_;
-  Submitted submitted_;
-};
+// Cancels by the job's name: an sbatch that gave no answer may have submitted its part, too.
+[[noreturn]] void take_back(const JobFolder& folder, const std::string& why) {
+  const std::string name = "--name=" + folder.name();
+  std::string fault;
+  try {
+    const ProgramResult result = run_program("scancel", {name});
+    if (!result.is_good()) fault = result.why();
+  } catch (const Error& error) {
+    fault = error.what();
+  }
+  if (!fault.empty())
+    throw Error(why + "; a part may be in the queue already, and scancel cannot remove it (" +
+                fault + "); run `scancel " + name + "`");
+  try {
+    folder.write_submitted({});
+  } catch (const Error&) {
+    // The numbers of jobs that were cancelled do no harm.
+  }
+  throw Error(why + "; nothing was submitted");
+}
 
 // Returns the numbers of what was submitted, "17,18"; empty: nothing was.
 std::string submitted_numbers(const JobFolder& folder) {
@@ -127,8 +144,11 @@ std::vector<std::string> fields_of(const std::string& line) {
 // Takes "17_3|1000|RUNNING|node2|None": the job's number and the task's, its argument, and the
 // rest.
 std::optional<QueuedTask> task_of(const std::vector<std::string>& fields) {
-  if (fields.size() < 5) return std::nullopt;
-  QueuedTask task{std::nullopt, fields[2], fields[3], fields[4]};
+  if (fields.size() < 3) return std::nullopt;
+  const auto field = [&](std::size_t index) {
+    return index < fields.size() ? fields[index] : std::string();
+  };
+  QueuedTask task{std::nullopt, fields[2], field(3), field(4)};
   const std::size_t under = fields[0].find('_');
   if (under == std::string::npos) return task;
   const auto index = number_in(fields[0].substr(under + 1));
@@ -163,19 +183,25 @@ void write_scripts(const JobFolder& folder, const Job& job, const ScriptPlaces& 
 
 void submit_chunks(const JobFolder& folder, const Job& job, const std::set<std::size_t>& chunks,
                    const std::vector<std::string>& more, std::ostream& out) {
-  const std::size_t size = array_size();
-  Submission submission(folder, job, more);
-  const std::vector<std::string> rendered =
-      submission.add_arrays(arrays_of(chunks, 0, job.first_merge(), size), {});
-  const std::vector<std::string> merged = submission.add_arrays(
-      arrays_of(chunks, job.first_merge(), job.chunks.size(), size), rendered);
-  std::vector<std::string> all = rendered;
-  all.insert(all.end(), merged.begin(), merged.end());
-  submission.add_finish(all);
-  folder.write_submitted(submission.submitted());
-  for (const std::string& number : rendered) out << "render: job " << number << "\n";
-  for (const std::string& number : merged) out << "merge: job " << number << "\n";
-  out << "check: job " << *submission.submitted().finish << std::endl;
+  Submitted submitted;
+  std::string printed;
+  folder.write_submitted(submitted);
+  try {
+    for_each_job(folder, job, chunks, more,
+                 [&](const std::string& about, const std::vector<std::string>& arguments) {
+                   const std::uint64_t number = submit_one(arguments);
+                   if (about == "check")
+                     submitted.finish = number;
+                   else
+                     submitted.tasks.push_back(number);
+                   folder.write_submitted(submitted);
+                   printed += about + ": job " + std::to_string(number) + "\n";
+                   return std::to_string(number);
+                 });
+  } catch (const std::exception& error) {
+    take_back(folder, error.what());
+  }
+  out << printed << std::flush;
 }
 
 void print_submission(const JobFolder& folder, const Job& job, const ScriptPlaces& places,
@@ -184,32 +210,24 @@ void print_submission(const JobFolder& folder, const Job& job, const ScriptPlace
   for (std::size_t chunk = 0; chunk < job.chunks.size(); ++chunk) chunks.insert(chunk);
   out << "# " << folder.task_script().string() << "\n" << slurm_tasks(places) << "\n";
   out << "# " << folder.finish_script().string() << "\n" << slurm_finish(places) << "\n";
-  const std::size_t size = array_size();
-  std::vector<std::string> after;
-  const auto print = [&](std::size_t first, std::size_t end, const char* name) {
-    std::vector<std::string> numbers;
-    for (const Array& array : arrays_of(chunks, first, end, size)) {
-      out << quoted_command(sbatch_arguments(folder, job, index_list(array.indices), array.offset,
-                                             after, more))
-          << "\n";
-      numbers.emplace_back(name);
-    }
-    after.insert(after.end(), numbers.begin(), numbers.end());
-  };
-  print(0, job.first_merge(), "RENDER");
-  print(job.first_merge(), job.chunks.size(), "MERGE");
-  out << quoted_command(sbatch_finish_arguments(folder, job, after, more)) << std::endl;
+  for_each_job(folder, job, chunks, more,
+               [&](const std::string& about, const std::vector<std::string>& arguments) {
+                 out << quoted_command(arguments) << "\n";
+                 return std::string(about == "merge" ? "MERGE" : "RENDER");
+               });
+  out << std::flush;
 }
 
-// The name is compared as well, because the numbers come from a file.
+bool was_submitted(const JobFolder& folder) {
+  std::error_code unknown;
+  return std::filesystem::exists(folder.path() / "submitted.json", unknown);
+}
+
+// It asks by the name, which no file of the folder can choose, and by which also that is found
+// whose number was never written down.
 std::vector<QueuedTask> queued_tasks(const JobFolder& folder) {
-  const std::string numbers = submitted_numbers(folder);
-  if (numbers.empty()) return {};
-  const ProgramResult result =
-      run_program("squeue", {"--noheader", "--array", "--jobs=" + numbers,
-                             "--name=" + folder.name(), "--format=%i|%k|%T|%N|%r"});
-  // It does not know jobs that ended long ago.
-  if (!result.is_good() && result.errors.find("Invalid job id") != std::string::npos) return {};
+  const ProgramResult result = run_program(
+      "squeue", {"--noheader", "--array", "--name=" + folder.name(), "--format=%i|%k|%T|%N|%r"});
   if (!result.is_good()) throw Error("squeue does not respond: " + result.why());
   std::vector<QueuedTask> tasks;
   std::istringstream lines(result.out);
@@ -219,14 +237,30 @@ std::vector<QueuedTask> queued_tasks(const JobFolder& folder) {
   return tasks;
 }
 
-void cancel_tasks(const JobFolder& folder) {
-  const Submitted submitted = folder.read_submitted();
-  std::vector<std::string> arguments{"--name=" + folder.name()};
-  for (const std::uint64_t number : submitted.tasks) arguments.push_back(std::to_string(number));
-  if (submitted.finish) arguments.push_back(std::to_string(*submitted.finish));
-  if (arguments.size() == 1) throw Error(folder.path().string() + ": was not submitted to Slurm");
-  const ProgramResult result = run_program("scancel", arguments);
-  if (!result.is_good()) throw Error("scancel does not respond: " + result.why());
+std::string numbers_of_others(const JobFolder& folder) {
+  const std::string numbers = submitted_numbers(folder);
+  if (numbers.empty()) return "";
+  const ProgramResult result =
+      run_program("squeue", {"--noheader", "--jobs=" + numbers, "--format=%A|%j"});
+  // It does not know jobs that ended long ago.
+  if (!result.is_good() && result.errors.find("Invalid job id") != std::string::npos) return "";
+  if (!result.is_good()) throw Error("squeue does not respond: " + result.why());
+  std::set<std::string> others;
+  std::istringstream lines(result.out);
+  for (std::string line; std::getline(lines, line);) {
+    const std::vector<std::string> fields = fields_of(line);
+    if (fields.size() > 1 && fields[1] != folder.name()) others.insert(fields[0]);
+  }
+  std::string list;
+  for (const std::string& number : others) add_to_list(list, number, ",");
+  return list;
+}
+
+bool cancel_tasks(const JobFolder& folder) {
+  if (queued_tasks(folder).empty()) return false;
+  const ProgramResult result = run_program("scancel", {"--name=" + folder.name()});
+  if (!result.is_good()) throw Error("scancel does not cancel the job: " + result.why());
+  return true;
 }
 
 }  // namespace previz::farm

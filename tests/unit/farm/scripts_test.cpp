@@ -18,11 +18,13 @@ class Scripts : public testing::Test {
   ProgramResult run(const std::string& script, int status, const std::string& more = "") {
     session::write_content(directory_ / "script.sh", script);
     session::write_content(places_.program,
-                           "#!/bin/sh\nprintf 'previzd\\n'; printf '<%s>\\n' \"$@\"\nexit " +
-                               std::to_string(status) + "\n");
+                           "#!/bin/sh\nprintf 'previzd\\n'; printf '<%s>\\n' \"$@\"\n" +
+                               previzd_does_ + "\nexit " + std::to_string(status) + "\n");
     for (const char* name : {"scontrol", "scancel", "sleep"})
-      session::write_content(directory_ / "bin" / name, "#!/bin/sh\nprintf '" + std::string(name) +
-                                                            "'; printf ' %s' \"$@\"; echo\n");
+      session::write_content(directory_ / "bin" / name,
+                             "#!/bin/sh\nprintf '" + std::string(name) +
+                                 "'; printf ' %s' \"$@\"; echo\n" +
+                                 (name == std::string("sleep") ? sleep_does_ : "") + "\n");
     for (const auto& file : {places_.program, directory_ / "bin/scontrol",
                              directory_ / "bin/scancel", directory_ / "bin/sleep"})
       std::filesystem::permissions(file, std::filesystem::perms::owner_all);
@@ -33,6 +35,7 @@ class Scripts : public testing::Test {
                                              "bash script.sh 1000"});
   }
   test::TemporaryDirectory directory_;
+  std::string previzd_does_, sleep_does_;  // further lines of those in their places
   ScriptPlaces places_{directory_ / "bin/previzd", directory_ / hostile, false};
 };
 
@@ -42,7 +45,7 @@ TEST_F(Scripts, GiveANameToPreviZdAsItIs) {
   const ProgramResult result = run(slurm_tasks(places_), 0);
   EXPECT_EQ(result.status, 0) << result.errors;
   EXPECT_EQ(result.out, "");
-  EXPECT_EQ(session::content_of(places_.job / "log/1003.log"),
+  EXPECT_EQ(session::content_of(places_.job / "log/1000+0003.log"),
             "previzd\n<farm>\n<task>\n<" + places_.job.string() + ">\n<1003>\n");
   EXPECT_FALSE(std::filesystem::exists(directory_ / "hit"));
 }
@@ -80,6 +83,42 @@ TEST_F(Scripts, LoopOverAllChunksAndFinish) {
   EXPECT_EQ(result.out, expected + "previzd\n<farm>\n<finish>\n" + name);
   const ProgramResult mistake = run(shell_loop(places_, job), 1);
   EXPECT_EQ(mistake.out, "previzd\n<farm>\n<task>\n" + name + "<0>\n<--not-if-taken>\n");
+}
+
+// It would refuse all others as well, in seconds, and the last step is not its business.
+TEST_F(Scripts, AMachineThatRefusesATaskLeavesTheLoop) {
+  Job job;
+  job.chunks.resize(2);
+  const ProgramResult result = run(shell_loop(places_, job), 75);
+  EXPECT_EQ(result.status, 75);
+  EXPECT_EQ(result.out,
+            "previzd\n<farm>\n<task>\n<" + places_.job.string() + ">\n<0>\n<--not-if-taken>\n");
+  EXPECT_THAT(result.errors, HasSubstr("this machine leaves the loop"));
+}
+
+// A task that Ctrl-C ends has status 0, by which a shell takes it that the signal was dealt with.
+TEST_F(Scripts, CtrlCEndsTheLoop) {
+  Job job;
+  job.chunks.resize(2);
+  previzd_does_ = "kill -INT $PPID; exit 0";
+  const ProgramResult result = run(shell_loop(places_, job), 0);
+  EXPECT_EQ(result.status, 130);
+  EXPECT_THAT(result.out, AllOf(HasSubstr("<0>"), Not(HasSubstr("<1>"))));
+}
+
+// scancel ends the waiting, or this script, or both.
+TEST_F(Scripts, ATaskThatIsCanceledWhileItWaitsIsNotRequeued) {
+  places_.job = "/job";
+  sleep_does_ = "exit 143";
+  ProgramResult canceled = run(slurm_tasks(places_), 75);
+  EXPECT_EQ(canceled.status, 75);
+  EXPECT_THAT(canceled.out, AllOf(HasSubstr("sleep 120\n"), Not(HasSubstr("requeue"))));
+  sleep_does_ = "kill -TERM $PPID; exit 0";
+  canceled = run(slurm_tasks(places_), 75);
+  EXPECT_THAT(canceled.out, AllOf(HasSubstr("sleep 120\n"), Not(HasSubstr("requeue"))));
+  previzd_does_ = "kill -TERM $PPID";
+  canceled = run(slurm_tasks(places_), 75);
+  EXPECT_THAT(canceled.out, Not(HasSubstr("sleep")));
 }
 
 TEST_F(Scripts, DescribeTheJobForOtherSchedulers) {

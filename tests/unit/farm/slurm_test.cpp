@@ -19,6 +19,7 @@ class Slurm : public testing::Test {
              "n=$(cat \"$HERE/n\" 2>/dev/null || echo 16); n=$((n + 1)); echo $n > \"$HERE/n\"; "
              "echo $n");
     stand_in("scancel", "");
+    stand_in("squeue", "");
     write_scripts(folder_, job_, {"/usr/bin/previzd", folder_.path(), false});
   }
   // Puts a script in the place of a program; it appends its name and arguments to `calls`.
@@ -46,14 +47,34 @@ TEST_F(Slurm, GetsArraysThatItAllowsAndTheLastStepAfterThem) {
   EXPECT_EQ(out_.str(), "render: job 17\nrender: job 18\nrender: job 19\ncheck: job 20\n");
   const std::string all = calls();
   EXPECT_THAT(all, HasSubstr("--array=0-1000%8 "));
-  EXPECT_THAT(all, HasSubstr("--array=0-497%8 "));
   EXPECT_THAT(all,
               HasSubstr("--partition=render --time=1:00:00 --exclusive --mem=0 --account=film "));
   EXPECT_THAT(all, HasSubstr("tasks.sh 2002\n"));
-  EXPECT_THAT(all, HasSubstr("--dependency=afterany:17:18:19 --account=film "));
+  EXPECT_THAT(all, HasSubstr("--dependency=afterany:17:18:19 "));
   const Submitted submitted = folder_.read_submitted();
   EXPECT_EQ(submitted.tasks, (std::vector<std::uint64_t>{17, 18, 19}));
   EXPECT_EQ(submitted.finish, 20u);
+}
+
+// Slurm counts the tasks of each array by itself, so that only one array may run.
+TEST_F(Slurm, LimitsTheTasksOfAllArrays) {
+  job_.wishes.at_once = 8;
+  for (std::size_t i = 2200; i < 2500; ++i) job_.chunks[i].kind = ChunkKind::merge;
+  submit_chunks(folder_, job_, {0, 1500, 2100, 2300}, {}, out_);
+  EXPECT_EQ(out_.str(),
+            "render: job 17\nrender: job 18\nrender: job 19\nmerge: job 20\ncheck: job 21\n");
+  EXPECT_THAT(calls(), HasSubstr("--array=499%8 --comment=1001 --dependency=afterany:17 "));
+  EXPECT_THAT(calls(), HasSubstr("--array=98%8 --comment=2002 --dependency=afterany:18 "));
+  EXPECT_THAT(calls(), HasSubstr("--dependency=afterany:17:18:19 "));
+}
+
+// The user's own arguments come before those that the job is found by: sbatch takes the last.
+TEST_F(Slurm, TakesNoNameAndNoPlaceFromTheUser) {
+  submit_chunks(folder_, job_, {1500}, {"--gres=gpu:a100:1", "--job-name=x", "--comment=x"}, out_);
+  const std::string all = calls();
+  for (const char* fixed : {"--job-name=previz-", "--comment=1001", "--chdir=", "--output=log/"})
+    EXPECT_GT(all.find(fixed), all.find("--comment=x")) << fixed;
+  EXPECT_GT(all.find("--gres=gpu:a100:1"), all.find("--exclusive"));
 }
 
 TEST_F(Slurm, IsAskedForAGraphicsCardOrAWholeProcessor) {
@@ -82,8 +103,37 @@ TEST_F(Slurm, ThatRefusesAPartGetsNothing) {
         submit_chunks(folder_, job_, {0, 1500}, {}, out_);
       }),
       "sbatch does not take the job: sbatch: error: Invalid partition; nothing was submitted");
-  EXPECT_THAT(calls(), HasSubstr("scancel 17\n"));
+  EXPECT_THAT(calls(), HasSubstr("scancel --name=" + folder_.name() + "\n"));
   EXPECT_TRUE(folder_.read_submitted().tasks.empty());
+}
+
+// An sbatch that prints no number may have submitted its part: it is canceled by the job's name.
+TEST_F(Slurm, ThatPrintsNoNumberGetsNothing) {
+  stand_in("sbatch", "echo accepted");
+  EXPECT_THAT(test::error_of([&] { submit_chunks(folder_, job_, {0}, {}, out_); }),
+              AllOf(HasSubstr("prints no number"), HasSubstr("nothing was submitted")));
+  EXPECT_THAT(calls(), HasSubstr("scancel --name=" + folder_.name() + "\n"));
+}
+
+// Each number is on disk before the next array is handed over: a crash then hides none.
+TEST_F(Slurm, NumbersAreWrittenAtOnce) {
+  const std::string seen =
+      "cat '" + (folder_.path() / "submitted.json").string() + "' >> \"$HERE/seen\"; echo 17";
+  stand_in("sbatch", seen);
+  submit_chunks(folder_, job_, {0}, {}, out_);
+  EXPECT_THAT(session::content_of(directory_ / "seen"), HasSubstr("17"));
+}
+
+TEST_F(Slurm, ThatCannotCancelIsReported) {
+  stand_in("sbatch", "[ -e \"$HERE/first\" ] && exit 1; touch \"$HERE/first\"; echo 17");
+  stand_in("scancel", "echo 'scancel: error: Unable to contact slurm controller' >&2; exit 1");
+  EXPECT_THAT(test::error_of([&] {
+                submit_chunks(folder_, job_, {0, 1500}, {}, out_);
+              }),
+              AllOf(HasSubstr("may be in the queue already"), HasSubstr("Unable to contact"),
+                    HasSubstr("run `scancel --name=" + folder_.name() + "`"),
+                    Not(HasSubstr("nothing was submitted"))));
+  EXPECT_EQ(folder_.read_submitted().tasks, std::vector<std::uint64_t>{17});
 }
 
 TEST_F(Slurm, SaysWhichTasksRun) {
@@ -98,28 +148,39 @@ TEST_F(Slurm, SaysWhichTasksRun) {
   EXPECT_EQ(tasks[1].chunk, 1500u);
   EXPECT_EQ(tasks[1].reason, "Priority");
   EXPECT_FALSE(tasks[2].chunk);
-  EXPECT_THAT(calls(), HasSubstr("--jobs=17,18,19 --name=" + folder_.name() + " "));
+  EXPECT_THAT(calls(), HasSubstr("squeue --noheader --array --name=" + folder_.name() + " "));
 }
 
-// Ended long ago, or not at all to be asked.
-TEST_F(Slurm, ThatForgotAJobIsNoError) {
-  EXPECT_TRUE(queued_tasks(folder_).empty());  // nothing was submitted
-  submit_chunks(folder_, job_, {0}, {}, out_);
-  stand_in("squeue", "echo 'slurm_load_jobs error: Invalid job id specified' >&2; exit 1");
+TEST_F(Slurm, ThatDoesNotAnswerIsAnError) {
   EXPECT_TRUE(queued_tasks(folder_).empty());
   stand_in("squeue",
            "echo 'slurm_load_jobs error: Unable to contact slurm controller' >&2; exit 1");
   EXPECT_THAT(test::error_of([&] { queued_tasks(folder_); }), HasSubstr("Unable to contact"));
 }
 
-// The numbers come from a file in the folder: they are given along with the job's name.
+// The folder was moved, or the numbers come from elsewhere.
+TEST_F(Slurm, KnowsTheNumbersUnderAnotherName) {
+  EXPECT_EQ(numbers_of_others(folder_), "");  // nothing was submitted
+  submit_chunks(folder_, job_, {0, 1500}, {}, out_);
+  stand_in("squeue", "echo '17|previz-01234567'; echo '18|" + folder_.name() + "'");
+  EXPECT_EQ(numbers_of_others(folder_), "17");
+  EXPECT_THAT(calls(), HasSubstr("--jobs=17,18,19 "));
+  // It does not know jobs that ended long ago.
+  stand_in("squeue", "echo 'slurm_load_jobs error: Invalid job id specified' >&2; exit 1");
+  EXPECT_EQ(numbers_of_others(folder_), "");
+}
+
+// The numbers come from a file in the folder, and the name does not.
 TEST_F(Slurm, CancelsOnlyWhatHasTheJobsName) {
-  EXPECT_THAT(test::error_of([&] { cancel_tasks(folder_); }), HasSubstr("was not submitted"));
   session::write_content(folder_.path() / "submitted.json", R"({"tasks": [1, 2], "finish": 3})");
-  cancel_tasks(folder_);
-  EXPECT_THAT(calls(), HasSubstr("scancel --name=" + folder_.name() + " 1 2 3\n"));
+  EXPECT_FALSE(cancel_tasks(folder_));
+  EXPECT_THAT(calls(), Not(HasSubstr("scancel")));
+  stand_in("squeue", "echo '2_0|0|RUNNING|node2|None'");
+  EXPECT_TRUE(cancel_tasks(folder_));
+  EXPECT_THAT(calls(), HasSubstr("scancel --name=" + folder_.name() + "\n"));
   session::write_content(folder_.path() / "submitted.json", R"({"tasks": ["--user=root"]})");
-  EXPECT_THAT(test::error_of([&] { cancel_tasks(folder_); }), HasSubstr("cannot be understood"));
+  EXPECT_THAT(test::error_of([&] { numbers_of_others(folder_); }),
+              HasSubstr("cannot be understood"));
 }
 
 // Its daemon may be down, and its programs then wait for minutes.

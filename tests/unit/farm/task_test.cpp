@@ -421,7 +421,7 @@ TEST_F(FarmTask, OfManyFramesIsPlannedAndProvedInLittleTimeAndSpace) {
 TEST_F(FarmTask, DryRunWritesNothing) {
   options_.dry_run = true;
   submit();
-  EXPECT_THAT(out_.str(), HasSubstr("sbatch --parsable --array=0-2 "));
+  EXPECT_THAT(out_.str(), AllOf(HasSubstr("\nsbatch --parsable "), HasSubstr(" --array=0-2 ")));
   EXPECT_FALSE(std::filesystem::exists(directory_ / "job"));
   EXPECT_FALSE(std::filesystem::exists(directory_ / "out"));
 }
