@@ -112,7 +112,7 @@ void print_plan(const Job& job, const JobFolder& folder, std::ostream& out) {
 // Frames that were rendered before with the same settings are not rendered again.
 std::set<std::size_t> chunks_to_do(const JobFolder& folder, const Job& job, std::ostream& out,
                                    const std::stop_token& stop) {
-  return prove(folder, job, out, stop).chunks;
+  return prove(folder, job, Foreign::keep, out, stop).chunks;
 }
 
 // Forgets what is finished, once for the whole job: no task does it again (`--force`).
@@ -242,7 +242,7 @@ void retry(const JobOptions& options, std::ostream& out) {
   std::error_code stays;
   std::filesystem::remove(folder.stopped_file(), stays);
   const JobLock lock(folder, options.stop);
-  const Proof proof = prove(folder, job, out, options.stop);
+  const Proof proof = prove(folder, job, Foreign::forget, out, options.stop);
   write_missing(folder, job, proof);
   print_missing(folder, job, proof, out);
   const ScriptPlaces places = places_of(folder, job, options.program);

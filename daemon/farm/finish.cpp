@@ -28,9 +28,10 @@ set::Output output_of(const JobTake& take, const std::filesystem::path& folder, 
 // Finds out about one take.
 class TakeProof {
  public:
-  TakeProof(const JobFolder& folder, const Job& job, std::size_t take, std::ostream& out,
-            const std::stop_token& stop)
-      : folder_(folder),
+  TakeProof(const JobFolder& folder, const Job& job, std::size_t take, Foreign foreign,
+            std::ostream& out, const std::stop_token& stop)
+      : foreign_(foreign),
+        folder_(folder),
         job_(job),
         take_(job.takes.at(take)),
         index_(take),
@@ -44,11 +45,12 @@ class TakeProof {
  private:
   void collect(std::size_t chunk);
   std::string why_not_ours(std::size_t chunk) const;
-  std::string why_missing(std::size_t chunk) const;
+  std::string why_missing(std::size_t chunk, std::uint64_t frame) const;
   bool is_wanted_device(const post::FinishedFrame& frame) const {
     return job_.any_device || frame.made_on.is_gpu == job_.on_gpu;
   }
 
+  const Foreign foreign_;
   const JobFolder& folder_;
   const Job& job_;
   const JobTake& take_;
@@ -57,6 +59,7 @@ class TakeProof {
   const std::stop_token& stop_;
   post::RenderDirectory pictures_;
   std::map<std::size_t, std::string> faults_;  // by chunk: why its frames stay where they are
+  std::map<std::uint64_t, std::string> frame_faults_;  // by frame: the same
 };
 
 // Returns why the frames of a chunk's folder are not taken over; empty: they may be.
@@ -89,16 +92,22 @@ void TakeProof::collect(std::size_t chunk) {
                              session::read_plain_file(folder / "render.json"), false, {},
                              plan.frames, stop_);
   for (const auto& [why, frames] : part.rejected())
-    faults_[chunk] = post::frames_words(frames) + ": " + why;
-  const auto foreign = [&](const post::FinishedFrame& frame) { return !is_wanted_device(frame); };
-  for (const post::FinishedFrame& frame : part.reject(foreign))
-    faults_[chunk] = "frame " + std::to_string(frame.frame) + ": was rendered on " +
-                     frame.made_on.device + ", and the job is rendered on " +
-                     (job_.on_gpu ? "graphics cards" : "processors") + "; --any-device allows both";
+    for (const std::uint64_t frame : frames) frame_faults_[frame] = why;
+  const std::vector<post::FinishedFrame> foreign =
+      part.reject([&](const post::FinishedFrame& frame) { return !is_wanted_device(frame); });
+  for (const post::FinishedFrame& frame : foreign)
+    frame_faults_[frame.frame] = "was rendered on " + frame.made_on.device +
+                                 ", and the job is rendered on " +
+                                 (job_.on_gpu ? "graphics cards" : "processors") +
+                                 "; `previzd farm finish --any-device` takes both, and `previzd "
+                                 "farm retry` renders it again";
+  if (foreign_ == Foreign::forget) part.forget(foreign);
   pictures_.adopt(part);
 }
 
-std::string TakeProof::why_missing(std::size_t chunk) const {
+std::string TakeProof::why_missing(std::size_t chunk, std::uint64_t frame) const {
+  if (const auto fault = frame_faults_.find(frame); fault != frame_faults_.end())
+    return fault->second;
   if (const auto fault = faults_.find(chunk); fault != faults_.end()) return fault->second;
   const std::optional<TaskState> state = folder_.read_state(chunk);
   if (!state) return "not begun";
@@ -128,7 +137,7 @@ void TakeProof::run(Proof& proof) {
         cards.insert(finished->made_on.device);
         continue;
       }
-      MissingFrames& these = missing[why_missing(chunk)];
+      MissingFrames& these = missing[why_missing(chunk, frame)];
       these.take = index_;
       these.frames.push_back(frame);
       proof.chunks.insert(chunk);
@@ -183,12 +192,13 @@ void complete_take(const JobFolder& folder, const Job& job, const JobTake& take,
 
 }  // namespace
 
-Proof prove(const JobFolder& folder, const Job& job, std::ostream& out,
+Proof prove(const JobFolder& folder, const Job& job, Foreign foreign, std::ostream& out,
             const std::stop_token& stop) {
   Proof proof;
   for (std::size_t take = 0; take < job.takes.size(); ++take)
-    TakeProof(folder, job, take, out, stop).run(proof);
-  // A frame that is merged again needs its sums again, unless they are there.
+    TakeProof(folder, job, take, foreign, out, stop).run(proof);
+  // The sums of a frame that is merged again are looked at again, and those that are there are
+  // kept.
   const std::size_t merges = job.first_merge();
   std::set<std::pair<std::size_t, std::uint64_t>> merged;  // take and first frame
   for (auto at = proof.chunks.lower_bound(merges); at != proof.chunks.end(); ++at)
@@ -235,7 +245,7 @@ void print_missing(const JobFolder& folder, const Job& job, const Proof& proof, 
 int run_finish(const JobFolder& folder, const Job& job, std::ostream& out,
                const std::stop_token& stop) {
   const JobLock lock(folder, stop);
-  const Proof proof = prove(folder, job, out, stop);
+  const Proof proof = prove(folder, job, Foreign::keep, out, stop);
   write_missing(folder, job, proof);
   print_missing(folder, job, proof, out);
   if (!proof.missing.empty()) return task_status::machine_fault;

@@ -21,6 +21,10 @@ struct MissingFrames {
   std::string why;
 };
 
+// What becomes of frames that another kind of device rendered, where the plan does not allow it:
+// they stay where they are, or are forgotten, so that a task renders them again.
+enum class Foreign { keep, forget };
+
 struct Proof {
   std::vector<MissingFrames> missing;
   std::set<std::size_t> chunks;  // that have a missing frame, and those that they are merged of
@@ -32,7 +36,7 @@ struct Proof {
 // finished. Chunks that a process is at stay as they are, and so do frames of other settings, of
 // another version or, unless the plan allows it, of another kind of device: these are missing.
 // Throws previz::Error where a folder cannot be read or written, or on a stop.
-Proof prove(const JobFolder& folder, const Job& job, std::ostream& out,
+Proof prove(const JobFolder& folder, const Job& job, Foreign foreign, std::ostream& out,
             const std::stop_token& stop);
 
 // Writes the review videos of the takes and removes what is left of the chunks.

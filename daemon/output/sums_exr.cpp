@@ -26,22 +26,22 @@ struct SumLayer {
   glm::vec4 gpu::GpuPixel::*values;
 };
 
-constexpr std::array<const char*, 4> mixed{"R", "G", "B", "mask"},
-    difference{"R", "G", "B", "depth"}, uncovered{"R", "G", "B", "differences"},
-    square{"R", "G", "B", "samples"}, normal{"X", "Y", "Z", "hits"}, albedo{"R", "G", "B", "A"},
-    caustics{"R", "G", "B", "variance"};
+constexpr std::array<const char*, 4> of_mixed{"R", "G", "B", "mask"},
+    of_difference{"R", "G", "B", "depth"}, of_uncovered{"R", "G", "B", "differences"},
+    of_square{"R", "G", "B", "samples"}, of_normal{"X", "Y", "Z", "hits"},
+    of_albedo{"R", "G", "B", "A"}, of_caustics{"R", "G", "B", "variance"};
 
 constexpr std::array sum_layers{
-    SumLayer{"mixed.high", mixed, &gpu::GpuPixel::mixed_high},
-    SumLayer{"mixed.low", mixed, &gpu::GpuPixel::mixed_low},
-    SumLayer{"difference.high", difference, &gpu::GpuPixel::diff_high},
-    SumLayer{"difference.low", difference, &gpu::GpuPixel::diff_low},
-    SumLayer{"uncovered.high", uncovered, &gpu::GpuPixel::uncovered_high},
-    SumLayer{"uncovered.low", uncovered, &gpu::GpuPixel::uncovered_low},
-    SumLayer{"square.high", square, &gpu::GpuPixel::square_high},
-    SumLayer{"square.low", square, &gpu::GpuPixel::square_low},
-    SumLayer{"normal", normal, &gpu::GpuPixel::normal},
-    SumLayer{"albedo", albedo, &gpu::GpuPixel::albedo},
+    SumLayer{"mixed.high", of_mixed, &gpu::GpuPixel::mixed_high},
+    SumLayer{"mixed.low", of_mixed, &gpu::GpuPixel::mixed_low},
+    SumLayer{"difference.high", of_difference, &gpu::GpuPixel::diff_high},
+    SumLayer{"difference.low", of_difference, &gpu::GpuPixel::diff_low},
+    SumLayer{"uncovered.high", of_uncovered, &gpu::GpuPixel::uncovered_high},
+    SumLayer{"uncovered.low", of_uncovered, &gpu::GpuPixel::uncovered_low},
+    SumLayer{"square.high", of_square, &gpu::GpuPixel::square_high},
+    SumLayer{"square.low", of_square, &gpu::GpuPixel::square_low},
+    SumLayer{"normal", of_normal, &gpu::GpuPixel::normal},
+    SumLayer{"albedo", of_albedo, &gpu::GpuPixel::albedo},
 };
 constexpr std::size_t floats_a_pixel = sizeof(gpu::GpuPixel) / sizeof(float);
 static_assert(floats_a_pixel == 4 * sum_layers.size());
@@ -58,7 +58,7 @@ Imf::FrameBuffer channels_of(const render::SampleSums& sums) {
                     exr_slice(&(sums.sums.pixels[0].*layer.values)[c], floats_a_pixel, sums.width));
   if (!sums.sums.caustics.empty())
     for (int c = 0; c < 4; ++c)
-      buffer.insert(channel_name("caustics", caustics[static_cast<std::size_t>(c)]),
+      buffer.insert(channel_name("caustics", of_caustics[static_cast<std::size_t>(c)]),
                     exr_slice(&sums.sums.caustics[0][c], 4, sums.width));
   return buffer;
 }

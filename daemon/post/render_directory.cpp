@@ -318,8 +318,7 @@ std::size_t RenderDirectory::adopt(RenderDirectory& from) {
   return taken.size();
 }
 
-// Takes away the lines of frames whose files have gone. Those that reject() counts as not finished
-// stay.
+// The lines of others that reject() counts as not finished stay.
 void RenderDirectory::forget(const std::vector<FinishedFrame>& frames) {
   const std::lock_guard guard(mutex_);
   const FolderLocks::Transaction transaction(*locks_);

@@ -89,6 +89,8 @@ class RenderDirectory {
   // the moves of a frame's files is mended by take_back(). Returns
   // the number of frames taken over.
   std::size_t adopt(RenderDirectory& from);
+  // Takes away the lines of these frames, which are then not finished; no file is removed.
+  void forget(const std::vector<FinishedFrame>& frames);
   // Puts the lines in the order of the frames.
   void put_in_order();
 
@@ -108,7 +110,6 @@ class RenderDirectory {
   std::string differences_from(const std::string& settings) const;
   void read_lines();
   void write_lines(const Frames& frames) const;
-  void forget(const std::vector<FinishedFrame>& frames);
   void verify(FrameRange range, const std::stop_token& stop);
   void reject_without_line(FrameRange range);
 

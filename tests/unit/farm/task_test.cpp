@@ -189,7 +189,7 @@ TEST_F(FarmTask, WhosePictureWasDamagedIsFoundAndTriedAgain) {
   run_all();
   write_content(folder_.chunk(0) / "0001.exr", "damaged");
   EXPECT_EQ(finish(), task_status::machine_fault);
-  EXPECT_THAT(out_.str(), HasSubstr("session: frame 1: frame 1: its .exr has another size"));
+  EXPECT_THAT(out_.str(), HasSubstr("session: frame 1: its .exr has another size"));
   EXPECT_EQ(run(0), task_status::done);
   EXPECT_EQ(finish(), task_status::done) << out_.str();
   write_content(directory_ / "out/0004.png", "damaged");
@@ -352,8 +352,15 @@ TEST_F(FarmTask, OfAnotherKindOfDeviceIsNotTaken) {
   lines.replace(lines.find("\"is_gpu\":" + is), 9 + is.size(), "\"is_gpu\":" + is_not);
   write_content(file, lines);
   EXPECT_EQ(finish(), task_status::machine_fault);
-  EXPECT_THAT(out_.str(), HasSubstr("session: frame 6: frame 6: was rendered on "));
-  EXPECT_THAT(out_.str(), HasSubstr("--any-device allows both"));
+  EXPECT_THAT(out_.str(), HasSubstr("session: frame 6: was rendered on "));
+  EXPECT_THAT(out_.str(), HasSubstr("--any-device` takes both"));
+  EXPECT_EQ(finish(), task_status::machine_fault);  // it is still known
+  EXPECT_THAT(out_.str(), HasSubstr("session: frame 6: was rendered on "));
+  JobOptions again;
+  again.job = folder_.path();
+  retry(again, out_);
+  EXPECT_EQ(run(2), task_status::done) << out_.str();
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
 }
 
 // A plan that came from elsewhere chooses neither a place nor a program.
@@ -414,7 +421,7 @@ TEST_F(FarmTask, OfManyFramesIsPlannedAndProvedInLittleTimeAndSpace) {
   Job read = job_from_json(text, "plan");
   EXPECT_EQ(read.chunks.size(), 10'000u);
   read.takes[0].pictures = directory_ / "out";
-  const Proof proof = prove(folder_, read, out_, {});
+  const Proof proof = prove(folder_, read, Foreign::keep, out_, {});
   EXPECT_EQ(proof.chunks.size(), 10'000u);
 }
 
