@@ -108,6 +108,9 @@ void add_farm(CLI::App& app, Commands& commands,
   CLI::App& finish = add_job_command(
       farm, "finish", "Prove that every frame is there and whole, and make the review video",
       commands.job.job);
+  finish.add_flag(
+      "--any-device", commands.job.any_device,
+      "Take frames of graphics cards and of processors, whatever the job was made with");
   add_any_place(finish, commands.job.any_paths);
 }
 

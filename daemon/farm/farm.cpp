@@ -261,7 +261,8 @@ void retry(const JobOptions& options, std::ostream& out) {
 
 int finish(const JobOptions& options, std::ostream& out) {
   const JobFolder folder(options.job);
-  const Job job = folder.read_plan();
+  Job job = folder.read_plan();
+  job.any_device |= options.any_device;
   check_paths(folder, job, options.any_paths);
   const Machine machine = this_machine();
   TaskState state = state_now(TaskOutcome::running, machine.host, "");

@@ -7,6 +7,7 @@
 #include <ostream>
 #include <utility>
 
+#include "daemon/farm/on_one_line.hpp"
 #include "daemon/farm/settings.hpp"
 #include "daemon/farm/task.hpp"
 #include "daemon/post/folder_locks.hpp"
@@ -234,8 +235,8 @@ void print_missing(const JobFolder& folder, const Job& job, const Proof& proof, 
   std::size_t count = 0;
   for (const MissingFrames& missing : proof.missing) {
     count += missing.frames.size();
-    out << job.takes[missing.take].session.filename().string() << ": "
-        << post::frames_words(missing.frames) << ": " << missing.why << std::endl;
+    out << on_one_line(job.takes[missing.take].session.filename().string()) << ": "
+        << post::frames_words(missing.frames) << ": " << on_one_line(missing.why) << std::endl;
   }
   if (count > 0)
     out << folder.path().string() << ": " << count << (count == 1 ? " frame is" : " frames are")

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "daemon/farm/on_one_line.hpp"
 #include "daemon/post/folder_locks.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
@@ -48,13 +49,6 @@ std::string text_of(const nlohmann::ordered_json& json) {
 
 }  // namespace
 
-std::string one_line(std::string text) {
-  while (text.ends_with('\n')) text.pop_back();
-  for (char& c : text)
-    if (static_cast<unsigned char>(c) < ' ' || c == 0x7f) c = ' ';
-  return text;
-}
-
 const char* name_of(TaskOutcome outcome) {
   return outcomes.at(static_cast<std::size_t>(outcome));
 }
@@ -62,7 +56,7 @@ const char* name_of(TaskOutcome outcome) {
 TaskState state_now(TaskOutcome outcome, const std::string& host, const std::string& message) {
   return {outcome, host, ::getpid(),
           fmt::format("{:%Y-%m-%d %H:%M:%S} UTC", fmt::gmtime(std::time(nullptr))),
-          one_line(message)};
+          on_one_line(message)};
 }
 
 JobFolder::JobFolder(std::filesystem::path folder)

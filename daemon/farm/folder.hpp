@@ -43,9 +43,6 @@ struct TaskState {
   std::string message;  // one line: why it is not done
 };
 
-// Returns the text on one line, without what a terminal would take for a command.
-std::string one_line(std::string text);
-
 // Returns what a process says now; `message` is put on one line.
 TaskState state_now(TaskOutcome outcome, const std::string& host, const std::string& message);
 

@@ -42,6 +42,8 @@ struct JobOptions {
   std::stop_token stop;
   // For retry(): those that are given replace the plan's, for this submission.
   Wishes wishes = {};
+  // For finish(): frames of both kinds of device are taken, whatever the plan says.
+  bool any_device = false;
 };
 
 }  // namespace previz::farm

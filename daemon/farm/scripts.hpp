@@ -15,7 +15,7 @@ namespace previz::farm {
 struct ScriptPlaces {
   std::filesystem::path program;  // previzd, as it is found on every machine
   std::filesystem::path job;      // the job's folder, absolute
-  // The job may write into folders that are not beside its own (see allowed_pictures()).
+  // The job may write into folders that are not beside its own (see check_paths()).
   bool any_paths = false;
 };
 

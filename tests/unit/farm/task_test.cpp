@@ -10,6 +10,7 @@
 #include "daemon/farm/status.hpp"
 #include "daemon/post/folder_locks.hpp"
 #include "daemon/post/render.hpp"
+#include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/session_fixture.hpp"
@@ -361,6 +362,23 @@ TEST_F(FarmTask, OfAnotherKindOfDeviceIsNotTaken) {
   retry(again, out_);
   EXPECT_EQ(run(2), task_status::done) << out_.str();
   EXPECT_EQ(finish(), task_status::done) << out_.str();
+}
+
+TEST_F(FarmTask, OfAnotherKindOfDeviceMayBeTakenLater) {
+  options_.any_device = false;
+  options_.on_gpu = !render::is_gpu(*machine_.open_device({}));
+  submit();
+  Job job = folder_.read_plan();
+  job.any_device = true;  // so that its tasks run here
+  session::replace_file(folder_.plan(), to_json(job));
+  run_all();
+  job.any_device = false;
+  session::replace_file(folder_.plan(), to_json(job));
+  EXPECT_EQ(finish(), task_status::machine_fault);
+  JobOptions both;
+  both.job = folder_.path();
+  both.any_device = true;
+  EXPECT_EQ(farm::finish(both, out_), task_status::done) << out_.str();
 }
 
 // A plan that came from elsewhere chooses neither a place nor a program.
