@@ -59,7 +59,7 @@ TaskState state_now(TaskOutcome outcome, const std::string& host, const std::str
           on_one_line(message)};
 }
 
-JobFolder::JobFolder(std::filesystem::path folder)
+JobFolder::JobFolder(const std::filesystem::path& folder)
     : path_(std::filesystem::absolute(folder).lexically_normal()) {
   if (!path_.has_filename()) path_ = path_.parent_path();  // "JOB/"
   std::error_code unknown;

@@ -58,7 +58,7 @@ struct Submitted {
 
 class JobFolder {
  public:
-  explicit JobFolder(std::filesystem::path folder);
+  explicit JobFolder(const std::filesystem::path& folder);
 
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path plan() const { return path_ / "job.json"; }

@@ -105,7 +105,7 @@ post::FrameRange range_of(const Json& json) {
 }
 
 std::filesystem::path absolute_path(const Json& json) {
-  const auto path = std::filesystem::path(json.get<std::string>()).lexically_normal();
+  auto path = std::filesystem::path(json.get<std::string>()).lexically_normal();
   if (!path.is_absolute()) throw Error(path.string() + ": is not a full path");
   return path;
 }

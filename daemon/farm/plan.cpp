@@ -110,8 +110,8 @@ void add_chunks(const FarmOptions& options, const std::vector<set::Quality>& qua
   job.sample_ranges = sample_ranges_for(division, frames);
   for (std::size_t i = 0; i < job.takes.size(); ++i)
     divide(all_of(job.takes[i].frames), i, job.sample_ranges, division, job.chunks);
-  std::ranges::stable_partition(job.chunks,
-                                [](const Chunk& chunk) { return chunk.kind != ChunkKind::merge; });
+  std::stable_partition(job.chunks.begin(), job.chunks.end(),
+                        [](const Chunk& chunk) { return chunk.kind != ChunkKind::merge; });
 }
 
 }  // namespace

@@ -81,6 +81,7 @@ void RenderDirectory::begin(const std::string& settings, bool force, FrameRange 
                             const std::stop_token& stop) {
   const FolderLocks::Transaction transaction(*locks_, stop);
   const std::vector<FolderUser> others = locks_->others();
+  has_others_ = !others.empty();
   std::string who;
   for (const FolderUser& user : others) add_to_list(who, words_of(user), "; ");
   if (!who.empty()) notes_.push_back("also at work here: " + who);

@@ -60,6 +60,8 @@ class RenderDirectory {
   // else is at work here, that the file system has no locks.
   const std::vector<std::string>& notes() const { return notes_; }
 
+  // Returns whether other processes were at work here when the folder was opened.
+  bool has_others() const { return has_others_; }
   // Counts the frames of the range that are such as not finished, as long as this object lives, and
   // returns them; their lines and files stay.
   std::vector<FinishedFrame> reject(const std::function<bool(const FinishedFrame&)>& is_such);
@@ -123,6 +125,7 @@ class RenderDirectory {
   std::map<std::uint64_t, FinishedFrame> finished_;
   std::map<std::string, std::vector<std::uint64_t>> rejected_;
   FrameRange range_;
+  bool has_others_ = false;
 };
 
 }  // namespace previz::post

@@ -102,7 +102,8 @@ TEST(SumsExr, ComesBackWithTheSameBits) {
     EXPECT_EQ(read.sums.counters.unmeasured, 7u);
     const auto &a = sums.sums.sums, &b = read.sums.sums;
     ASSERT_EQ(a.pixels.size(), b.pixels.size());
-    EXPECT_EQ(std::memcmp(a.pixels.data(), b.pixels.data(), 6 * sizeof(gpu::GpuPixel)), 0);
+    EXPECT_TRUE(
+        std::ranges::equal(std::as_bytes(std::span(a.pixels)), std::as_bytes(std::span(b.pixels))));
     EXPECT_EQ(a.caustics, b.caustics);
   }
 }
@@ -144,7 +145,7 @@ class MergedTake : public testing::Test {
     render_range({2, 2}, "second");
   }
   RenderReport merge(const std::string& folder,
-                     std::vector<std::string> from = {"second", "first"}) {
+                     const std::vector<std::string>& from = {"second", "first"}) {
     RenderOptions options = options_for(folder);
     for (const std::string& name : from) options.sums_from.push_back(directory_ / name);
     return run(options);

@@ -16,7 +16,7 @@ using render::PixelSums, render::SampleRange, render::SampleSpan, render::Sample
 // True if the memory of both has the same bytes: NaN, -0 and all.
 template <class T>
 bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
-  return a.size() == b.size() && std::memcmp(a.data(), b.data(), sizeof(T) * a.size()) == 0;
+  return std::ranges::equal(std::as_bytes(std::span(a)), std::as_bytes(std::span(b)));
 }
 bool same_bits(const PixelSums& a, const PixelSums& b) {
   return same_bits(a.pixels, b.pixels) && same_bits(a.caustics, b.caustics);
