@@ -98,10 +98,11 @@ std::uint64_t frames_of(const Job& job) {
 
 void print_plan(const Job& job, const JobFolder& folder, std::ostream& out) {
   out << folder.path().string() << ": " << frames_of(job) << " frames of " << job.takes.size()
-      << (job.takes.size() == 1 ? " take" : " takes") << " in " << job.first_merge() << " tasks";
+      << (job.takes.size() == 1 ? " take" : " takes") << " in " << job.first_merge()
+      << (job.first_merge() == 1 ? " task" : " tasks");
   if (job.sample_ranges > 1)
     out << ", each frame in " << job.sample_ranges << " sample ranges, and "
-        << job.chunks.size() - job.first_merge() << " tasks that merge them";
+        << job.chunks.size() - job.first_merge() << " more that merge them";
   out << ", on "
       << (job.any_device ? "whatever device there is"
           : job.on_gpu   ? "a graphics card each"

@@ -23,7 +23,7 @@ namespace previz::farm {
 namespace {
 
 constexpr std::array<const char*, 5> outcomes{"running", "done", "stopped", "machine", "job"};
-// What a job of a million chunks takes, and more than a state or a reason ever does.
+// A job of a million chunks takes less, and so does any state or reason.
 constexpr std::uintmax_t most_plan_bytes = std::uintmax_t{1} << 27, most_state_bytes = 1 << 16;
 
 bool is_there(const std::filesystem::path& file) {

@@ -17,7 +17,7 @@ constexpr int format = 1;
 constexpr std::size_t most_chunks = 1'000'000;
 constexpr std::uint64_t most_frames = 10'000'000;  // of a take: four days of it
 constexpr std::array<const char*, 3> kinds{"pictures", "sums", "merge"};
-// Enough for four tasks a machine: one that ends early takes another one.
+// Each machine gets about four tasks, so that one that ends early takes another one.
 constexpr std::uint64_t chunks_a_machine = 4;
 // A chunk costs the opening of the take and the scene, and a longer one is lost for longer.
 constexpr std::uint64_t longest_chunk = 64;

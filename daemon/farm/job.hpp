@@ -98,8 +98,8 @@ struct Division {
 // Returns into how many sample ranges each of this number of frames is best divided: 1, unless
 // there are fewer frames than machines.
 int sample_ranges_for(const Division& division, std::uint64_t frames);
-// Appends the chunks of these frames of a take: runs of frames without a gap, of about equal
-// length.
+// Appends the chunks of these frames of a take: runs of frames without a gap, all but the
+// last one of a run of the same length.
 void divide(const std::set<std::uint64_t>& frames, std::size_t take, int sample_ranges,
             const Division& division, std::vector<Chunk>& chunks);
 

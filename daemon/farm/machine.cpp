@@ -12,7 +12,7 @@
 namespace previz::farm {
 namespace {
 
-// More than clocks are apart that anybody sets, and less than would mix up the order of what
+// Clocks that anybody sets are closer, and a larger difference would mix up the order of what
 // happened.
 constexpr std::int64_t most_clock_difference_s = 60;
 

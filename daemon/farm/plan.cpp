@@ -22,8 +22,8 @@
 namespace previz::farm {
 namespace {
 
-// What a pixel takes in files that are not compressed: the floats of all layers or of the sums, and
-// a PNG of 16 bits.
+// A pixel takes no more in files that are not compressed: the floats of all layers or of the sums,
+// and a PNG of 16 bits.
 constexpr std::uint64_t exr_bytes_a_pixel = 4 * 44, png_bytes_a_pixel = 6;
 
 // Returns how many sample ranges a frame can be divided into with these settings.

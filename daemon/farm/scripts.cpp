@@ -40,14 +40,14 @@ std::string own_log(const ScriptPlaces& places, const std::string& name) {
   return is_plain(places.job) ? "" : "exec >>\"$job/log/" + name + "\" 2>&1\n";
 }
 
-// What the job asks for, which the user's own arguments may replace.
+// Adds what the job asks for, which the user's own arguments may replace.
 void add_wishes_of(const Job& job, std::vector<std::string>& arguments) {
   arguments.emplace_back("--requeue");
   if (!job.wishes.partition.empty()) arguments.push_back("--partition=" + job.wishes.partition);
   if (!job.wishes.time.empty()) arguments.push_back("--time=" + job.wishes.time);
 }
 
-// A graphics card, or all of a processor and the memory beside it.
+// Asks for a graphics card, or for all of a processor and the memory beside it.
 void add_device(const Job& job, std::vector<std::string>& arguments) {
   arguments.emplace_back(job.on_gpu ? "--gres=gpu:1" : "--exclusive");
   if (!job.wishes.memory.empty())
@@ -56,8 +56,8 @@ void add_device(const Job& job, std::vector<std::string>& arguments) {
     arguments.emplace_back("--mem=0");
 }
 
-// What the job is found by, and its tasks find their way by: it stands after the user's own
-// arguments, of which sbatch takes the last.
+// Adds what the job is found by, and its tasks find their way by. It stands after the user's own
+// arguments, because sbatch takes the last of two.
 void add_fixed(const JobFolder& folder, const std::string& log,
                std::vector<std::string>& arguments) {
   const bool plain = is_plain(folder.path());

@@ -16,7 +16,7 @@
 namespace previz::farm {
 namespace {
 
-// What slurm.conf has where it says nothing: the highest number of a task is one less.
+// Slurm allows so many where slurm.conf says nothing: the highest number of a task is one less.
 constexpr std::size_t usual_array_size = 1001;
 
 std::optional<std::uint64_t> number_in(const std::string& text) {
@@ -223,8 +223,8 @@ bool was_submitted(const JobFolder& folder) {
   return std::filesystem::exists(folder.path() / "submitted.json", unknown);
 }
 
-// It asks by the name, which no file of the folder can choose, and by which also that is found
-// whose number was never written down.
+// squeue is asked for the job's name, which no file of the folder can choose, and by which a part
+// is found whose number was never written down.
 std::vector<QueuedTask> queued_tasks(const JobFolder& folder) {
   const ProgramResult result = run_program(
       "squeue", {"--noheader", "--array", "--name=" + folder.name(), "--format=%i|%k|%T|%N|%r"});

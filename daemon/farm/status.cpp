@@ -110,7 +110,8 @@ std::size_t JobStatus::count(TaskPhase phase) const {
   return static_cast<std::size_t>(std::ranges::count(chunks, phase, &ChunkStatus::phase));
 }
 
-// An earlier version of the last step left no word, but removed the folders of the chunks.
+// Where its own word was lost, the last step is known to have ended by the folders of chunks, which
+// it removes.
 bool JobStatus::is_complete() const {
   if (done < frames || !finish_queue.empty()) return false;
   return finish ? finish->outcome == TaskOutcome::done : !has_parts;

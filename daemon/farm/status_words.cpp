@@ -21,7 +21,8 @@ std::string frames_done(const ChunkStatus& status) {
   return std::to_string(status.done) + " of " + std::to_string(status.frames) + " frames done";
 }
 
-// Slurm knows at once where a task runs, and the task's own word may be that of its last machine.
+// Returns where a task runs. Slurm knows it at once; the task's own word may be that of its last
+// machine.
 std::string machine_of(const ChunkStatus& status) {
   if (!status.node.empty()) return status.node;
   return status.state ? status.state->host : "a machine that says nothing";
@@ -49,7 +50,7 @@ std::string words_of(const ChunkStatus& status) {
   }
 }
 
-// Why a part waits: squeue's reason, or its state where that is a rarer one.
+// Returns why a part waits: squeue's reason, or its state where that is a rarer one.
 std::string why_waiting(const std::string& queue, const std::string& reason) {
   if (queue != "PENDING" && queue != "RUNNING") return queue;
   return reason.empty() || reason == "None" ? "Slurm gives no reason yet" : reason;
@@ -71,7 +72,7 @@ void print_queue(const JobStatus& status, std::ostream& out) {
         << " (the last step)\n";
 }
 
-// What is to be done once all frames are rendered.
+// Prints what is to be done once all frames are rendered.
 void print_last_step(const JobFolder& folder, const Job& job, const JobStatus& status,
                      std::ostream& out) {
   const std::string command = "`previzd farm finish " + folder.path().string() + "`";

@@ -17,7 +17,7 @@
 namespace previz::farm {
 namespace {
 
-// How long another machine is left alone before it is looked at again.
+// Another machine is left alone for so long before it is looked at again.
 constexpr std::chrono::seconds while_another_works(3);
 
 class Task {
@@ -136,7 +136,7 @@ void Task::say(TaskOutcome outcome, const std::string& message) {
   folder_.write_state(options_.chunk, state_now(outcome, machine_.host, message));
 }
 
-// The disk may be what is at fault.
+// A word that cannot be written is printed: the disk may be what is at fault.
 int Task::fail(TaskOutcome outcome, const std::string& message) {
   out_ << machine_.host << ": " << on_one_line(message) << std::endl;
   try {

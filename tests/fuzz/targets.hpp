@@ -43,6 +43,7 @@ bool accepts(const Target& target, Bytes bytes);
 
 // What the targets use. Each file of a room of targets adds its own to the table.
 std::span<const Target> device_targets();
+std::span<const Target> farm_targets();
 std::span<const Target> footage_targets();
 std::span<const Target> scene_targets();
 std::span<const Target> session_targets();
