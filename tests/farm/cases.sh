@@ -9,7 +9,7 @@ demo=(config/demo/session --set config/demo/demo.toml)
 quick=("${demo[@]}" --scale 0.1 --spp 4)
 slow=("${demo[@]}" --scale 0.1 --spp 64 --no-video)
 # A requeued task starts after six seconds, while its first copy is still to run.
-slower=("${demo[@]}" --scale 0.1 --spp 256 --frames 0-3 --no-video)
+slower=("${demo[@]}" --scale 0.1 --spp 384 --no-video)
 
 # The test bed itself: a node without power loses its task, a cut one keeps it while a second copy runs.
 case_cluster() {
@@ -63,8 +63,8 @@ case_power() {
 case_network() {
   reference slower "${slower[@]}"
   start_cluster
-  submit "${slower[@]}" --chunk 2 --job "$job" --out "$pictures"
-  expect "a task on node1 is in the middle of its frames" await 120 has_begun 1 2
+  submit "${slower[@]}" --chunk 3 --job "$job" --out "$pictures"
+  expect "a task on node1 is in the middle of its frames" await 120 has_begun 1 3
   node cut-node 1
   declare_lost 1
   expect "the task runs on node3, too" await 30 node on-node 3 pgrep --exact previzd
