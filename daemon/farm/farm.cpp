@@ -97,7 +97,8 @@ std::uint64_t frames_of(const Job& job) {
 }
 
 void print_plan(const Job& job, const JobFolder& folder, std::ostream& out) {
-  out << folder.path().string() << ": " << frames_of(job) << " frames of " << job.takes.size()
+  out << folder.path().string() << ": " << frames_of(job)
+      << (frames_of(job) == 1 ? " frame of " : " frames of ") << job.takes.size()
       << (job.takes.size() == 1 ? " take" : " takes") << " in " << job.first_merge()
       << (job.first_merge() == 1 ? " task" : " tasks");
   if (job.sample_ranges > 1)
