@@ -59,7 +59,8 @@ class NewFolder {
     // What an earlier job in this folder has left would be taken for this one's.
     std::error_code stays;
     for (const std::filesystem::path& file :
-         {folder.stopped_file(), folder.missing_file(), folder.path() / "submitted.json"})
+         {folder.stopped_file(), folder.missing_file(), folder.path() / "submitted.json",
+          folder.path() / "state" / "finish.json"})
       std::filesystem::remove(file, stays);
     for (std::size_t chunk = 0; chunk < job.chunks.size() && was_there_; ++chunk)
       std::filesystem::remove(folder.state_file(chunk), stays);

@@ -187,16 +187,12 @@ render::Layers read_exr(const std::filesystem::path& path) {
     for (const ScalarLayer& layer : scalar_layers) (layers.*layer.values).resize(pixels);
 
     const Imf::FrameBuffer buffer = frame_buffer(layers);
-    for (auto channel = buffer.begin(); channel != buffer.end(); ++channel)
-      if (!file.header().channels().findChannel(channel.name()))
-        throw Error(path.string() + ": has no channel " + channel.name());
     if (const auto* samples = file.header().findTypedAttribute<Imf::IntAttribute>("previz.samples"))
       layers.samples = samples->value();
     if (const auto* denoised =
             file.header().findTypedAttribute<Imf::IntAttribute>("previz.denoised"))
       layers.denoised = denoised->value() != 0;
-    file.setFrameBuffer(buffer);
-    file.readPixels(0, layers.height - 1);
+    read_channels(path, file, buffer);
     return layers;
   } catch (const Error&) {
     throw;

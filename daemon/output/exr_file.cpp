@@ -1,5 +1,6 @@
 #include "daemon/output/exr_file.hpp"
 
+#include <ImfChannelList.h>
 #include <ImfIO.h>
 #include <ImfOutputFile.h>
 #include <unistd.h>
@@ -102,6 +103,16 @@ std::size_t exr_pixels(const std::filesystem::path& path, const Imath::Box2i& wi
                 std::to_string(window.min.y) + " to " + std::to_string(window.max.x) + ", " +
                 std::to_string(window.max.y) + " does not begin at 0, 0, or is empty or too large");
   return static_cast<std::size_t>(width * height);
+}
+
+void read_channels(const std::filesystem::path& path, Imf::InputFile& file,
+                   const Imf::FrameBuffer& channels) {
+  const Imf::Header& header = file.header();
+  for (auto channel = channels.begin(); channel != channels.end(); ++channel)
+    if (!header.channels().findChannel(channel.name()))
+      throw Error(path.string() + ": has no channel " + channel.name());
+  file.setFrameBuffer(channels);
+  file.readPixels(header.dataWindow().min.y, header.dataWindow().max.y);
 }
 
 }  // namespace previz::output

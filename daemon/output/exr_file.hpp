@@ -4,6 +4,7 @@
 #include <ImathBox.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
+#include <ImfInputFile.h>
 
 #include <cstddef>
 #include <filesystem>
@@ -25,5 +26,10 @@ session::Draft exr_draft(const std::filesystem::path& path, const Imf::Header& h
 // Returns the number of pixels of a data window. Throws previz::Error naming the file unless the
 // window begins at 0, 0 and has from 1 to most_pixels pixels.
 std::size_t exr_pixels(const std::filesystem::path& path, const Imath::Box2i& window);
+
+// Reads the whole file into these channels. Throws previz::Error naming the file and a channel that
+// it does not have, or what OpenEXR throws.
+void read_channels(const std::filesystem::path& path, Imf::InputFile& file,
+                   const Imf::FrameBuffer& channels);
 
 }  // namespace previz::output

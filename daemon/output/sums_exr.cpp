@@ -147,11 +147,7 @@ RangeSums read_sums_exr(const std::filesystem::path& path) {
     sums.sums.pixels.resize(pixels);
     if (file.header().channels().findChannel("caustics.R")) sums.sums.caustics.resize(pixels);
     const Imf::FrameBuffer channels = channels_of(sums);
-    for (auto channel = channels.begin(); channel != channels.end(); ++channel)
-      if (!file.header().channels().findChannel(channel.name()))
-        throw Error(path.string() + ": has no channel " + channel.name());
-    file.setFrameBuffer(channels);
-    file.readPixels(0, sums.height - 1);
+    read_channels(path, file, channels);
     return result;
   } catch (const Error&) {
     throw;

@@ -104,7 +104,7 @@ class RenderDirectory {
 
  private:
   std::filesystem::path file(std::uint64_t frame, const char* extension) const;
-  // Of the files that a frame has.
+  // Returns the endings of the files that a frame has.
   std::vector<const char*> extensions(FrameStatus status) const;
   void write_files(const pipeline::Shot& shot, const set::Set& set) const;
   void begin(const std::string& settings, bool force, FrameRange range,

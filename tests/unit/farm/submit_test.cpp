@@ -73,6 +73,18 @@ TEST_F(FarmSubmission, ThatIsRefusedLeavesAFolderThatWasThere) {
   EXPECT_FALSE(std::filesystem::exists(folder_.plan()));
 }
 
+// Somebody has removed an earlier job's plan alone: what it said last is not the new one's word.
+TEST_F(FarmSubmission, TakesNoWordOfAnEarlierJob) {
+  std::filesystem::create_directories(folder_.path() / "state");
+  const TaskState done = state_now(TaskOutcome::done, "node1", "");
+  folder_.write_finish_state(done);
+  folder_.write_state(0, done);
+  stand_in("sbatch", "echo 17");
+  EXPECT_EQ(refusal(), "");
+  EXPECT_FALSE(folder_.read_finish_state());
+  EXPECT_FALSE(folder_.read_state(0));
+}
+
 // A part that cannot be taken back is canceled by the folder.
 TEST_F(FarmSubmission, ThatStaysInTheQueueKeepsItsFolder) {
   const std::string once = (directory_ / "once").string();
