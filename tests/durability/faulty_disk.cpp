@@ -105,6 +105,7 @@ struct Disk {
   std::vector<Call> calls;
   std::map<int, std::size_t> open;  // nodes by descriptor
   std::optional<Fault> fault;
+  std::optional<std::string> unwritable;  // the file whose next write fails
 };
 
 Disk& disk() {
@@ -223,6 +224,10 @@ ssize_t write_noted(int descriptor, const void* bytes, std::size_t count, off_t 
   const std::unique_lock lock(disk().mutex);
   const std::optional<std::size_t> node = node_of(descriptor);
   if (!node) return forward(count);
+  if (disk().unwritable == name_of(*node)) {
+    disk().fault = {disk().calls.size(), DiskFault::io_error};
+    disk().unwritable.reset();
+  }
   if (is_refused()) return -1;
   if (next_fault() == DiskFault::short_write && count > 1) count /= 2;
   off_t at = offset;
@@ -287,6 +292,7 @@ FaultyDisk::FaultyDisk(const Path& folder) {
   d.calls.clear();
   d.open.clear();
   d.fault.reset();
+  d.unwritable.reset();
   d.watches = true;
 }
 
@@ -298,6 +304,11 @@ FaultyDisk::~FaultyDisk() {
 void FaultyDisk::fail(std::size_t call, DiskFault fault) {
   const std::lock_guard lock(disk().mutex);
   disk().fault = {call, fault};
+}
+
+void FaultyDisk::fail_next_write_of(const std::string& name) {
+  const std::lock_guard lock(disk().mutex);
+  disk().unwritable = name;
 }
 
 std::size_t FaultyDisk::calls() const {

@@ -43,6 +43,9 @@ class FaultyDisk {
 
   // Lets one call fail, counted from 0. A short write falls upon calls that write only.
   void fail(std::size_t call, DiskFault fault);
+  // Lets the next write of a file of this name fail with EIO, whatever other threads call
+  // meanwhile.
+  void fail_next_write_of(const std::string& name);
   // Returns how many calls there were: those that make, change, sync, rename or remove something.
   std::size_t calls() const;
   std::string describe(std::size_t call) const;  // "write observer.mkv", ...

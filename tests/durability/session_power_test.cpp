@@ -273,7 +273,7 @@ TEST(RecorderOfTwoDisks, GoesOnInTheSecondHoweverTheFirstIsNamed) {
     recorder.start();
     offer(recorder, 0, 1);
     ASSERT_TRUE(wait_for_frames(recorder, 1));
-    disk.fail(disk.calls() + 4, DiskFault::io_error);
+    disk.fail_next_write_of("observer.mkv");
     offer(recorder, 1, frames);
     recorder.stop();
     recorder.finish();

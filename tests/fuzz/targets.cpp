@@ -14,8 +14,8 @@ namespace {
 std::vector<Target> all_targets() {
   std::vector<Target> all;
   for (const std::span<const Target> some :
-       {device_targets(), farm_targets(), footage_targets(), scene_targets(), session_targets(), take_targets(),
-        v4l2_targets(), bus_targets(), video_targets()})
+       {device_targets(), farm_targets(), footage_targets(), scene_targets(), session_targets(),
+        take_targets(), v4l2_targets(), bus_targets(), video_targets()})
     all.insert(all.end(), some.begin(), some.end());
   return all;
 }
