@@ -93,7 +93,7 @@ class NewFolder {
 
 std::uint64_t frames_of(const Job& job) {
   std::uint64_t frames = 0;
-  for (const JobTake& take : job.takes) frames += take.frames.last - take.frames.first + 1;
+  for (const JobTake& take : job.takes) frames += length_of(take.frames);
   return frames;
 }
 

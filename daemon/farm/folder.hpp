@@ -31,7 +31,7 @@ enum class TaskOutcome {
   running,
   done,
   stopped,  // by a signal; what was finished is on disk
-  machine,  // the machine is at fault: another one, or a later time, mends it (exit status 75)
+  machine,  // the machine is at fault: another one, or a later time, mends it (66 and 75)
   job       // the job is at fault: no machine can do it (exit status 1)
 };
 

@@ -210,6 +210,10 @@ Job read(const Json& json) {
 
 }  // namespace
 
+std::uint64_t length_of(const post::FrameRange& range) {
+  return range.last - range.first + 1;
+}
+
 std::size_t Job::first_merge() const {
   const auto merge = std::ranges::find(chunks, ChunkKind::merge, &Chunk::kind);
   return static_cast<std::size_t>(merge - chunks.begin());

@@ -81,6 +81,8 @@ struct Job {
 std::string to_json(const Job& job);
 Job job_from_json(const std::string& text, const std::string& name);
 
+// Returns the number of frames in a range.
+std::uint64_t length_of(const post::FrameRange& range);
 // Returns the number of the chunk as its folder and its log have it: at least four digits.
 std::string chunk_number(std::size_t chunk);
 // Returns "frames 12 to 15 of 12A_take003", "frame 7 of 12A_take003, sample range 2 of 4".

@@ -97,7 +97,7 @@ void add_set(const FarmOptions& options, const post::RenderPlan& plan, Job& job)
 
 void add_chunks(const FarmOptions& options, const std::vector<set::Quality>& qualities, Job& job) {
   std::uint64_t frames = 0;
-  for (const JobTake& take : job.takes) frames += take.frames.last - take.frames.first + 1;
+  for (const JobTake& take : job.takes) frames += length_of(take.frames);
   Division division = options.division;
   division.most_sample_ranges = 1024;
   for (const set::Quality& quality : qualities) {

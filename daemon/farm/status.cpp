@@ -19,10 +19,6 @@ bool is_taken(const JobFolder& folder, std::size_t chunk) {
   }
 }
 
-std::uint64_t length_of(const post::FrameRange& range) {
-  return range.last - range.first + 1;
-}
-
 // Adds up what one chunk has finished.
 void count(const JobFolder& folder, const Job& job, std::size_t index, JobStatus& status,
            const std::map<std::uint64_t, post::FinishedFrame>& pictures) {

@@ -20,6 +20,12 @@ namespace {
 // Another machine is left alone for so long before it is looked at again.
 constexpr std::chrono::seconds while_another_works(3);
 
+// The sums that a task merges are not rendered.
+class MissingSums : public Error {
+ public:
+  using Error::Error;
+};
+
 class Task {
  public:
   Task(const TaskOptions& options, const Machine& machine, std::ostream& out)
@@ -29,7 +35,9 @@ class Task {
 
  private:
   bool begin();
-  void check_sums() const;
+  std::map<std::uint64_t, post::FinishedFrame> finished_pictures() const;
+  std::string why_nothing_to_merge() const;
+  bool is_complete() const;
   void render();
   post::RenderOptions render_options() const;
   void check_settings() const;
@@ -65,30 +73,41 @@ bool Task::begin() {
     return false;
   }
   is_mine_ = true;
+  finished_ = finished_pictures();
+  const std::string no_sums = why_nothing_to_merge();
+  if (!no_sums.empty() && is_complete()) return false;
+  if (options_.not_if_taken && !no_sums.empty()) {
+    out_ << "another machine is rendering the sums that are merged in it" << std::endl;
+    return false;
+  }
   say(TaskOutcome::running, "");
   const std::string why =
       why_not_here(folder_, job_, chunk_, machine_, folder_.state_file(options_.chunk));
   if (!why.empty()) throw Error(why);
-  check_sums();
-  const JobTake& take = job_.takes[chunk_.take];
-  device_ = open_wanted_device(job_, take, machine_);
-  finished_ = post::finished_frames({take.pictures, take.exr, take.png, false},
-                                    /*has_sums=*/false, chunk_.frames);
+  if (!no_sums.empty()) throw MissingSums(no_sums);
+  device_ = open_wanted_device(job_, job_.takes[chunk_.take], machine_);
   return true;
 }
 
-// Throws unless the sums are there that this task merges.
-void Task::check_sums() const {
+std::map<std::uint64_t, post::FinishedFrame> Task::finished_pictures() const {
+  const JobTake& take = job_.takes[chunk_.take];
+  return post::finished_frames({take.pictures, take.exr, take.png, false}, /*has_sums=*/false,
+                               chunk_.frames);
+}
+
+// Returns which of the sums that this task merges are not there; empty: all are.
+std::string Task::why_nothing_to_merge() const {
   for (std::size_t other = 0; chunk_.kind == ChunkKind::merge && other < options_.chunk; ++other) {
     if (!is_merged_of(job_, options_.chunk, other)) continue;
     const Chunk& part = job_.chunks[other];
     const auto there = post::finished_frames({folder_.chunk(other), true, false, false},
                                              /*has_sums=*/true, part.frames);
-    if (there.size() <= part.frames.last - part.frames.first)
-      throw Error("chunk " + std::to_string(other) + " (" + words_of(job_, part) +
-                  ") is not rendered, so that there is nothing to merge; `previzd farm retry` "
-                  "renders it");
+    if (there.size() < length_of(part.frames))
+      return "chunk " + std::to_string(other) + " (" + words_of(job_, part) +
+             ") is not rendered, so that there is nothing to merge; `previzd farm retry` renders "
+             "it";
   }
+  return "";
 }
 
 post::RenderOptions Task::render_options() const {
@@ -150,6 +169,19 @@ int Task::fail(TaskOutcome outcome, const std::string& message) {
   return outcome == TaskOutcome::job ? task_status::job_fault : task_status::machine_fault;
 }
 
+// Returns whether another machine has done the last step meanwhile, and says so: it removes the
+// folders of chunks, which a task may be about to read.
+bool Task::is_complete() const {
+  try {
+    if (!is_mine_ || finished_pictures().size() < length_of(chunk_.frames)) return false;
+    out_ << "another machine has moved these frames into "
+         << job_.takes[chunk_.take].pictures.string() << std::endl;
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 int Task::run() {
   try {
     if (!begin()) return task_status::done;
@@ -158,7 +190,14 @@ int Task::run() {
     return task_status::done;
   } catch (const JobFault& error) {
     return fail(TaskOutcome::job, error.what());
+  } catch (const MissingSums& error) {
+    fail(TaskOutcome::machine, error.what());
+    return task_status::missing_sums;
   } catch (const Error& error) {
+    if (is_complete()) {
+      say(TaskOutcome::done, "");
+      return task_status::done;
+    }
     if (!options_.stop.stop_requested()) return fail(TaskOutcome::machine, error.what());
     fail(TaskOutcome::stopped, error.what());
     return task_status::done;

@@ -24,8 +24,9 @@ struct TaskOptions {
 namespace task_status {
 inline constexpr int done = 0;
 inline constexpr int job_fault = 1;  // no retry mends it
-inline constexpr int machine_fault =
-    75;  // EX_TEMPFAIL of sysexits.h: another machine, or time, does
+// Those of sysexits.h. EX_NOINPUT: what is to be merged was not rendered, and waiting for it is in
+// vain; EX_TEMPFAIL: another machine, or time, does it.
+inline constexpr int missing_sums = 66, machine_fault = 75;
 }  // namespace task_status
 
 // Throws JobFault if pictures would be written outside of the job's folder and of the one that it

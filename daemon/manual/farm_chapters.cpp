@@ -48,6 +48,7 @@ If frames are missing, missing.json and the log of the last step, log/finish.log
 0: Done. A `task` has rendered its frames; to `finish` it means that every frame is there and whole.
 1: Error; one line says what is wrong. A `task` ends with it if the job is at fault, so that no machine can do it.
 2: The command line cannot be understood.
+66: A `task` that merges sample ranges ends with it if one of them was not rendered; Slurm does not start it again, and `retry` renders both.
 75: A `task` ends with it if the machine is at fault: another one, or a later time, mends it. `finish` does if frames are missing.
 128+N: Stopped by signal N. Finished frames are on disk, and the next start of the task continues there.
 )"},

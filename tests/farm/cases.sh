@@ -280,6 +280,35 @@ case_without_cluster() {
   fi
 }
 
+# Three machines without a scheduler, which start the loop together. A machine has a host name and process numbers of its
+# own. LP_NUM_THREADS leaves the others something.
+case_loop() {
+  local ranges=("${demo[@]}" --scale 0.05 --spp 256 --neighbours 0 --frames 0-3 --no-video)
+  reference loop "${ranges[@]}"
+  timeout 30 "$previzd" farm "${ranges[@]}" --chunk 1 --sample-ranges 2 --job "$job" --out "$pictures" \
+    --openjd "$folder/job.yaml"
+  on_three_machines
+  expect "the bits are those of one run" same_render "$out/reference/loop" "$pictures"
+  expect "nothing is missing" [ ! -s "$job/missing.json" ]
+  local k
+  for k in 1 2 3; do
+    expect "machine $k renders" grep --quiet '^frame ' "$folder/machine$k.txt"
+  done
+}
+
+# Starts the loop on three machines at once, and expects all to end well.
+on_three_machines() {
+  local k machines=()
+  for k in 1 2 3; do
+    LP_NUM_THREADS=1 timeout 300 unshare --uts --pid --fork --mount-proc bash -c \
+      'hostname "$1" && exec bash "$2"' - "machine$k" "$job/loop.sh" >"$folder/machine$k.txt" 2>&1 &
+    machines+=($!)
+  done
+  for k in 1 2 3; do
+    expect "machine $k ends the loop" wait "${machines[k - 1]}"
+  done
+}
+
 # Whether a command fails.
 fails() { ! "$@"; }
 

@@ -66,6 +66,9 @@ TEST_F(Scripts, RequeueWhatAnotherMachineMayDo) {
   const ProgramResult last = run(slurm_tasks(places_), 75, "SLURM_RESTART_COUNT=3");
   EXPECT_EQ(last.status, 75);
   EXPECT_THAT(last.out, Not(HasSubstr("requeue")));
+  const ProgramResult no_sums = run(slurm_tasks(places_), 66);
+  EXPECT_EQ(no_sums.status, 66);
+  EXPECT_THAT(no_sums.out, Not(AnyOf(HasSubstr("requeue"), HasSubstr("scancel"))));
   const ProgramResult mistake = run(slurm_tasks(places_), 1);
   EXPECT_EQ(mistake.status, 1);
   EXPECT_THAT(mistake.out, HasSubstr("scancel --state=PENDING 90\n"));
