@@ -8,6 +8,7 @@
 #include "daemon/farm/machine.hpp"
 #include "daemon/farm/plan.hpp"
 #include "daemon/farm/scripts.hpp"
+#include "daemon/farm/signs_of_life.hpp"
 #include "daemon/farm/slurm.hpp"
 #include "daemon/farm/status.hpp"
 #include "daemon/farm/task.hpp"
@@ -166,6 +167,11 @@ void hand_over(const FarmOptions& options, const JobFolder& folder, const Job& j
         << shell_word(folder.loop_script().string()) << std::endl;
 }
 
+bool was_finished(const JobFolder& folder) {
+  const std::optional<TaskState> state = folder.read_finish_state();
+  return state && state->outcome == TaskOutcome::done;
+}
+
 // Returns the wishes of the plan with those that are given now.
 Wishes wishes_with(Wishes planned, const Wishes& now) {
   if (now.at_once > 0) planned.at_once = now.at_once;
@@ -268,9 +274,14 @@ int finish(const JobOptions& options, std::ostream& out) {
   job.any_device |= options.any_device;
   check_paths(folder, job, options.any_paths);
   const Machine machine = this_machine();
-  TaskState state = state_now(TaskOutcome::running, machine.host, "");
   try {
-    folder.write_finish_state(state);
+    const JobLock lock(folder, options.stop);
+    if (lock.was_waited_for() && was_finished(folder)) {
+      out << folder.path().string() << ": another machine has just done the last step" << std::endl;
+      return task_status::done;
+    }
+    folder.write_finish_state(state_now(TaskOutcome::running, machine.host, ""));
+    const SignsOfLife signs(folder.finish_state_file());
     const int status = run_finish(folder, job, out, options.stop);
     folder.write_finish_state(
         state_now(status == task_status::done ? TaskOutcome::done : TaskOutcome::machine,

@@ -83,7 +83,7 @@ void TakeProof::collect(std::size_t chunk) {
     faults_[chunk] = std::move(why);
     return;
   }
-  if (folder_.is_taken(chunk)) {
+  if (folder_.taken(chunk) != Taken::no) {
     faults_[chunk] = "is being rendered";
     return;
   }
@@ -246,7 +246,6 @@ void print_missing(const JobFolder& folder, const Job& job, const Proof& proof, 
 
 int run_finish(const JobFolder& folder, const Job& job, std::ostream& out,
                const std::stop_token& stop) {
-  const JobLock lock(folder, stop);
   const Proof proof = prove(folder, job, Foreign::keep, out, stop);
   write_missing(folder, job, proof);
   print_missing(folder, job, proof, out);

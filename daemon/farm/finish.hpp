@@ -47,8 +47,8 @@ void write_missing(const JobFolder& folder, const Job& job, const Proof& proof);
 // Prints what is missing, a line a reason.
 void print_missing(const JobFolder& folder, const Job& job, const Proof& proof, std::ostream& out);
 
-// Does the whole last step, one at a time in a job's folder: proves the frames, and completes the
-// job if none is missing. Returns a status of task_status, or throws as prove() does.
+// Does the whole last step, within a JobLock: proves the frames, and completes the job if none is
+// missing. Returns a status of task_status, or throws as prove() does.
 int run_finish(const JobFolder& folder, const Job& job, std::ostream& out,
                const std::stop_token& stop);
 

@@ -14,7 +14,7 @@
 #include <thread>
 
 #include "daemon/farm/on_one_line.hpp"
-#include "daemon/post/folder_locks.hpp"
+#include "daemon/farm/signs_of_life.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
@@ -59,8 +59,10 @@ TaskState state_now(TaskOutcome outcome, const std::string& host, const std::str
           on_one_line(message)};
 }
 
-JobFolder::JobFolder(const std::filesystem::path& folder)
-    : path_(std::filesystem::absolute(folder).lexically_normal()) {
+JobFolder::JobFolder(const std::filesystem::path& folder) : JobFolder(folder, post::call_fcntl) {}
+
+JobFolder::JobFolder(const std::filesystem::path& folder, LockCall call)
+    : call_(call), path_(std::filesystem::absolute(folder).lexically_normal()) {
   if (!path_.has_filename()) path_ = path_.parent_path();  // "JOB/"
   std::error_code unknown;
   const std::filesystem::path real = std::filesystem::weakly_canonical(path_, unknown);
@@ -113,11 +115,11 @@ void JobFolder::write_state(std::size_t chunk, const TaskState& state) const {
 }
 
 std::optional<TaskState> JobFolder::read_finish_state() const {
-  return read_state_in(path_ / "state" / "finish.json");
+  return read_state_in(finish_state_file());
 }
 
 void JobFolder::write_finish_state(const TaskState& state) const {
-  write_state_in(path_ / "state" / "finish.json", state);
+  write_state_in(finish_state_file(), state);
 }
 
 std::optional<TaskState> JobFolder::read_state_in(const std::filesystem::path& file) const {
@@ -171,13 +173,26 @@ std::string JobFolder::read_stopped() const {
   return is_there(stopped_file()) ? read_at_most(stopped_file(), most_state_bytes) : "";
 }
 
-bool JobFolder::is_taken(std::size_t chunk) const {
+bool JobFolder::has_locks() const {
+  const session::OpenFile file(plan(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
+  return post::why_others_are_not_seen(file.get(), path_, call_).empty();
+}
+
+bool JobFolder::is_alive(const std::filesystem::path& state_file) const {
+  const std::optional<TaskState> state = read_state_in(state_file);
+  return state && state->outcome == TaskOutcome::running && has_signs_of_life(state_file);
+}
+
+bool JobFolder::is_being_finished() const {
+  return is_alive(finish_state_file());
+}
+
+Taken JobFolder::taken(std::size_t chunk) const {
   std::error_code unknown;
-  if (!std::filesystem::exists(this->chunk(chunk) / post::FolderLocks::file_name, unknown))
-    return false;
-  post::FolderLocks locks(this->chunk(chunk));
-  const post::FolderLocks::Transaction transaction(locks);
-  return !locks.others().empty();
+  if (std::filesystem::exists(this->chunk(chunk) / post::FolderLocks::file_name, unknown) &&
+      post::FolderLocks(this->chunk(chunk), call_).has_others())
+    return Taken::shared;
+  return is_alive(state_file(chunk)) && !has_locks() ? Taken::alone : Taken::no;
 }
 
 post::RenderOptions JobFolder::render_options(const Job& job, const JobTake& take) const {
@@ -204,8 +219,14 @@ JobLock::JobLock(const JobFolder& folder, const std::stop_token& stop)
   struct flock whole {};
   whole.l_type = F_WRLCK;
   whole.l_whence = SEEK_SET;
-  while (::fcntl(file_.get(), F_OFD_SETLK, &whole) != 0) {
-    if (errno != EAGAIN && errno != EACCES && errno != EINTR) return;
+  const auto is_at_another = [&] {
+    int result = 0;
+    do result = ::fcntl(file_.get(), F_OFD_SETLK, &whole);
+    while (result != 0 && errno == EINTR);
+    if (result != 0 && (errno == EAGAIN || errno == EACCES)) return true;
+    return folder.is_being_finished() && !folder.has_locks();
+  };
+  for (; is_at_another(); was_waited_for_ = true) {
     if (stop.stop_requested())
       throw Error(folder.path().string() + ": interrupted while another last step was at work");
     std::this_thread::sleep_for(std::chrono::milliseconds(100));

@@ -5,8 +5,10 @@
 //   JOB/loop.sh             the same for people without a scheduler
 //   JOB/chunks/0003/        a chunk's pictures, as `previzd render` leaves them; the last step
 //                           moves them into the folder of finished pictures
-//   JOB/state/0003.json     what the task of that chunk said last (TaskState)
-//   JOB/state/finish.json   what the last step said last
+//   JOB/state/0003.json     what the task of that chunk said last (TaskState); its time is renewed
+//   as
+//                           long as the task runs (SignsOfLife)
+//   JOB/state/finish.json   what the last step said last, likewise
 //   JOB/log/                a log a task
 //   JOB/submitted.json      the scheduler's numbers of the job
 //   JOB/stopped.txt         why no further task starts; absent: they do
@@ -22,6 +24,7 @@
 #include <vector>
 
 #include "daemon/farm/job.hpp"
+#include "daemon/post/folder_locks.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::farm {
@@ -56,9 +59,20 @@ struct Submitted {
   std::optional<std::uint64_t> finish;  // the last step
 };
 
+// Who is at work on a chunk.
+enum class Taken {
+  no,
+  shared,  // a process with which its frames are shared, by the locks of the file system
+  alone    // a machine that has told so, and whose locks are not seen here
+};
+
 class JobFolder {
  public:
+  using LockCall = post::LockCall;
+
   explicit JobFolder(const std::filesystem::path& folder);
+  // With the locks of another file system.
+  JobFolder(const std::filesystem::path& folder, LockCall call);
 
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path plan() const { return path_ / "job.json"; }
@@ -69,6 +83,7 @@ class JobFolder {
   std::filesystem::path stopped_file() const { return path_ / "stopped.txt"; }
   std::filesystem::path missing_file() const { return path_ / "missing.json"; }
   std::filesystem::path state_file(std::size_t chunk) const;
+  std::filesystem::path finish_state_file() const { return path_ / "state" / "finish.json"; }
   // Returns the place of a file that the plan names.
   std::filesystem::path place(const std::string& in_folder) const { return path_ / in_folder; }
 
@@ -89,9 +104,12 @@ class JobFolder {
   // Returns why no further task starts; empty: they do.
   std::string read_stopped() const;
 
-  // Returns whether a process is at work on the chunk, on whatever machine. False where the file
-  // system has no locks by which that is known.
-  bool is_taken(std::size_t chunk) const;
+  // Returns who is at work on the chunk, on whatever machine.
+  Taken taken(std::size_t chunk) const;
+  // Returns whether another machine's last step is at work, as far as that is known without locks.
+  bool is_being_finished() const;
+  // Returns whether the file system has locks that other machines see.
+  bool has_locks() const;
 
   // Returns the options by which the plan renders a take, without the frames and the folder for
   // them.
@@ -105,7 +123,9 @@ class JobFolder {
   std::optional<TaskState> read_state_in(const std::filesystem::path& file) const;
   void write_state_in(const std::filesystem::path& file, const TaskState& state) const;
   void refuse_links() const;
+  bool is_alive(const std::filesystem::path& state_file) const;
 
+  LockCall call_;
   std::filesystem::path path_;  // absolute, without links, so that all names of the folder are one
 };
 
@@ -113,12 +133,16 @@ class JobFolder {
 // the other for a task.
 class JobLock {
  public:
-  // Waits for it; throws previz::Error on a stop. Where the file system has no locks it is not
-  // waited for.
+  // Waits for it; throws previz::Error on a stop. Where the file system has no locks that other
+  // machines see, it waits for the signs of life of their last steps.
   JobLock(const JobFolder& folder, const std::stop_token& stop);
+
+  // Returns whether another had it first.
+  bool was_waited_for() const { return was_waited_for_; }
 
  private:
   session::OpenFile file_;
+  bool was_waited_for_ = false;
 };
 
 }  // namespace previz::farm

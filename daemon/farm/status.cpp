@@ -13,7 +13,7 @@ namespace {
 // Where that is not known, no task is said to run.
 bool is_taken(const JobFolder& folder, std::size_t chunk) {
   try {
-    return folder.is_taken(chunk);
+    return folder.taken(chunk) != Taken::no;
   } catch (const Error&) {
     return false;
   }

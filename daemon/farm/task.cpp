@@ -1,13 +1,17 @@
 #include "daemon/farm/task.hpp"
 
+#include <unistd.h>
+
 #include <chrono>
 #include <map>
+#include <optional>
 #include <ostream>
 #include <thread>
 #include <utility>
 
 #include "daemon/farm/on_one_line.hpp"
 #include "daemon/farm/settings.hpp"
+#include "daemon/farm/signs_of_life.hpp"
 #include "daemon/post/render.hpp"
 #include "daemon/post/render_files.hpp"
 #include "drivers/error.hpp"
@@ -19,6 +23,9 @@ namespace {
 
 // Another machine is left alone for so long before it is looked at again.
 constexpr std::chrono::seconds while_another_works(3);
+
+// Two machines that take a chunk at the same moment have both told so by then.
+constexpr std::chrono::seconds for_another_to_tell(2);
 
 // The sums that a task merges are not rendered.
 class MissingSums : public Error {
@@ -35,6 +42,8 @@ class Task {
 
  private:
   bool begin();
+  void wait_for_machine_alone() const;
+  bool is_still_mine() const;
   std::map<std::uint64_t, post::FinishedFrame> finished_pictures() const;
   std::string why_nothing_to_merge() const;
   bool is_complete() const;
@@ -52,6 +61,7 @@ class Task {
   Chunk chunk_;
   std::shared_ptr<render::Device> device_;
   std::map<std::uint64_t, post::FinishedFrame> finished_;  // among the finished pictures
+  std::optional<SignsOfLife> signs_;
   bool is_mine_ = false;  // the chunk is known, and its state is this task's to write
 };
 
@@ -68,10 +78,11 @@ bool Task::begin() {
     throw JobFault("the job was stopped: " + on_one_line(why) + "; `previzd farm retry` goes on");
   out_ << "chunk " << options_.chunk << ": " << on_one_line(words_of(job_, chunk_)) << ", on "
        << machine_.host << std::endl;
-  if (options_.not_if_taken && folder_.is_taken(options_.chunk)) {
+  if (options_.not_if_taken && folder_.taken(options_.chunk) != Taken::no) {
     out_ << "another machine is rendering it" << std::endl;
     return false;
   }
+  wait_for_machine_alone();
   is_mine_ = true;
   finished_ = finished_pictures();
   const std::string no_sums = why_nothing_to_merge();
@@ -81,12 +92,39 @@ bool Task::begin() {
     return false;
   }
   say(TaskOutcome::running, "");
+  if (!is_still_mine()) return false;
+  signs_.emplace(folder_.state_file(options_.chunk));
   const std::string why =
       why_not_here(folder_, job_, chunk_, machine_, folder_.state_file(options_.chunk));
   if (!why.empty()) throw Error(why);
   if (!no_sums.empty()) throw MissingSums(no_sums);
   device_ = open_wanted_device(job_, job_.takes[chunk_.take], machine_);
   return true;
+}
+
+// Waits until no machine is at the chunk with which frames cannot be shared.
+void Task::wait_for_machine_alone() const {
+  bool is_told = false;
+  while (folder_.taken(options_.chunk) == Taken::alone) {
+    if (options_.stop.stop_requested())
+      throw Error("interrupted while another machine rendered it");
+    if (!std::exchange(is_told, true))
+      out_
+          << "waits for another machine that is rendering it, because the file system has no locks "
+             "by which they could share its frames"
+          << std::endl;
+    std::this_thread::sleep_for(while_another_works);
+  }
+}
+
+// Returns whether no other machine took the chunk at the same moment, where no lock tells.
+bool Task::is_still_mine() const {
+  if (!options_.not_if_taken || folder_.has_locks()) return true;
+  std::this_thread::sleep_for(for_another_to_tell);
+  const std::optional<TaskState> state = folder_.read_state(options_.chunk);
+  if (!state || (state->host == machine_.host && state->pid == ::getpid())) return true;
+  out_ << "another machine is rendering it" << std::endl;
+  return false;
 }
 
 std::map<std::uint64_t, post::FinishedFrame> Task::finished_pictures() const {

@@ -35,7 +35,7 @@ inline constexpr int missing_sums = 66, machine_fault = 75;
 void check_paths(const JobFolder& folder, const Job& job, bool any_paths);
 
 // Renders what is missing of a chunk into the chunk's own folder. Two tasks with one chunk share
-// its frames, or, where the file system has no locks, both render them, to the same bits. What a
+// its frames, or, where the file system has no locks that both see, one waits for the other. What a
 // task of the same chunk has finished before is kept if it is whole. All that can be known is
 // checked before the first frame, and the outcome is written into the job's folder; `out` gets the
 // same line. Returns a status of task_status; a stop counts as done.

@@ -38,6 +38,7 @@ folder: "is not beside the job's folder": a job that came from elsewhere does no
 )"},
       {"WITHOUT SLURM", R"(
 If there is no program sbatch, the job is written and the command for it printed: `bash JOB/loop.sh`, to be started on each machine, by hand, over ssh or by any scheduler, on as many machines as there are, and on further ones later. Each takes chunks that no other machine is at, waits at the end for those of the others, takes over what they do not finish, and does the last step. Started again, it continues.
+Machines know of each other by locks on files. Where the disk has none that other machines see (Lustre without `flock`, NFS with `nolock`, sshfs), each renews the time of its file in state/ instead, and a chunk whose machine has lost power is taken over three minutes later. All clocks must be right to the minute, which each task checks.
 `--openjd FILE` writes the job as a template of Open Job Description (2023-09) instead, for schedulers that take it. The parameter JobFolder is the job's folder, Previzd the program on the machines.
 )"},
       {"IN THE MORNING", R"(

@@ -14,6 +14,7 @@
 #include <thread>
 #include <utility>
 
+#include "daemon/post/mounts.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
@@ -25,10 +26,6 @@ constexpr std::uint64_t transaction_byte = 0, first_frame_byte = 1;
 constexpr std::uint64_t video_byte = std::uint64_t{1} << 61;       // above all frames
 constexpr std::uint64_t first_line_byte = std::uint64_t{1} << 62;  // of the processes' lines
 constexpr std::uint64_t frames_end = video_byte - first_frame_byte;
-
-int call_fcntl(int descriptor, int command, struct flock* range) {
-  return ::fcntl(descriptor, command, range);
-}
 
 struct flock range_of(std::uint64_t byte, short type) {
   struct flock range {};
@@ -83,21 +80,34 @@ std::string words_of(const FolderUser& user) {
   return "previzd " + std::to_string(user.pid) + " on host " + user.host + ", since " + user.since;
 }
 
-FolderLocks::FolderLocks(const std::filesystem::path& folder) : FolderLocks(folder, call_fcntl) {}
+int call_fcntl(int descriptor, int command, struct flock* range) {
+  return ::fcntl(descriptor, command, range);
+}
+
+std::string why_others_are_not_seen(int descriptor, const std::filesystem::path& folder,
+                                    LockCall call) {
+  struct flock range = range_of(transaction_byte, F_WRLCK);
+  if (call(descriptor, F_OFD_GETLK, &range) != 0)
+    return std::string("the file system has no locks (") + std::strerror(errno) + ")";
+  const std::string kind = local_locks_of(folder);
+  return kind.empty() ? "" : "the file system's locks hold on this machine only (" + kind + ")";
+}
 
 FolderLocks::FolderLocks(const std::filesystem::path& folder, LockCall call)
     : file_(folder / file_name), open_(open_lock_file(file_)), call_(call) {
   self_.host = host_name();
   self_.pid = ::getpid();
   self_.since = fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)));
+  const std::string why = why_others_are_not_seen(open_.get(), folder, call_);
+  if (!why.empty())
+    missing_ = file_.string() + ": " + why +
+               ": no other machine may render into this folder at the same time";
   struct flock range = range_of(transaction_byte, F_WRLCK);
-  if (call_(open_.get(), F_OFD_GETLK, &range) != 0)
-    missing_ = file_.string() + ": the file system has no locks (" + std::strerror(errno) +
-               "): no other process may render into this folder at the same time";
+  has_locks_ = call_(open_.get(), F_OFD_GETLK, &range) == 0;
 }
 
 FolderLocks::~FolderLocks() {
-  if (line_ < 0 || !missing_.empty()) return;
+  if (line_ < 0 || !has_locks_) return;
   try {
     const Transaction transaction(*this);
     self_ = {};
@@ -131,7 +141,7 @@ FolderLocks::Transaction::~Transaction() {
 }
 
 bool FolderLocks::lock(std::uint64_t byte) {
-  if (!missing_.empty()) return true;
+  if (!has_locks_) return true;
   struct flock range = range_of(byte, F_WRLCK);
   while (call_(open_.get(), F_OFD_SETLK, &range) != 0) {
     if (errno == EAGAIN || errno == EACCES) return false;
@@ -141,15 +151,16 @@ bool FolderLocks::lock(std::uint64_t byte) {
 }
 
 void FolderLocks::unlock(std::uint64_t byte) {
-  if (!missing_.empty()) return;
+  if (!has_locks_) return;
   struct flock range = range_of(byte, F_UNLCK);
   while (call_(open_.get(), F_OFD_SETLK, &range) != 0 && errno == EINTR) {
   }
 }
 
-bool FolderLocks::is_locked_by_another(std::uint64_t byte) const {
-  if (!missing_.empty()) return false;
+bool FolderLocks::is_locked_by_another(std::uint64_t byte, std::uint64_t bytes) const {
+  if (!has_locks_) return false;
   struct flock range = range_of(byte, F_WRLCK);
+  range.l_len = static_cast<off_t>(bytes);
   while (call_(open_.get(), F_OFD_GETLK, &range) != 0)
     if (errno != EINTR)
       throw Error(file_.string() + ": its locks cannot be read: " + std::strerror(errno));
@@ -196,11 +207,15 @@ void FolderLocks::write_own_line() {
 }
 
 void FolderLocks::join() {
-  if (!missing_.empty()) return;
+  if (!has_locks_) return;
   std::int64_t line = 0;
   while (!lock(first_line_byte + static_cast<std::uint64_t>(line))) ++line;
   line_ = line;
   write_own_line();
+}
+
+bool FolderLocks::has_others() const {
+  return is_locked_by_another(first_line_byte, /*bytes=*/0);
 }
 
 std::vector<FolderUser> FolderLocks::others() const {

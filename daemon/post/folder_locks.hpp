@@ -28,21 +28,28 @@ struct FolderUser {
 // Returns "previzd 4711 on host a, since 2026-11-25 14:03 UTC".
 std::string words_of(const FolderUser& user);
 
+// fcntl(2); a test puts that of a file system without locks in its place.
+using LockCall = int (*)(int descriptor, int command, struct flock* range);
+int call_fcntl(int descriptor, int command, struct flock* range);
+
+// Returns why locks on a file of this folder are not seen by other machines: the file system has
+// none, or they hold on this machine only. Empty: they are seen.
+std::string why_others_are_not_seen(int descriptor, const std::filesystem::path& folder,
+                                    LockCall call = call_fcntl);
+
 // Not for several threads at once; two objects exclude each other even in one process.
 class FolderLocks {
  public:
   static constexpr const char* file_name = "render.lock";
-  // As fcntl(2); a test puts a file system without locks in its place.
-  using LockCall = int (*)(int descriptor, int command, struct flock* range);
 
   // Opens or makes render.lock. Throws previz::Error, also where that is a link.
-  explicit FolderLocks(const std::filesystem::path& folder);
-  FolderLocks(const std::filesystem::path& folder, LockCall call);
+  explicit FolderLocks(const std::filesystem::path& folder, LockCall call = call_fcntl);
   ~FolderLocks();  // lets everything go, and takes the process's line out of the text
   FolderLocks(const FolderLocks&) = delete;
   FolderLocks& operator=(const FolderLocks&) = delete;
 
-  // Why the file system has no locks: then every claim succeeds. Empty: it has.
+  // Why other machines are not seen: the file system has no locks, so that every claim succeeds, or
+  // they hold on this machine only. Empty: they are seen.
   const std::string& missing() const { return missing_; }
 
   // As long as it lives, no other process is in one.
@@ -58,6 +65,9 @@ class FolderLocks {
    private:
     FolderLocks& locks_;
   };
+
+  // Returns whether another process is at work here; waits for no transaction. Throws as below.
+  bool has_others() const;
 
   // All that follow are called within a transaction. They throw previz::Error where render.lock
   // cannot be written or read.
@@ -76,13 +86,15 @@ class FolderLocks {
  private:
   bool lock(std::uint64_t byte);
   void unlock(std::uint64_t byte);
-  bool is_locked_by_another(std::uint64_t byte) const;
+  // 0 bytes: all that follow.
+  bool is_locked_by_another(std::uint64_t byte, std::uint64_t bytes = 1) const;
   std::vector<std::string> lines() const;
   void write_own_line();
 
   std::filesystem::path file_;
   OwnedDescriptor open_;
   LockCall call_;
+  bool has_locks_ = true;
   std::string missing_;
   std::int64_t line_ = -1;  // of this process in the text; -1: none yet
   FolderUser self_;

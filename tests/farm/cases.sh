@@ -296,6 +296,42 @@ case_loop() {
   done
 }
 
+# The same on a file system without locks, as Lustre without its option "flock". A machine that lost power two minutes
+# ago has left a chunk that says it is being rendered.
+case_loop_without_locks() {
+  reference quick "${quick[@]}"
+  cc -shared -fPIC -o "$folder/no_locks.so" -x c - <<'END'
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdarg.h>
+static int call(const char* name, int descriptor, int command, void* argument) {
+  if (command == F_OFD_SETLK || command == F_OFD_GETLK || command == F_OFD_SETLKW) {
+    errno = ENOSYS;
+    return -1;
+  }
+  return ((int (*)(int, int, ...))dlsym(RTLD_NEXT, name))(descriptor, command, argument);
+}
+#define FORWARD(name)                       \
+  int name(int descriptor, int command, ...) { \
+    va_list rest;                           \
+    va_start(rest, command);                \
+    return call(#name, descriptor, command, va_arg(rest, void*)); \
+  }
+FORWARD(fcntl)
+FORWARD(fcntl64)
+END
+  timeout 30 "$previzd" farm "${quick[@]}" --chunk 2 --job "$job" --out "$pictures" --openjd "$folder/job.yaml"
+  printf '{"outcome": "running", "host": "lost", "pid": 7, "since": "today", "message": ""}' >"$job/state/0001.json"
+  touch --date='120 seconds ago' "$job/state/0001.json"
+  LD_PRELOAD=$folder/no_locks.so on_three_machines
+  expect "the bits are those of one run" same_render "$out/reference/quick" "$pictures"
+  expect "each frame is rendered once" \
+    [ "$(cat "$folder"/machine?.txt | grep '^frame ' | sort | uniq --repeated --check-chars=8 | wc --lines)" == 0 ]
+  expect "machines wait for the lost one" grep --quiet 'waits for another machine' "$folder"/machine?.txt
+}
+
 # Starts the loop on three machines at once, and expects all to end well.
 on_three_machines() {
   local k machines=()

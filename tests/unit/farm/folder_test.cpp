@@ -1,0 +1,84 @@
+// Who is at work in a job's folder, on file systems with locks and without.
+#include "daemon/farm/folder.hpp"
+
+#include <cerrno>
+
+#include "daemon/farm/signs_of_life.hpp"
+#include "drivers/session/draft.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
+#include "tests/support/wait_until.hpp"
+
+namespace previz::farm::folder_test {
+
+int no_locks(int, int, struct flock*) {
+  errno = ENOSYS;
+  return -1;
+}
+
+class FarmFolder : public testing::Test {
+ protected:
+  FarmFolder() {
+    std::filesystem::create_directories(directory_ / "state");
+    std::filesystem::create_directories(folder_.chunk(0));
+    session::replace_file(folder_.plan(), "{}");
+  }
+  // As one that cannot be seen any more.
+  static void grow_old(const std::filesystem::path& file) {
+    std::filesystem::last_write_time(
+        file, std::filesystem::last_write_time(file) - std::chrono::minutes(4));
+  }
+
+  const test::TemporaryDirectory directory_;
+  const JobFolder folder_{directory_.path()}, without_locks_{directory_.path(), no_locks};
+  const TaskState running_ = state_now(TaskOutcome::running, "machine1", "");
+};
+
+TEST_F(FarmFolder, WithoutLocksATaskIsKnownByItsSignsOfLife) {
+  EXPECT_TRUE(folder_.has_locks());
+  EXPECT_FALSE(without_locks_.has_locks());
+  EXPECT_EQ(without_locks_.taken(0), Taken::no);
+  folder_.write_state(0, running_);
+  EXPECT_EQ(without_locks_.taken(0), Taken::alone);
+  EXPECT_EQ(folder_.taken(0), Taken::no) << "it has died: its locks are gone";
+  grow_old(folder_.state_file(0));
+  EXPECT_EQ(without_locks_.taken(0), Taken::no);
+  {
+    const SignsOfLife signs(folder_.state_file(0), std::chrono::milliseconds(5));
+    EXPECT_TRUE(
+        test::wait_until("it is renewed", [&] { return without_locks_.taken(0) == Taken::alone; }));
+  }
+  folder_.write_state(0, state_now(TaskOutcome::done, "machine1", ""));
+  EXPECT_EQ(without_locks_.taken(0), Taken::no);
+}
+
+// A process that hangs while it changes the folder does not hold up `farm status`.
+TEST_F(FarmFolder, ATaskIsSeenWithoutWaitingForIt) {
+  post::FolderLocks other(folder_.chunk(0));
+  const post::FolderLocks::Transaction transaction(other);
+  EXPECT_EQ(folder_.taken(0), Taken::no);
+  other.join();
+  EXPECT_EQ(folder_.taken(0), Taken::shared);
+}
+
+TEST_F(FarmFolder, WithoutLocksTheLastStepWaitsForAnotherThatIsAlive) {
+  folder_.write_finish_state(running_);
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_THAT(test::error_of([&] { JobLock(without_locks_, stop.get_token()); }),
+              HasSubstr("another last step was at work"));
+  EXPECT_FALSE(JobLock(folder_, stop.get_token()).was_waited_for());
+  grow_old(folder_.finish_state_file());
+  EXPECT_FALSE(JobLock(without_locks_, stop.get_token()).was_waited_for());
+}
+
+TEST_F(FarmFolder, TheLastStepWaitsForOneThatHasTheLock) {
+  std::optional<JobLock> first(std::in_place, folder_, std::stop_token());
+  const std::jthread end([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(150));
+    first.reset();
+  });
+  EXPECT_TRUE(JobLock(folder_, {}).was_waited_for());
+}
+
+}  // namespace previz::farm::folder_test
