@@ -5,9 +5,8 @@
 //   JOB/loop.sh             the same for people without a scheduler
 //   JOB/chunks/0003/        a chunk's pictures, as `previzd render` leaves them; the last step
 //                           moves them into the folder of finished pictures
-//   JOB/state/0003.json     what the task of that chunk said last (TaskState); its time is renewed
-//   as
-//                           long as the task runs (SignsOfLife)
+//   JOB/state/0003.json     what the task of that chunk said last (TaskState); its time is
+//                           renewed as long as the task runs (SignsOfLife)
 //   JOB/state/finish.json   what the last step said last, likewise
 //   JOB/log/                a log a task
 //   JOB/submitted.json      the scheduler's numbers of the job

@@ -113,6 +113,17 @@ void read_attributes(const std::filesystem::path& path, const Imf::Header& heade
         static_cast<std::uint64_t>(number((std::string("previz.") + counter.name).c_str()));
 }
 
+// Throws previz::Error where the file cannot hold so many pixels, before there is memory for them.
+void refuse_too_small(const std::filesystem::path& path, const Imf::Header& header,
+                      std::size_t pixels) {
+  constexpr std::uintmax_t most_deflated = 1032;  // bytes of one (zlib, Technical Details)
+  if (header.compression() == Imf::ZIP_COMPRESSION &&
+      pixels * sizeof(gpu::GpuPixel) / most_deflated <= std::filesystem::file_size(path))
+    return;
+  throw Error(path.string() + ": is too small for its " + std::to_string(pixels) +
+              " pixels, or not ZIP compressed as previzd writes it");
+}
+
 }  // namespace
 
 void write_sums_exr(const std::filesystem::path& path, const RangeSums& sums) {
@@ -139,6 +150,7 @@ RangeSums read_sums_exr(const std::filesystem::path& path) {
       throw Error(path.string() + ": is not a flat, single-part EXR file");
     Imf::InputFile file(path.c_str());
     const std::size_t pixels = exr_pixels(path, file.header().dataWindow());
+    refuse_too_small(path, file.header(), pixels);
     RangeSums result;
     read_attributes(path, file.header(), result);
     render::SampleSums& sums = result.sums;

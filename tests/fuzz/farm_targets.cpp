@@ -1,7 +1,10 @@
-// The plan of a farm's job, which lies in a folder that may come from elsewhere.
+// What lies in the folder of a farm's job, which may come from elsewhere: its plan, and the sums
+// that its tasks merge.
 #include <array>
+#include <cstring>
 
 #include "daemon/farm/job.hpp"
+#include "daemon/output/sums_exr.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 
@@ -26,8 +29,25 @@ void read_job_plan(Bytes bytes) {
          "what is read and written is read again");
 }
 
-constexpr std::array<Target, 1> all{
-    {{"job_plan", "the plan of a farm's job", read_job_plan, mutate_json}}};
+// What is read has the sums of every pixel, and is read again with the same bits.
+void read_sums(Bytes bytes) {
+  const output::RangeSums first = output::read_sums_exr(file_of(bytes, "sums.exr"));
+  const std::size_t pixels =
+      static_cast<std::size_t>(first.sums.width) * static_cast<std::size_t>(first.sums.height);
+  expect(first.sums.sums.pixels.size() == pixels, "every pixel has its sums");
+  expect(first.sums.sums.caustics.empty() || first.sums.sums.caustics.size() == pixels,
+         "every pixel has caustics, or none");
+  const std::filesystem::path file = work_folder() / "again.exr";
+  output::write_sums_exr(file, first);
+  const output::RangeSums second = output::read_sums_exr(file);
+  expect(std::memcmp(first.sums.sums.pixels.data(), second.sums.sums.pixels.data(),
+                     pixels * sizeof(gpu::GpuPixel)) == 0,
+         "what is read and written is read again");
+}
+
+constexpr std::array<Target, 2> all{
+    {{"job_plan", "the plan of a farm's job", read_job_plan, mutate_json},
+     {"sums", "the sums of a range of a frame's samples: OpenEXR", read_sums}}};
 
 }  // namespace farm_targets_cpp
 

@@ -108,6 +108,25 @@ TEST(SumsExr, ComesBackWithTheSameBits) {
   }
 }
 
+// A file of a few bytes that claims a large picture would take all memory; one that is black has
+// less than a thousandth of its pixels' bytes.
+TEST(SumsExr, IsRefusedWhereItCannotHoldItsPixels) {
+  const test::TemporaryDirectory directory;
+  const std::filesystem::path file = directory / "0.sums.exr";
+  output::RangeSums black{0, {1, 2}, {400, 300, 64, {std::vector<gpu::GpuPixel>(400 * 300), {}}}};
+  output::write_sums_exr(file, black);
+  EXPECT_EQ(output::read_sums_exr(file).sums.width, 400);
+  output::write_sums_exr(file, extreme_sums(false));
+  std::string bytes = content_of(file);
+  const std::string name("dataWindow\0box2i\0", 17);
+  const std::int32_t window[] = {0, 0, 99999, 999};
+  bytes.replace(bytes.find(name) + name.size() + 4, sizeof(window),
+                std::string_view(reinterpret_cast<const char*>(window), sizeof(window)));
+  write_content(file, bytes);
+  EXPECT_THAT(message_of([&] { output::read_sums_exr(file); }),
+              HasSubstr("is too small for its 100000000 pixels"));
+}
+
 TEST(SumsExr, IsRefusedWhereItIsAnotherFile) {
   const test::TemporaryDirectory directory;
   write_content(directory / "0.sums.exr", "no picture");
