@@ -18,6 +18,7 @@
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
+#include "drivers/session/json_numbers.hpp"
 
 namespace previz::farm {
 namespace {
@@ -131,11 +132,13 @@ std::optional<TaskState> JobFolder::read_state_in(const std::filesystem::path& f
     if (outcome == outcomes.end()) return std::nullopt;
     state.outcome = static_cast<TaskOutcome>(outcome - outcomes.begin());
     json.at("host").get_to(state.host);
-    json.at("pid").get_to(state.pid);
+    state.pid = session::number_at<std::int64_t>(json, "pid");
     json.at("since").get_to(state.since);
     json.at("message").get_to(state.message);
     return state;
-  } catch (const nlohmann::json::exception&) {
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception&) {
     return std::nullopt;  // written by hand, or on a disk that was full
   }
 }
@@ -155,10 +158,13 @@ Submitted JobFolder::read_submitted() const {
   try {
     const auto json = nlohmann::json::parse(read_at_most(file, most_state_bytes));
     Submitted submitted;
-    json.at("tasks").get_to(submitted.tasks);
-    if (json.contains("finish")) submitted.finish = json.at("finish").get<std::uint64_t>();
+    submitted.tasks = session::numbers_of<std::uint64_t>(json.at("tasks"));
+    if (json.contains("finish"))
+      submitted.finish = session::number_at<std::uint64_t>(json, "finish");
     return submitted;
-  } catch (const nlohmann::json::exception& error) {
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& error) {
     throw Error(file.string() + ": cannot be understood: " + error.what());
   }
 }

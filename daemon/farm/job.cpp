@@ -9,6 +9,7 @@
 
 #include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/json_numbers.hpp"
 
 namespace previz::farm {
 namespace {
@@ -33,7 +34,11 @@ void put(Json& json, const char* key, const std::optional<T>& value) {
 
 template <typename T>
 void get(const Json& json, const char* key, std::optional<T>& value) {
-  if (json.contains(key)) value = json.at(key).get<T>();
+  if (!json.contains(key)) return;
+  if constexpr (std::same_as<T, bool>)
+    value = json.at(key).get<bool>();
+  else
+    value = session::number_at<T>(json, key);
 }
 
 Json json_of(const post::RenderOptions& options) {
@@ -56,7 +61,7 @@ Json json_of(const post::RenderOptions& options) {
 
 post::RenderOptions options_of(const Json& json) {
   post::RenderOptions options;
-  json.at("scale").get_to(options.scale);
+  options.scale = session::number_at<decltype(options.scale)>(json, "scale");
   if (!(options.scale >= 0.05 && options.scale <= 1)) throw Error("\"scale\" is not in 0.05 to 1");
   get(json, "samples", options.samples);
   if (options.samples && (*options.samples < 1 || *options.samples > 1'000'000))
@@ -84,20 +89,13 @@ post::RenderOptions options_of(const Json& json) {
   return options;
 }
 
-// Returns a number that an int holds; a reader that cuts it would take 4294967297 for 1.
-int whole_number(const Json& json) {
-  const auto number = json.get<std::int64_t>();
-  if (number < 0 || number > std::numeric_limits<int>::max())
-    throw Error(std::to_string(number) + " is not a number that it may have");
-  return static_cast<int>(number);
-}
-
 Json range_json(const post::FrameRange& range) {
   return {range.first, range.last};
 }
 
 post::FrameRange range_of(const Json& json) {
-  const post::FrameRange range{json.at(0), json.at(1)};
+  const post::FrameRange range{session::number_of<std::uint64_t>(json.at(0)),
+                               session::number_of<std::uint64_t>(json.at(1))};
   if (range.first > range.last || range.last >= most_frames)
     throw Error("a range of frames runs from " + std::to_string(range.first) + " to " +
                 std::to_string(range.last));
@@ -130,20 +128,20 @@ JobTake take_of(const Json& json) {
   json.at("exr").get_to(take.exr);
   json.at("png").get_to(take.png);
   json.at("video").get_to(take.video);
-  json.at("frame_bytes").get_to(take.frame_bytes);
+  take.frame_bytes = session::number_at<std::uint64_t>(json, "frame_bytes");
   json.at("hardware_rays").get_to(take.hardware_rays);
   return take;
 }
 
 Chunk chunk_of(const Json& json, const Job& job) {
   Chunk chunk;
-  json.at("take").get_to(chunk.take);
+  chunk.take = session::number_at<std::size_t>(json, "take");
   if (chunk.take >= job.takes.size()) throw Error("a chunk is of a take that there is not");
   chunk.frames = range_of(json.at("frames"));
   const auto kind = std::ranges::find(kinds, json.at("kind").get<std::string_view>());
   if (kind == kinds.end()) throw Error("a chunk is of an unknown kind");
   chunk.kind = static_cast<ChunkKind>(kind - kinds.begin());
-  chunk.range = json.contains("range") ? whole_number(json.at("range")) : 0;
+  chunk.range = session::number_or(json, "range", 0);
   const bool has_range = chunk.kind == ChunkKind::sums;
   if (has_range ? chunk.range < 1 || chunk.range > job.sample_ranges : chunk.range != 0)
     throw Error("a chunk is of sample range " + std::to_string(chunk.range) + " of " +
@@ -176,7 +174,7 @@ void check_cover(const Job& job) {
 }
 
 Job read(const Json& json) {
-  if (json.value("format", 0) != format)
+  if (session::number_or(json, "format", 0) != format)
     throw Error("its format is not the one that this previzd writes, " + std::to_string(format) +
                 "; use the previzd that made the job");
   Job job;
@@ -189,12 +187,12 @@ Job read(const Json& json) {
     job.set_assets[name] = place_in_folder(place);
   json.at("on_gpu").get_to(job.on_gpu);
   json.at("any_device").get_to(job.any_device);
-  job.sample_ranges = whole_number(json.at("sample_ranges"));
+  job.sample_ranges = session::number_at<int>(json, "sample_ranges");
   if (job.sample_ranges < 1 || job.sample_ranges > 1024 ||
       !std::has_single_bit(static_cast<unsigned>(job.sample_ranges)))
     throw Error("\"sample_ranges\" is " + std::to_string(job.sample_ranges));
   const Json& wishes = json.at("wishes");
-  wishes.at("at_once").get_to(job.wishes.at_once);
+  job.wishes.at_once = session::number_at<int>(wishes, "at_once");
   wishes.at("partition").get_to(job.wishes.partition);
   wishes.at("time").get_to(job.wishes.time);
   wishes.at("memory").get_to(job.wishes.memory);
@@ -265,9 +263,7 @@ std::string to_json(const Job& job) {
 Job job_from_json(const std::string& text, const std::string& name) {
   try {
     return read(Json::parse(text));
-  } catch (const nlohmann::json::exception& error) {
-    throw JobFault(name + ": is not a job's plan: " + error.what());
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     throw JobFault(name + ": is not a job's plan: " + error.what());
   }
 }

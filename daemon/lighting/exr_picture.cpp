@@ -11,8 +11,8 @@
 #include <cmath>
 #include <cstddef>
 #include <exception>
-#include <fstream>
 
+#include "daemon/lighting/exr_header.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::lighting {
@@ -57,35 +57,8 @@ void note_primaries(const Imf::Header& header, std::vector<std::string>& notes) 
     notes.push_back("the file's primaries are not Rec. 709; its values are used unconverted");
 }
 
-// Walks the attributes of a file's first header (OpenEXR's "File Layout"), which OpenEXR itself
-// asks memory for by the sizes that they claim. Throws previz::Error where one claims more bytes
-// than the file has, or the picture too many pixels. What else is wrong is left to OpenEXR.
-void check_header(const std::filesystem::path& path) {
-  const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(path));
-  std::ifstream file(path, std::ios::binary);
-  file.seekg(8);  // the magic number and the version
-  std::string name, type;
-  while (std::getline(file, name, '\0') && !name.empty() && std::getline(file, type, '\0')) {
-    std::int32_t size = 0;
-    file.read(reinterpret_cast<char*>(&size), sizeof size);
-    const std::int64_t begin = file.tellg();
-    if (!file || begin < 0) return;
-    if (size < 0 || size > bytes - begin)
-      throw Error(path.string() +
-                  ": cannot be read as OpenEXR: its header is damaged, or its end is missing; copy "
-                  "or export it again");
-    if (name == "dataWindow" && size == sizeof(Imath::Box2i)) {
-      Imath::Box2i window;
-      file.read(reinterpret_cast<char*>(&window), sizeof window);
-      check_size(path, std::int64_t{window.max.x} - window.min.x + 1,
-                 std::int64_t{window.max.y} - window.min.y + 1);
-    }
-    file.seekg(begin + size);
-  }
-}
-
 LinearPicture read(const std::filesystem::path& path, std::vector<std::string>& notes) {
-  check_header(path);
+  check_exr_header(path);
   Imf::InputFile file(path.c_str());
   const Imath::Box2i window = file.header().dataWindow();
   check_size(path, std::int64_t{window.max.x} - window.min.x + 1,

@@ -11,7 +11,6 @@
 #include <ImfMatrixAttribute.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
-#include <ImfTestFile.h>
 
 #include <algorithm>
 #include <array>
@@ -175,9 +174,7 @@ void write_exr(const std::filesystem::path& path, const render::Layers& layers,
 
 render::Layers read_exr(const std::filesystem::path& path) {
   try {
-    bool is_tiled = false, is_deep = false, has_parts = false;
-    if (!Imf::isOpenExrFile(path.c_str(), is_tiled, is_deep, has_parts) || is_deep || has_parts)
-      throw Error(path.string() + ": is not a flat, single-part EXR file");
+    require_exr(path);
     Imf::InputFile file(path.c_str());
     const std::size_t pixels = exr_pixels(path, file.header().dataWindow());
     render::Layers layers;

@@ -3,6 +3,7 @@
 #include <ImfChannelList.h>
 #include <ImfIO.h>
 #include <ImfOutputFile.h>
+#include <ImfTestFile.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -12,6 +13,7 @@
 #include <string>
 #include <utility>
 
+#include "daemon/lighting/exr_header.hpp"
 #include "daemon/output/picture_size.hpp"
 #include "drivers/error.hpp"
 
@@ -91,6 +93,13 @@ session::Draft exr_draft(const std::filesystem::path& path, const Imf::Header& h
     throw Error(path.string() + ": cannot be written: " + error.what());
   }
   return draft;
+}
+
+void require_exr(const std::filesystem::path& path) {
+  bool is_tiled = false, is_deep = false, has_parts = false;
+  if (!Imf::isOpenExrFile(path.c_str(), is_tiled, is_deep, has_parts) || is_deep || has_parts)
+    throw Error(path.string() + ": is not a flat, single-part EXR file");
+  lighting::check_exr_header(path);
 }
 
 std::size_t exr_pixels(const std::filesystem::path& path, const Imath::Box2i& window) {

@@ -23,6 +23,10 @@ Imf::Slice exr_slice(const float* first, std::size_t floats_a_pixel, int width);
 session::Draft exr_draft(const std::filesystem::path& path, const Imf::Header& header,
                          const Imf::FrameBuffer& channels);
 
+// Throws previz::Error naming the file unless it is a flat OpenEXR file of one part whose header
+// can be read (lighting::check_exr_header()).
+void require_exr(const std::filesystem::path& path);
+
 // Returns the number of pixels of a data window. Throws previz::Error naming the file unless the
 // window begins at 0, 0 and has from 1 to most_pixels pixels.
 std::size_t exr_pixels(const std::filesystem::path& path, const Imath::Box2i& window);

@@ -5,7 +5,6 @@
 #include <ImfHeader.h>
 #include <ImfInputFile.h>
 #include <ImfStringAttribute.h>
-#include <ImfTestFile.h>
 
 #include <algorithm>
 #include <array>
@@ -145,9 +144,7 @@ void write_sums_exr(const std::filesystem::path& path, const RangeSums& sums) {
 
 RangeSums read_sums_exr(const std::filesystem::path& path) {
   try {
-    bool is_tiled = false, is_deep = false, has_parts = false;
-    if (!Imf::isOpenExrFile(path.c_str(), is_tiled, is_deep, has_parts) || is_deep || has_parts)
-      throw Error(path.string() + ": is not a flat, single-part EXR file");
+    require_exr(path);
     Imf::InputFile file(path.c_str());
     const std::size_t pixels = exr_pixels(path, file.header().dataWindow());
     refuse_too_small(path, file.header(), pixels);

@@ -4,9 +4,12 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/error.hpp"
+#include "drivers/session/json_numbers.hpp"
 
 namespace previz::post {
 namespace {
+
+using session::number_at, session::number_or, session::numbers_of;
 
 nlohmann::ordered_json rows(const glm::dmat4& matrix) {
   nlohmann::ordered_json result;
@@ -98,40 +101,41 @@ std::string to_json(const FinishedFrame& frame) {
 FinishedFrame from_json(const std::string& line) {
   const nlohmann::json json = nlohmann::json::parse(line);
   FinishedFrame frame;
-  frame.frame = json.at("frame");
-  frame.timestamp_ns = json.at("timestamp_ns");
+  frame.frame = number_at<std::uint64_t>(json, "frame");
+  frame.timestamp_ns = number_at<std::int64_t>(json, "timestamp_ns");
   frame.status = json.at("status") == "rendered" ? FrameStatus::rendered : FrameStatus::untouched;
   frame.reason = json.value("reason", "");
-  frame.samples = json.at("samples");
-  frame.render_s = json.at("render_s");
-  frame.error = json.value("error", 0.0);
+  frame.samples = number_at<std::int64_t>(json, "samples");
+  frame.render_s = number_at<double>(json, "render_s");
+  frame.error = number_or(json, "error", 0.0);
   if (json.contains("world_from_camera")) {
     frame.pose.emplace();
     frame.pose->world_from_camera = matrix_of(json["world_from_camera"]);
     frame.pose->covariance = json.at("covariance");
     frame.pose->reprojection_rms_px = json.at("reprojection_rms_px");
-    frame.pose->tags = json.at("tags").get<std::vector<int>>();
+    frame.pose->tags = numbers_of<int>(json.at("tags"));
   }
-  frame.light_frames = json.at("light_frames").get<std::vector<std::uint64_t>>();
+  frame.light_frames = numbers_of<std::uint64_t>(json.at("light_frames"));
   if (json.contains("light_sources"))
     for (const nlohmann::json& source : json["light_sources"])
-      frame.light_sources.push_back({source.at("id"), vector_of(source.at("direction")),
-                                     source.at("solid_angle_sr"), vector_of(source.at("flux"))});
-  frame.light_dropped_share = json.value("light_dropped_share", 0.0);
-  frame.counters.rays = json.at("rays");
-  frame.counters.shadow_rays = json.at("shadow_rays");
-  frame.counters.dropped_not_finite = json.at("dropped_not_finite");
-  frame.counters.dropped_negative = json.at("dropped_negative");
-  frame.counters.stopped_in_layers = json.value("stopped_in_layers", std::uint64_t{0});
-  frame.counters.unfinished = json.value("unfinished", std::uint64_t{0});
-  frame.counters.rebuilt_trees = json.value("rebuilt_trees", std::uint64_t{0});
-  frame.counters.measured = json.value("measured", std::uint64_t{0});
-  frame.counters.unmeasured = json.value("unmeasured", std::uint64_t{0});
+      frame.light_sources.push_back(
+          {number_at<int>(source, "id"), vector_of(source.at("direction")),
+           number_at<double>(source, "solid_angle_sr"), vector_of(source.at("flux"))});
+  frame.light_dropped_share = number_or(json, "light_dropped_share", 0.0);
+  frame.counters.rays = number_at<std::uint64_t>(json, "rays");
+  frame.counters.shadow_rays = number_at<std::uint64_t>(json, "shadow_rays");
+  frame.counters.dropped_not_finite = number_at<std::uint64_t>(json, "dropped_not_finite");
+  frame.counters.dropped_negative = number_at<std::uint64_t>(json, "dropped_negative");
+  frame.counters.stopped_in_layers = number_or(json, "stopped_in_layers", std::uint64_t{0});
+  frame.counters.unfinished = number_or(json, "unfinished", std::uint64_t{0});
+  frame.counters.rebuilt_trees = number_or(json, "rebuilt_trees", std::uint64_t{0});
+  frame.counters.measured = number_or(json, "measured", std::uint64_t{0});
+  frame.counters.unmeasured = number_or(json, "unmeasured", std::uint64_t{0});
   if (json.contains("device"))
     frame.made_on = {json["device"].at("name"), json["device"].at("is_gpu")};
   if (json.contains("files"))
     for (const auto& [name, mark] : json["files"].items())
-      frame.files[name] = {mark.at("bytes"), mark.at("sha256")};
+      frame.files[name] = {number_at<std::uint64_t>(mark, "bytes"), mark.at("sha256")};
   return frame;
 }
 

@@ -65,7 +65,7 @@ std::int64_t samples_of(const pipeline::Shot& shot);
 FinishedFrame finished_frame(const pipeline::Shot& shot);
 
 // These write the frame as a line, without the newline, and read it back; from_json throws
-// nlohmann::json::exception on a broken line.
+// nlohmann::json::exception or std::invalid_argument on a broken line.
 std::string to_json(const FinishedFrame& frame);
 FinishedFrame from_json(const std::string& line);
 

@@ -17,6 +17,7 @@
 #include "daemon/post/mounts.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
+#include "drivers/session/json_numbers.hpp"
 
 namespace previz::post {
 namespace {
@@ -55,11 +56,12 @@ FolderUser user_of(const std::string& line) {
     const auto json = nlohmann::json::parse(line);
     FolderUser user;
     json.at("host").get_to(user.host);
-    json.at("pid").get_to(user.pid);
+    user.pid = session::number_at<std::int64_t>(json, "pid");
     json.at("since").get_to(user.since);
-    json.at("frames").get_to(user.frames);
+    for (const auto frame : session::numbers_of<std::uint64_t>(json.at("frames")))
+      user.frames.insert(frame);
     return user;
-  } catch (const nlohmann::json::exception&) {
+  } catch (const std::exception&) {
     return {};  // half written when its process died, or changed by hand
   }
 }

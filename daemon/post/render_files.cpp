@@ -123,7 +123,7 @@ Frames frames_in(const std::filesystem::path& lines) {
     try {
       const FinishedFrame record = from_json(line);
       frames[record.frame] = record;
-    } catch (const nlohmann::json::exception&) {
+    } catch (const std::exception&) {
       continue;
     }
   }

@@ -12,6 +12,7 @@
 
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
+#include "drivers/session/json_numbers.hpp"
 #include "drivers/session/light_json.hpp"
 
 namespace previz::session {
@@ -43,29 +44,20 @@ std::uint32_t from_hex(const std::string& text) {
   return value;
 }
 
-// Strict, unlike get_to: a number of the wrong kind is damage, and converting it may overflow.
 void get(const Json& json, std::uint64_t& value) {
-  if (!json.is_number_unsigned()) throw std::invalid_argument("not a count");
-  json.get_to(value);
+  value = number_of<std::uint64_t>(json);
 }
 
 void get(const Json& json, std::int64_t& value) {
-  if (!json.is_number_integer() ||
-      (json.is_number_unsigned() && json.get<std::uint64_t>() > INT64_MAX))
-    throw std::invalid_argument("not an integer");
-  json.get_to(value);
+  value = number_of<std::int64_t>(json);
 }
 
 void get(const Json& json, int& value) {
-  std::int64_t wide = 0;
-  get(json, wide);
-  if (!std::in_range<int>(wide)) throw std::invalid_argument("too large");
-  value = static_cast<int>(wide);
+  value = number_of<int>(json);
 }
 
 void get(const Json& json, double& value) {
-  if (!json.is_number()) throw std::invalid_argument("not a number");
-  json.get_to(value);
+  value = number_of<double>(json);
 }
 
 void get(const Json& json, bool& value) {

@@ -1,4 +1,5 @@
 #include "drivers/session/light_json.hpp"
+#include "drivers/session/json_numbers.hpp"
 
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -29,8 +30,7 @@ Json components_of(const Vector& v, const char* what) {
 }
 
 double number(const Json& json) {
-  if (!json.is_number()) throw std::invalid_argument("not a number");
-  const double value = json.get<double>();
+  const auto value = number_of<double>(json);
   if (!std::isfinite(value)) throw std::invalid_argument("not finite");
   return value;
 }
@@ -48,8 +48,7 @@ const Json& three(const Json& json) {
 
 CapturedSource source_of(const Json& json) {
   CapturedSource source;
-  if (!json.at("id").is_number_integer()) throw std::invalid_argument("not a source number");
-  source.id = json.at("id").get<int>();
+  source.id = number_at<int>(json, "id");
   source.solid_angle_sr = number(json.at("solid_angle_sr"));
   constexpr double sphere_sr = 12.566370614359173;
   if (!(source.solid_angle_sr > 0 && source.solid_angle_sr <= sphere_sr))
@@ -87,8 +86,7 @@ CapturedLight captured_light_of(const Json& json) {
   if (!json.at("sources").is_array()) throw std::invalid_argument("not a list of sources");
   for (const Json& source : json.at("sources")) light.sources.push_back(source_of(source));
   const Json& ambient = json.at("ambient");
-  if (!ambient.at("size").is_number_integer()) throw std::invalid_argument("not a size");
-  light.ambient_size = ambient.at("size").get<int>();
+  light.ambient_size = number_at<int>(ambient, "size");
   const int size = light.ambient_size;
   if (size < 1 || size > largest_ambient || (size & (size - 1)) != 0)
     throw std::invalid_argument("not a power of two up to 64");

@@ -1,10 +1,14 @@
-// What lies in the folder of a farm's job, which may come from elsewhere: its plan, and the sums
-// that its tasks merge.
+// What lies in the folder of a farm's job, which may come from elsewhere: its plan, the lines of
+// its frames, and the sums that its tasks merge.
 #include <array>
 #include <cstring>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "daemon/farm/job.hpp"
 #include "daemon/output/sums_exr.hpp"
+#include "daemon/post/finished_frame.hpp"
+#include "drivers/error.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 
@@ -45,8 +49,24 @@ void read_sums(Bytes bytes) {
          "what is read and written is read again");
 }
 
-constexpr std::array<Target, 2> all{
+// A line that is read and written is the same when it is read again.
+void read_finished_line(Bytes bytes) {
+  const auto read = [](const std::string& line) {
+    try {
+      return post::from_json(line);
+    } catch (const nlohmann::json::exception& error) {
+      throw Error(error.what());
+    } catch (const std::invalid_argument& error) {
+      throw Error(error.what());
+    }
+  };
+  const std::string line = post::to_json(read(text_of(bytes)));
+  expect(post::to_json(read(line)) == line, "what is read and written is read again");
+}
+
+constexpr std::array<Target, 3> all{
     {{"job_plan", "the plan of a farm's job", read_job_plan, mutate_json},
+     {"finished_line", "a line of a render's frames.jsonl", read_finished_line, mutate_json},
      {"sums", "the sums of a range of a frame's samples: OpenEXR", read_sums}}};
 
 }  // namespace farm_targets_cpp

@@ -78,6 +78,10 @@ TEST(JobPlan, ThatIsNotOneIsRefused) {
   EXPECT_THAT(refusal([](auto& json) { json["render"]["seconds"] = 1e308; }), HasSubstr("seconds"));
   EXPECT_THAT(refusal([](auto& json) { json["sample_ranges"] = 4'294'967'297; }),
               HasSubstr("4294967297"));
+  EXPECT_THAT(refusal([](auto& json) { json["render"]["samples"] = 4'294'967'298; }),
+              HasSubstr("4294967298 is too large"));
+  EXPECT_THAT(refusal([](auto& json) { json["render"]["samples"] = 1e12; }),
+              HasSubstr("1000000000000.0 is not a whole number"));
   EXPECT_THAT(refusal([](auto& json) { json["takes"][0]["settings"] = "garbage"; }),
               HasSubstr("no JSON object"));
 }
