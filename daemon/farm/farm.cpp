@@ -1,14 +1,15 @@
 #include "daemon/farm/farm.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <ostream>
 #include <set>
 
 #include "daemon/farm/finish.hpp"
+#include "daemon/farm/job_lock.hpp"
 #include "daemon/farm/machine.hpp"
 #include "daemon/farm/plan.hpp"
 #include "daemon/farm/scripts.hpp"
-#include "daemon/farm/signs_of_life.hpp"
 #include "daemon/farm/slurm.hpp"
 #include "daemon/farm/status.hpp"
 #include "daemon/farm/task.hpp"
@@ -19,6 +20,8 @@
 
 namespace previz::farm {
 namespace {
+
+constexpr const char* frames_are_missing = "frames are missing";
 
 std::filesystem::path own_program() {
   std::error_code code;
@@ -167,11 +170,6 @@ void hand_over(const FarmOptions& options, const JobFolder& folder, const Job& j
         << shell_word(folder.loop_script().string()) << std::endl;
 }
 
-bool was_finished(const JobFolder& folder) {
-  const std::optional<TaskState> state = folder.read_finish_state();
-  return state && state->outcome == TaskOutcome::done;
-}
-
 // Returns the wishes of the plan with those that are given now.
 Wishes wishes_with(Wishes planned, const Wishes& now) {
   if (now.at_once > 0) planned.at_once = now.at_once;
@@ -250,15 +248,16 @@ void retry(const JobOptions& options, std::ostream& out) {
   refuse_under_another_name(status, folder);
   std::error_code stays;
   std::filesystem::remove(folder.stopped_file(), stays);
-  const JobLock lock(folder, options.stop);
+  JobLock lock(folder, this_machine().host, out, options.stop);
   const Proof proof = prove(folder, job, Foreign::forget, out, options.stop);
   write_missing(folder, job, proof);
   print_missing(folder, job, proof, out);
   const ScriptPlaces places = places_of(folder, job, options.program);
   write_scripts(folder, job, places);
+  if (!proof.missing.empty()) lock.end(TaskOutcome::machine, frames_are_missing);
   if (proof.missing.empty()) {
     complete(folder, job, out);
-    folder.write_finish_state(state_now(TaskOutcome::done, this_machine().host, ""));
+    lock.end(TaskOutcome::done, "");
     out << folder.path().string() << ": every frame is there and whole" << std::endl;
   } else if (has_slurm()) {
     submit_chunks(folder, job, proof.chunks, options.sbatch, out);
@@ -273,26 +272,27 @@ int finish(const JobOptions& options, std::ostream& out) {
   Job job = folder.read_plan();
   job.any_device |= options.any_device;
   check_paths(folder, job, options.any_paths);
-  const Machine machine = this_machine();
+  std::optional<JobLock> lock;  // what only waits for it has nothing to say of the last step
+  const auto end = [&](TaskOutcome outcome, const std::string& message) {
+    if (lock) lock->end(outcome, message);
+  };
   try {
-    const JobLock lock(folder, options.stop);
-    if (lock.was_waited_for() && was_finished(folder)) {
+    lock.emplace(folder, this_machine().host, out, options.stop);
+    int status = task_status::done;
+    if (lock->is_complete())
       out << folder.path().string() << ": another machine has just done the last step" << std::endl;
-      return task_status::done;
-    }
-    folder.write_finish_state(state_now(TaskOutcome::running, machine.host, ""));
-    const SignsOfLife signs(folder.finish_state_file());
-    const int status = run_finish(folder, job, out, options.stop);
-    folder.write_finish_state(
-        state_now(status == task_status::done ? TaskOutcome::done : TaskOutcome::machine,
-                  machine.host, status == task_status::done ? "" : "frames are missing"));
+    else
+      status = run_finish(folder, job, out, options.stop);
+    const bool is_done = status == task_status::done;
+    end(is_done ? TaskOutcome::done : TaskOutcome::machine, is_done ? "" : frames_are_missing);
     return status;
-  } catch (const JobFault&) {
+  } catch (const JobFault& error) {
+    end(TaskOutcome::job, error.what());
     throw;
-  } catch (const Error& error) {
+  } catch (const std::exception& error) {
     out << error.what() << std::endl;
     try {
-      folder.write_finish_state(state_now(TaskOutcome::machine, machine.host, error.what()));
+      end(TaskOutcome::machine, error.what());
     } catch (const Error& full) {
       out << full.what() << std::endl;
     }

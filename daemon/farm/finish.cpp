@@ -1,10 +1,12 @@
 #include "daemon/farm/finish.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <ostream>
+#include <thread>
 #include <utility>
 
 #include "daemon/farm/on_one_line.hpp"
@@ -44,6 +46,7 @@ class TakeProof {
   void run(Proof& proof);
 
  private:
+  void wait_for_a_look(std::size_t chunk) const;
   void collect(std::size_t chunk);
   std::string why_not_ours(std::size_t chunk) const;
   std::string why_missing(std::size_t chunk, std::uint64_t frame) const;
@@ -75,6 +78,21 @@ std::string TakeProof::why_not_ours(std::size_t chunk) const {
   return "";
 }
 
+// Waits while a task is at a chunk whose frames are all there, which it only looks at: in the loop
+// machines come to the end one after the other.
+void TakeProof::wait_for_a_look(std::size_t chunk) const {
+  constexpr std::chrono::minutes patience(5);  // a look takes seconds
+  const auto begin = std::chrono::steady_clock::now();
+  const Chunk& plan = job_.chunks[chunk];
+  while (folder_.taken(chunk) != Taken::no && std::chrono::steady_clock::now() - begin < patience) {
+    const auto there = post::finished_frames({folder_.chunk(chunk), take_.exr, take_.png, false},
+                                             /*has_sums=*/false, plan.frames);
+    if (there.size() < length_of(plan.frames)) return;
+    if (stop_.stop_requested()) throw Error(folder_.chunk(chunk).string() + ": interrupted");
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
+}
+
 void TakeProof::collect(std::size_t chunk) {
   const std::filesystem::path folder = folder_.chunk(chunk);
   std::error_code unknown;
@@ -83,6 +101,7 @@ void TakeProof::collect(std::size_t chunk) {
     faults_[chunk] = std::move(why);
     return;
   }
+  wait_for_a_look(chunk);
   if (folder_.taken(chunk) != Taken::no) {
     faults_[chunk] = "is being rendered";
     return;
@@ -212,7 +231,8 @@ Proof prove(const JobFolder& folder, const Job& job, Foreign foreign, std::ostre
 
 void complete(const JobFolder& folder, const Job& job, std::ostream& out) {
   for (const JobTake& take : job.takes) complete_take(folder, job, take, out);
-  for (std::size_t chunk = 0; chunk < job.chunks.size(); ++chunk) remove_chunk(folder.chunk(chunk));
+  for (std::size_t chunk = 0; chunk < job.chunks.size(); ++chunk)
+    if (folder.taken(chunk) == Taken::no) remove_chunk(folder.chunk(chunk));
 }
 
 void write_missing(const JobFolder& folder, const Job& job, const Proof& proof) {

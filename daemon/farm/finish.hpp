@@ -34,12 +34,14 @@ struct Proof {
 
 // Looks at every file of every frame, by the SHA-256 in its line; what is not whole is no longer
 // finished. Chunks that a process is at stay as they are, and so do frames of other settings, of
-// another version or, unless the plan allows it, of another kind of device: these are missing.
+// another version or, unless the plan allows it, of another kind of device: these are missing. A
+// process that only looks at a chunk whose frames are all there is waited for.
 // Throws previz::Error where a folder cannot be read or written, or on a stop.
 Proof prove(const JobFolder& folder, const Job& job, Foreign foreign, std::ostream& out,
             const std::stop_token& stop);
 
-// Writes the review videos of the takes and removes what is left of the chunks.
+// Writes the review videos of the takes and removes what is left of the chunks, but of those that a
+// process is at: it finds them finished, and removes them with its own last step.
 void complete(const JobFolder& folder, const Job& job, std::ostream& out);
 
 // Writes JOB/missing.json, or removes it if nothing is missing.

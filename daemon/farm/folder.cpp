@@ -184,21 +184,20 @@ bool JobFolder::has_locks() const {
   return post::why_others_are_not_seen(file.get(), path_, call_).empty();
 }
 
-bool JobFolder::is_alive(const std::filesystem::path& state_file) const {
-  const std::optional<TaskState> state = read_state_in(state_file);
-  return state && state->outcome == TaskOutcome::running && has_signs_of_life(state_file);
+std::optional<TaskState> JobFolder::living(const std::filesystem::path& state_file) const {
+  std::optional<TaskState> state = read_state_in(state_file);
+  const bool is_alive =
+      state && state->outcome == TaskOutcome::running && has_signs_of_life(state_file);
+  return is_alive ? state : std::nullopt;
 }
 
-bool JobFolder::is_being_finished() const {
-  return is_alive(finish_state_file());
+std::optional<TaskState> JobFolder::living_finish() const {
+  return living(finish_state_file());
 }
 
 Taken JobFolder::taken(std::size_t chunk) const {
-  std::error_code unknown;
-  if (std::filesystem::exists(this->chunk(chunk) / post::FolderLocks::file_name, unknown) &&
-      post::FolderLocks(this->chunk(chunk), call_).has_others())
-    return Taken::shared;
-  return is_alive(state_file(chunk)) && !has_locks() ? Taken::alone : Taken::no;
+  if (post::is_in_use(this->chunk(chunk), call_)) return Taken::shared;
+  return living(state_file(chunk)) && !has_locks() ? Taken::alone : Taken::no;
 }
 
 post::RenderOptions JobFolder::render_options(const Job& job, const JobTake& take) const {
@@ -218,25 +217,6 @@ std::string JobFolder::name() const {
   session::Sha256 hash;
   hash.add(path_.string());
   return "previz-" + hash.text().substr(0, 8);
-}
-
-JobLock::JobLock(const JobFolder& folder, const std::stop_token& stop)
-    : file_(folder.path() / "job.lock", O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK) {
-  struct flock whole {};
-  whole.l_type = F_WRLCK;
-  whole.l_whence = SEEK_SET;
-  const auto is_at_another = [&] {
-    int result = 0;
-    do result = ::fcntl(file_.get(), F_OFD_SETLK, &whole);
-    while (result != 0 && errno == EINTR);
-    if (result != 0 && (errno == EAGAIN || errno == EACCES)) return true;
-    return folder.is_being_finished() && !folder.has_locks();
-  };
-  for (; is_at_another(); was_waited_for_ = true) {
-    if (stop.stop_requested())
-      throw Error(folder.path().string() + ": interrupted while another last step was at work");
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  }
 }
 
 }  // namespace previz::farm

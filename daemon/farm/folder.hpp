@@ -11,20 +11,18 @@
 //   JOB/log/                a log a task
 //   JOB/submitted.json      the scheduler's numbers of the job
 //   JOB/stopped.txt         why no further task starts; absent: they do
-//   JOB/job.lock            the last step and a retry lock it: one is at work at a time
+//   JOB/job.lock            the last step and a retry lock it (JobLock): one is at work at a time
 //   JOB/missing.json        what the last step found missing; absent: nothing, or it has not run
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <stop_token>
 #include <string>
 #include <vector>
 
 #include "daemon/farm/job.hpp"
 #include "daemon/post/folder_locks.hpp"
-#include "drivers/session/files.hpp"
 
 namespace previz::farm {
 
@@ -105,10 +103,12 @@ class JobFolder {
 
   // Returns who is at work on the chunk, on whatever machine.
   Taken taken(std::size_t chunk) const;
-  // Returns whether another machine's last step is at work, as far as that is known without locks.
-  bool is_being_finished() const;
+  // Returns the process whose last step or retry shows signs of life; nothing if there is none.
+  std::optional<TaskState> living_finish() const;
   // Returns whether the file system has locks that other machines see.
   bool has_locks() const;
+  // Returns by what files are locked: fcntl(2), but in tests.
+  LockCall lock_call() const { return call_; }
 
   // Returns the options by which the plan renders a take, without the frames and the folder for
   // them.
@@ -122,26 +122,10 @@ class JobFolder {
   std::optional<TaskState> read_state_in(const std::filesystem::path& file) const;
   void write_state_in(const std::filesystem::path& file, const TaskState& state) const;
   void refuse_links() const;
-  bool is_alive(const std::filesystem::path& state_file) const;
+  std::optional<TaskState> living(const std::filesystem::path& state_file) const;
 
   LockCall call_;
   std::filesystem::path path_;  // absolute, without links, so that all names of the folder are one
-};
-
-// Held by the last step and by a retry while they move and compare pictures, so that neither takes
-// the other for a task.
-class JobLock {
- public:
-  // Waits for it; throws previz::Error on a stop. Where the file system has no locks that other
-  // machines see, it waits for the signs of life of their last steps.
-  JobLock(const JobFolder& folder, const std::stop_token& stop);
-
-  // Returns whether another had it first.
-  bool was_waited_for() const { return was_waited_for_; }
-
- private:
-  session::OpenFile file_;
-  bool was_waited_for_ = false;
 };
 
 }  // namespace previz::farm

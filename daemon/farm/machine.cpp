@@ -8,6 +8,7 @@
 #include <ctime>
 
 #include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
 
 namespace previz::farm {
 namespace {
@@ -45,9 +46,11 @@ std::string why_no_room(const std::filesystem::path& path, std::uint64_t needed,
          megabytes(needed) + "; make room, then call `previzd farm retry`";
 }
 
-std::string why_wrong_clock(const Machine& machine, const std::filesystem::path& written) {
+// Compares the clock with the time that the job's disk gives to a new file.
+std::string why_wrong_clock(const Machine& machine, const JobFolder& folder) {
+  const session::Draft draft(folder.place("state") / "clock");
   struct stat file {};
-  if (::stat(written.c_str(), &file) != 0) return "";
+  if (::fstat(draft.file().get(), &file) != 0) return "";
   const std::int64_t behind = file.st_mtim.tv_sec - machine.now_s();
   if (std::abs(behind) <= most_clock_difference_s) return "";
   return "the clock here is " + std::to_string(std::abs(behind)) + " s " +
@@ -76,7 +79,7 @@ Machine this_machine() {
 }
 
 std::string why_not_here(const JobFolder& folder, const Job& job, const Chunk& chunk,
-                         const Machine& machine, const std::filesystem::path& written) {
+                         const Machine& machine) {
   const JobTake& take = job.takes.at(chunk.take);
   if (machine.software != job.software)
     return machine.software + " is installed here, and the job was made with " + job.software +
@@ -86,8 +89,8 @@ std::string why_not_here(const JobFolder& folder, const Job& job, const Chunk& c
            ": the take is not found; mount its disk at the same place as where the job was made";
   if (!job.set_file.empty() && !can_be_seen(folder.place(job.set_file)))
     return folder.place(job.set_file).string() + ": not found; make the job again";
-  if (std::string why = why_wrong_clock(machine, written); !why.empty()) return why;
   try {
+    if (std::string why = why_wrong_clock(machine, folder); !why.empty()) return why;
     for (const std::filesystem::path& place : {folder.path(), take.pictures})
       if (std::string why = why_no_room(place, take.frame_bytes, machine); !why.empty()) return why;
   } catch (const Error& error) {

@@ -137,7 +137,7 @@ for waits in --not-if-taken ''; do
          call(places, "task \"$job\" \"$task\" $waits") +
          R"sh(
     status=$?
-    if [[ $status == 75 ]]; then
+    if [[ $status == 66 || $status == 75 ]]; then
       echo "this machine leaves the loop, for the reason above; others go on with it, and the last" \
         "of them does the last step. Start it here again once that is mended." >&2
     fi

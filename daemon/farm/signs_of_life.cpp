@@ -36,7 +36,7 @@ SignsOfLife::SignsOfLife(const std::filesystem::path& file, std::chrono::millise
 bool has_signs_of_life(const std::filesystem::path& file) {
   struct stat found {};
   if (::lstat(file.c_str(), &found) != 0) return false;
-  return seconds(std::time(nullptr) - found.st_mtim.tv_sec) < oldest_sign;
+  return std::chrono::abs(seconds(std::time(nullptr) - found.st_mtim.tv_sec)) < oldest_sign;
 }
 
 }  // namespace previz::farm

@@ -18,7 +18,7 @@ class SignsOfLife {
 };
 
 // Returns whether the file is not older than it can be, as seen from another machine, if somebody
-// renews it: three minutes.
+// renews it: three minutes. Nor is it younger than now by more than that: clocks are not so wrong.
 bool has_signs_of_life(const std::filesystem::path& file);
 
 }  // namespace previz::farm

@@ -23,7 +23,6 @@ namespace {
 
 // Another machine is left alone for so long before it is looked at again.
 constexpr std::chrono::seconds while_another_works(3);
-
 // Two machines that take a chunk at the same moment have both told so by then.
 constexpr std::chrono::seconds for_another_to_tell(2);
 
@@ -42,16 +41,19 @@ class Task {
 
  private:
   bool begin();
-  void wait_for_machine_alone() const;
-  bool is_still_mine() const;
-  std::map<std::uint64_t, post::FinishedFrame> finished_pictures() const;
+  bool is_at_another() const;
+  bool is_left_to_me();
+  bool take();
+  void wait(std::chrono::seconds time) const;
+  void read_finished();
   std::string why_nothing_to_merge() const;
-  bool is_complete() const;
+  bool is_complete();
   void render();
-  post::RenderOptions render_options() const;
+  post::RenderOptions render_options();
   void check_settings() const;
   void say(TaskOutcome outcome, const std::string& message);
   int fail(TaskOutcome outcome, const std::string& message);
+  int end_after(const Error& error);
 
   const TaskOptions& options_;
   const Machine& machine_;
@@ -62,11 +64,11 @@ class Task {
   std::shared_ptr<render::Device> device_;
   std::map<std::uint64_t, post::FinishedFrame> finished_;  // among the finished pictures
   std::optional<SignsOfLife> signs_;
-  bool is_mine_ = false;  // the chunk is known, and its state is this task's to write
+  bool is_known_ = false;  // the chunk is that of the plan
 };
 
-// Returns false where another machine is at the chunk, and is to be left alone. Throws JobFault, or
-// previz::Error where another machine may do it.
+// Returns false where there is nothing to do, or another machine is at the chunk and is to be left
+// alone. Throws JobFault, or previz::Error where another machine may do it.
 bool Task::begin() {
   job_ = folder_.read_plan();
   if (options_.chunk >= job_.chunks.size())
@@ -78,59 +80,70 @@ bool Task::begin() {
     throw JobFault("the job was stopped: " + on_one_line(why) + "; `previzd farm retry` goes on");
   out_ << "chunk " << options_.chunk << ": " << on_one_line(words_of(job_, chunk_)) << ", on "
        << machine_.host << std::endl;
-  if (options_.not_if_taken && folder_.taken(options_.chunk) != Taken::no) {
-    out_ << "another machine is rendering it" << std::endl;
-    return false;
+  is_known_ = true;
+  if (const std::string why = why_not_here(folder_, job_, chunk_, machine_); !why.empty())
+    throw Error(why);
+  while (!is_complete()) {
+    if (!is_left_to_me()) return false;
+    if (!take()) continue;
+    if (const std::string why = why_nothing_to_merge(); !why.empty()) throw MissingSums(why);
+    device_ = open_wanted_device(job_, job_.takes[chunk_.take], machine_);
+    return true;
   }
-  wait_for_machine_alone();
-  is_mine_ = true;
-  finished_ = finished_pictures();
-  const std::string no_sums = why_nothing_to_merge();
-  if (!no_sums.empty() && is_complete()) return false;
-  if (options_.not_if_taken && !no_sums.empty()) {
-    out_ << "another machine is rendering the sums that are merged in it" << std::endl;
-    return false;
-  }
-  say(TaskOutcome::running, "");
-  if (!is_still_mine()) return false;
-  signs_.emplace(folder_.state_file(options_.chunk));
-  const std::string why =
-      why_not_here(folder_, job_, chunk_, machine_, folder_.state_file(options_.chunk));
-  if (!why.empty()) throw Error(why);
-  if (!no_sums.empty()) throw MissingSums(no_sums);
-  device_ = open_wanted_device(job_, job_.takes[chunk_.take], machine_);
-  return true;
-}
-
-// Waits until no machine is at the chunk with which frames cannot be shared.
-void Task::wait_for_machine_alone() const {
-  bool is_told = false;
-  while (folder_.taken(options_.chunk) == Taken::alone) {
-    if (options_.stop.stop_requested())
-      throw Error("interrupted while another machine rendered it");
-    if (!std::exchange(is_told, true))
-      out_
-          << "waits for another machine that is rendering it, because the file system has no locks "
-             "by which they could share its frames"
-          << std::endl;
-    std::this_thread::sleep_for(while_another_works);
-  }
-}
-
-// Returns whether no other machine took the chunk at the same moment, where no lock tells.
-bool Task::is_still_mine() const {
-  if (!options_.not_if_taken || folder_.has_locks()) return true;
-  std::this_thread::sleep_for(for_another_to_tell);
-  const std::optional<TaskState> state = folder_.read_state(options_.chunk);
-  if (!state || (state->host == machine_.host && state->pid == ::getpid())) return true;
-  out_ << "another machine is rendering it" << std::endl;
   return false;
 }
 
-std::map<std::uint64_t, post::FinishedFrame> Task::finished_pictures() const {
+// Returns whether another process is at the chunk.
+bool Task::is_at_another() const {
+  const std::optional<TaskState> state = folder_.read_state(options_.chunk);
+  const bool is_mine = state && state->host == machine_.host && state->pid == ::getpid();
+  return !is_mine && folder_.taken(options_.chunk) != Taken::no;
+}
+
+// Returns whether the chunk is to be rendered here. Waits for a machine that is at it, unless it is
+// to be left alone, or its frames can be shared.
+bool Task::is_left_to_me() {
+  if (options_.not_if_taken && is_at_another()) {
+    out_ << "another machine is rendering it" << std::endl;
+    return false;
+  }
+  if (options_.not_if_taken && !why_nothing_to_merge().empty()) {
+    out_ << "the sums that are merged in it are not all there yet; left for later" << std::endl;
+    return false;
+  }
+  bool is_told = false;
+  for (; folder_.taken(options_.chunk) == Taken::alone; wait(while_another_works)) {
+    const std::optional<TaskState> state = folder_.read_state(options_.chunk);
+    if (!std::exchange(is_told, true) && state)
+      out_ << on_one_line("waits for " + state->host + ", which has begun it at " + state->since)
+           << ": the disk has no locks by which they could share its frames. If that machine has "
+              "died, it is taken over within three minutes"
+           << std::endl;
+  }
+  return true;
+}
+
+// Takes the chunk. Returns false if another machine has done so at the same moment, where no lock
+// tells.
+bool Task::take() {
+  say(TaskOutcome::running, "");
+  if (!folder_.has_locks()) {
+    wait(for_another_to_tell);
+    if (is_at_another()) return false;
+  }
+  signs_.emplace(folder_.state_file(options_.chunk));
+  return true;
+}
+
+void Task::wait(std::chrono::seconds time) const {
+  if (options_.stop.stop_requested()) throw Error("interrupted while another machine rendered it");
+  std::this_thread::sleep_for(time);
+}
+
+void Task::read_finished() {
   const JobTake& take = job_.takes[chunk_.take];
-  return post::finished_frames({take.pictures, take.exr, take.png, false}, /*has_sums=*/false,
-                               chunk_.frames);
+  finished_ = post::finished_frames({take.pictures, take.exr, take.png, false}, /*has_sums=*/false,
+                                    chunk_.frames);
 }
 
 // Returns which of the sums that this task merges are not there; empty: all are.
@@ -140,15 +153,16 @@ std::string Task::why_nothing_to_merge() const {
     const Chunk& part = job_.chunks[other];
     const auto there = post::finished_frames({folder_.chunk(other), true, false, false},
                                              /*has_sums=*/true, part.frames);
-    if (there.size() < length_of(part.frames))
-      return "chunk " + std::to_string(other) + " (" + words_of(job_, part) +
-             ") is not rendered, so that there is nothing to merge; `previzd farm retry` renders "
-             "it";
+    for (std::uint64_t frame = part.frames.first; frame <= part.frames.last; ++frame)
+      if (!there.contains(frame) && !finished_.contains(frame))
+        return "chunk " + std::to_string(other) + " (" + words_of(job_, part) +
+               ") is not rendered, so that there is nothing to merge; `previzd farm retry` renders "
+               "it";
   }
   return "";
 }
 
-post::RenderOptions Task::render_options() const {
+post::RenderOptions Task::render_options() {
   post::RenderOptions options = folder_.render_options(job_, job_.takes[chunk_.take]);
   options.frames = chunk_.frames;
   options.directory = folder_.chunk(options_.chunk);
@@ -161,7 +175,11 @@ post::RenderOptions Task::render_options() const {
         options.sums_from.push_back(folder_.chunk(other));
   options.open_device = device_;
   options.stop = options_.stop;
-  options.is_elsewhere = [this](std::uint64_t frame) { return finished_.contains(frame); };
+  options.is_elsewhere = [this](std::uint64_t frame) {
+    // The last step of another machine may have moved them since.
+    if (frame == chunk_.frames.first) read_finished();
+    return finished_.contains(frame);
+  };
   return options;
 }
 
@@ -189,7 +207,9 @@ void Task::render() {
   }
 }
 
+// What another process says that is at the chunk stays.
 void Task::say(TaskOutcome outcome, const std::string& message) {
+  if (outcome != TaskOutcome::running && is_at_another()) return;
   folder_.write_state(options_.chunk, state_now(outcome, machine_.host, message));
 }
 
@@ -197,8 +217,8 @@ void Task::say(TaskOutcome outcome, const std::string& message) {
 int Task::fail(TaskOutcome outcome, const std::string& message) {
   out_ << machine_.host << ": " << on_one_line(message) << std::endl;
   try {
-    if (is_mine_) say(outcome, message);
-    if (is_mine_ && outcome == TaskOutcome::job)
+    if (is_known_) say(outcome, message);
+    if (is_known_ && outcome == TaskOutcome::job)
       session::replace_file(folder_.stopped_file(), "chunk " + std::to_string(options_.chunk) +
                                                         ": " + on_one_line(message) + "\n");
   } catch (const Error& error) {
@@ -207,17 +227,31 @@ int Task::fail(TaskOutcome outcome, const std::string& message) {
   return outcome == TaskOutcome::job ? task_status::job_fault : task_status::machine_fault;
 }
 
-// Returns whether another machine has done the last step meanwhile, and says so: it removes the
-// folders of chunks, which a task may be about to read.
-bool Task::is_complete() const {
+// Returns whether all of the chunk's pictures are where the last step puts them, and says so. It
+// removes the folders of chunks, which a task may be about to read.
+bool Task::is_complete() {
+  read_finished();
+  if (finished_.size() < length_of(chunk_.frames)) return false;
+  out_ << "these frames are finished already, in " << job_.takes[chunk_.take].pictures.string()
+       << std::endl;
+  return true;
+}
+
+// Ends a task that met an error: what it was to do may have been done meanwhile.
+int Task::end_after(const Error& error) {
   try {
-    if (!is_mine_ || finished_pictures().size() < length_of(chunk_.frames)) return false;
-    out_ << "another machine has moved these frames into "
-         << job_.takes[chunk_.take].pictures.string() << std::endl;
-    return true;
-  } catch (const Error&) {
-    return false;
+    if (is_known_ && is_complete()) {
+      say(TaskOutcome::done, "");
+      return task_status::done;
+    }
+  } catch (const Error& further) {
+    out_ << further.what() << std::endl;
   }
+  const bool was_stopped = options_.stop.stop_requested();
+  fail(was_stopped ? TaskOutcome::stopped : TaskOutcome::machine, error.what());
+  if (was_stopped) return task_status::done;
+  return dynamic_cast<const MissingSums*>(&error) ? task_status::missing_sums
+                                                  : task_status::machine_fault;
 }
 
 int Task::run() {
@@ -228,17 +262,10 @@ int Task::run() {
     return task_status::done;
   } catch (const JobFault& error) {
     return fail(TaskOutcome::job, error.what());
-  } catch (const MissingSums& error) {
-    fail(TaskOutcome::machine, error.what());
-    return task_status::missing_sums;
   } catch (const Error& error) {
-    if (is_complete()) {
-      say(TaskOutcome::done, "");
-      return task_status::done;
-    }
-    if (!options_.stop.stop_requested()) return fail(TaskOutcome::machine, error.what());
-    fail(TaskOutcome::stopped, error.what());
-    return task_status::done;
+    return end_after(error);
+  } catch (const std::exception& error) {  // of a folder that another machine removes
+    return end_after(Error(error.what()));
   }
 }
 

@@ -14,8 +14,8 @@ struct TaskOptions {
   std::size_t chunk = 0;
   // The pictures may lie where the plan says, wherever that is (check_paths()).
   bool any_paths = false;
-  // Leaves a chunk alone that another machine is at; otherwise it waits, and takes over what that
-  // one does not finish.
+  // Leaves a chunk alone that another machine is at, or whose sums are not all there; otherwise it
+  // waits, and takes over what another one does not finish.
   bool not_if_taken = false;
   std::stop_token stop;
 };

@@ -95,6 +95,18 @@ std::string why_others_are_not_seen(int descriptor, const std::filesystem::path&
   return kind.empty() ? "" : "the file system's locks hold on this machine only (" + kind + ")";
 }
 
+bool is_in_use(const std::filesystem::path& folder, LockCall call) {
+  const std::filesystem::path file = folder / FolderLocks::file_name;
+  const OwnedDescriptor open(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  if (!open && (errno == ENOENT || errno == ESTALE)) return false;  // nobody was, or has ended
+  if (!open) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
+  struct flock lines = range_of(first_line_byte, F_WRLCK);
+  lines.l_len = 0;  // all that follow
+  while (call(open.get(), F_OFD_GETLK, &lines) != 0)
+    if (errno != EINTR) return false;  // the file system has no locks
+  return lines.l_type != F_UNLCK;
+}
+
 FolderLocks::FolderLocks(const std::filesystem::path& folder, LockCall call)
     : file_(folder / file_name), open_(open_lock_file(file_)), call_(call) {
   self_.host = host_name();
@@ -159,10 +171,9 @@ void FolderLocks::unlock(std::uint64_t byte) {
   }
 }
 
-bool FolderLocks::is_locked_by_another(std::uint64_t byte, std::uint64_t bytes) const {
+bool FolderLocks::is_locked_by_another(std::uint64_t byte) const {
   if (!has_locks_) return false;
   struct flock range = range_of(byte, F_WRLCK);
-  range.l_len = static_cast<off_t>(bytes);
   while (call_(open_.get(), F_OFD_GETLK, &range) != 0)
     if (errno != EINTR)
       throw Error(file_.string() + ": its locks cannot be read: " + std::strerror(errno));
@@ -214,10 +225,6 @@ void FolderLocks::join() {
   while (!lock(first_line_byte + static_cast<std::uint64_t>(line))) ++line;
   line_ = line;
   write_own_line();
-}
-
-bool FolderLocks::has_others() const {
-  return is_locked_by_another(first_line_byte, /*bytes=*/0);
 }
 
 std::vector<FolderUser> FolderLocks::others() const {

@@ -37,6 +37,10 @@ int call_fcntl(int descriptor, int command, struct flock* range);
 std::string why_others_are_not_seen(int descriptor, const std::filesystem::path& folder,
                                     LockCall call = call_fcntl);
 
+// Returns whether a process is at work in the folder. Waits for none, and makes no file. Throws
+// previz::Error where that cannot be known.
+bool is_in_use(const std::filesystem::path& folder, LockCall call = call_fcntl);
+
 // Not for several threads at once; two objects exclude each other even in one process.
 class FolderLocks {
  public:
@@ -66,9 +70,6 @@ class FolderLocks {
     FolderLocks& locks_;
   };
 
-  // Returns whether another process is at work here; waits for no transaction. Throws as below.
-  bool has_others() const;
-
   // All that follow are called within a transaction. They throw previz::Error where render.lock
   // cannot be written or read.
 
@@ -86,8 +87,7 @@ class FolderLocks {
  private:
   bool lock(std::uint64_t byte);
   void unlock(std::uint64_t byte);
-  // 0 bytes: all that follow.
-  bool is_locked_by_another(std::uint64_t byte, std::uint64_t bytes = 1) const;
+  bool is_locked_by_another(std::uint64_t byte) const;
   std::vector<std::string> lines() const;
   void write_own_line();
 

@@ -57,6 +57,7 @@ struct RenderOptions {
   // before it fails on every machine that sees the same files. Not called if no frame is to do.
   std::function<void()> on_begin;
   // Returns whether a frame is finished elsewhere, so that it is not rendered and not reported.
+  // Asked of each frame in their order, once this process is known to be at work in the folder.
   std::function<bool(std::uint64_t frame)> is_elsewhere;
   // Only these samples of every frame are rendered, and their sums are written in place of pictures
   // and video: NNNN.sums.exr (output::write_sums_exr). check_sample_range() says what is refused.

@@ -329,7 +329,7 @@ END
   expect "the bits are those of one run" same_render "$out/reference/quick" "$pictures"
   expect "each frame is rendered once" \
     [ "$(cat "$folder"/machine?.txt | grep '^frame ' | sort | uniq --repeated --check-chars=8 | wc --lines)" == 0 ]
-  expect "machines wait for the lost one" grep --quiet 'waits for another machine' "$folder"/machine?.txt
+  expect "machines wait for the lost one" grep --quiet 'waits for lost' "$folder"/machine?.txt
 }
 
 # Starts the loop on three machines at once, and expects all to end well.

@@ -2,7 +2,10 @@
 #include "daemon/farm/folder.hpp"
 
 #include <cerrno>
+#include <mutex>
+#include <sstream>
 
+#include "daemon/farm/job_lock.hpp"
 #include "daemon/farm/signs_of_life.hpp"
 #include "drivers/session/draft.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -31,6 +34,7 @@ class FarmFolder : public testing::Test {
 
   const test::TemporaryDirectory directory_;
   const JobFolder folder_{directory_.path()}, without_locks_{directory_.path(), no_locks};
+  std::ostringstream out_;
   const TaskState running_ = state_now(TaskOutcome::running, "machine1", "");
 };
 
@@ -54,6 +58,7 @@ TEST_F(FarmFolder, WithoutLocksATaskIsKnownByItsSignsOfLife) {
 
 // A process that hangs while it changes the folder does not hold up `farm status`.
 TEST_F(FarmFolder, ATaskIsSeenWithoutWaitingForIt) {
+  EXPECT_EQ(folder_.taken(1), Taken::no) << "it has no folder";
   post::FolderLocks other(folder_.chunk(0));
   const post::FolderLocks::Transaction transaction(other);
   EXPECT_EQ(folder_.taken(0), Taken::no);
@@ -65,20 +70,53 @@ TEST_F(FarmFolder, WithoutLocksTheLastStepWaitsForAnotherThatIsAlive) {
   folder_.write_finish_state(running_);
   std::stop_source stop;
   stop.request_stop();
-  EXPECT_THAT(test::error_of([&] { JobLock(without_locks_, stop.get_token()); }),
+  EXPECT_THAT(test::error_of([&] { JobLock(without_locks_, "b", out_, stop.get_token()); }),
               HasSubstr("another last step was at work"));
-  EXPECT_FALSE(JobLock(folder_, stop.get_token()).was_waited_for());
+  EXPECT_THAT(out_.str(), HasSubstr("waits for the last step or retry of machine1, since "));
+  EXPECT_EQ(folder_.read_finish_state()->host, "machine1") << "it has said nothing";
   grow_old(folder_.finish_state_file());
-  EXPECT_FALSE(JobLock(without_locks_, stop.get_token()).was_waited_for());
+  JobLock lock(without_locks_, "b", out_, stop.get_token());
+  EXPECT_EQ(folder_.read_finish_state()->host, "b");
+  EXPECT_FALSE(lock.is_complete());
+}
+
+// Two that see nobody at the same moment.
+TEST_F(FarmFolder, WithoutLocksOneOfTwoLastStepsGoesFirst) {
+  std::vector<std::string> order;
+  std::mutex mutex;
+  const auto finish = [&](const std::string& host) {
+    const JobFolder folder(directory_.path(), no_locks);
+    std::ostringstream out;
+    JobLock lock(folder, host, out, {});
+    const auto note = [&](const char* what) {
+      const std::lock_guard guard(mutex);
+      order.push_back(host + what);
+    };
+    note(" begins");
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    note(" ends");
+    lock.end(TaskOutcome::done, "");
+  };
+  {
+    const std::jthread first([&] { finish("a"); }), second([&] { finish("b"); });
+  }
+  ASSERT_EQ(order.size(), 4u);
+  EXPECT_EQ(order[0].substr(0, 1), order[1].substr(0, 1)) << order[0] << ", " << order[1];
 }
 
 TEST_F(FarmFolder, TheLastStepWaitsForOneThatHasTheLock) {
-  std::optional<JobLock> first(std::in_place, folder_, std::stop_token());
-  const std::jthread end([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(150));
-    first.reset();
-  });
-  EXPECT_TRUE(JobLock(folder_, {}).was_waited_for());
+  for (const TaskOutcome outcome : {TaskOutcome::machine, TaskOutcome::done}) {
+    folder_.write_finish_state(state_now(TaskOutcome::done, "earlier", ""));
+    std::optional<JobLock> first(std::in_place, folder_, "a", out_, std::stop_token());
+    EXPECT_FALSE(first->is_complete()) << "nobody was waited for";
+    const std::jthread end([&] {
+      std::this_thread::sleep_for(std::chrono::milliseconds(150));
+      first->end(outcome, "");
+      first.reset();
+    });
+    EXPECT_EQ(JobLock(folder_, "b", out_, {}).is_complete(), outcome == TaskOutcome::done);
+    EXPECT_EQ(folder_.read_finish_state()->outcome, TaskOutcome::stopped) << "b has not ended it";
+  }
 }
 
 }  // namespace previz::farm::folder_test

@@ -10,7 +10,7 @@ class MachineTest : public testing::Test {
  protected:
   MachineTest() {
     session::write_content(directory_ / "take/session.toml", "");
-    session::write_content(written_, "");
+    std::filesystem::create_directories(directory_ / "job/state");
     job_.software = "previzd 1.2";
     job_.chunks.resize(1);
     JobTake take;
@@ -24,10 +24,9 @@ class MachineTest : public testing::Test {
     machine_.free_bytes = [](const auto&) { return std::uint64_t{200'000'000}; };
   }
   std::string why() {
-    return why_not_here(JobFolder(directory_ / "job"), job_, job_.chunks[0], machine_, written_);
+    return why_not_here(JobFolder(directory_ / "job"), job_, job_.chunks[0], machine_);
   }
   test::TemporaryDirectory directory_;
-  std::filesystem::path written_ = directory_ / "job/state/0000.json";
   Job job_;
   Machine machine_;
 };

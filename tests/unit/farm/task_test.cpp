@@ -234,7 +234,7 @@ TEST_F(FarmTask, ThatMergesNeedsAllSums) {
   submit();  // sums: 0 to 3, merges: 4 and 5
   for (const std::size_t chunk : {0, 2, 3}) EXPECT_EQ(run(chunk), task_status::done);
   EXPECT_EQ(run(4, {}, /*not_if_taken=*/true), task_status::done);
-  EXPECT_THAT(out_.str(), HasSubstr("another machine is rendering the sums"));
+  EXPECT_THAT(out_.str(), HasSubstr("the sums that are merged in it are not all there yet"));
   EXPECT_EQ(state_of(folder_.read_state(4)), "none");
   EXPECT_EQ(run(4), task_status::missing_sums);
   EXPECT_EQ(state_of(folder_.read_state(4)),
@@ -244,6 +244,23 @@ TEST_F(FarmTask, ThatMergesNeedsAllSums) {
   EXPECT_EQ(finish(), task_status::machine_fault);
   run_all();
   EXPECT_EQ(finish(), task_status::done) << out_.str();
+}
+
+// Sums are rendered of those frames only whose pictures are not there yet.
+TEST_F(FarmTask, ThatMergesNeedsNoSumsOfAFrameThatIsThere) {
+  options_.render.samples = 256;
+  options_.render.neighbours = 0;
+  options_.division.sample_ranges = 2;
+  options_.division.chunk = 4;
+  post::RenderOptions one = options_.render;
+  one.session = directory_ / "session";
+  one.frames = {0, 1};
+  one.video = false;
+  post::render_session(one, out_);
+  submit();
+  run_all();
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  EXPECT_FALSE(std::filesystem::exists(folder_.chunk(0)));
 }
 
 // Folders of the job that lead elsewhere: nothing is written or removed there.
@@ -298,14 +315,22 @@ TEST_F(FarmTask, IsFinishedByTwoMachinesAtOnce) {
   expect_pictures_of_one_run({});
 }
 
+// A process at work in a chunk's folder.
+class OtherProcess {
+ public:
+  explicit OtherProcess(const std::filesystem::path& chunk) : locks_(chunk) {
+    const post::FolderLocks::Transaction transaction(locks_);
+    locks_.join();
+  }
+
+ private:
+  post::FolderLocks locks_;
+};
+
 TEST_F(FarmTask, ThatAnotherHasMayBeLeftToIt) {
   submit();
   std::filesystem::create_directories(folder_.chunk(1));
-  post::FolderLocks other(folder_.chunk(1));
-  {
-    const post::FolderLocks::Transaction transaction(other);
-    other.join();
-  }
+  const OtherProcess other(folder_.chunk(1));
   EXPECT_EQ(run(1, {}, /*not_if_taken=*/true), task_status::done);
   EXPECT_THAT(out_.str(), HasSubstr("another machine is rendering it"));
   EXPECT_EQ(state_of(folder_.read_state(1)), "none");
@@ -339,13 +364,68 @@ TEST_F(FarmTask, ThatRunsTwiceDoesNoHarm) {
 TEST_F(FarmTask, ThatIsAtWorkIsLeftAloneByTheLastStep) {
   submit();
   run_all();
-  post::FolderLocks other(folder_.chunk(1));
-  {
-    const post::FolderLocks::Transaction transaction(other);
-    other.join();
-  }
+  const std::filesystem::path lines = folder_.chunk(1) / "frames.jsonl";
+  const std::string text = content_of(lines);
+  write_content(lines, text.substr(0, text.find('\n') + 1));  // of its three frames
+  const OtherProcess other(folder_.chunk(1));
   EXPECT_EQ(finish(), task_status::machine_fault);
   EXPECT_THAT(out_.str(), HasSubstr("session: frames 3 to 5: is being rendered"));
+}
+
+// The last step of another machine ends while a task of this one opens its device: pictures of
+// whole frames, then of sample ranges, whose sums are gone by then.
+TEST_F(FarmTask, ThatComesTooLateRendersNothing) {
+  for (const int ranges : {1, 2}) {
+    options_.render.samples = 128;
+    options_.render.neighbours = 0;
+    options_.division.sample_ranges = ranges;
+    options_.render.directory = directory_ / ("out" + std::to_string(ranges));
+    options_.render.force = ranges > 1;
+    options_.job = directory_ / ("job" + std::to_string(ranges));
+    submit();
+    const JobFolder folder(*options_.job);
+    TaskOptions task;
+    task.job = folder.path();
+    const std::size_t chunks = folder.read_plan().chunks.size();
+    for (task.chunk = 0; task.chunk < chunks; ++task.chunk)
+      EXPECT_EQ(run_task(task, machine_, out_), task_status::done) << out_.str();
+    Machine late = machine_;
+    late.open_device = [&](const render::DeviceOptions& options) {
+      JobOptions job;
+      job.job = folder.path();
+      EXPECT_EQ(farm::finish(job, out_), task_status::done) << out_.str();
+      out_.str("");
+      return machine_.open_device(options);
+    };
+    task.chunk = chunks - 1;
+    EXPECT_EQ(run_task(task, late, out_), task_status::done) << out_.str();
+    EXPECT_THAT(out_.str(), Not(HasSubstr("samples in")));
+    EXPECT_EQ(state_of(folder.read_state(task.chunk)), "done: ");
+  }
+}
+
+// What an earlier last step said is not taken for the word of one that comes after.
+TEST_F(FarmTask, ThatIsToBeRetriedTakesBackThatTheJobIsDone) {
+  submit();
+  run_all();
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  std::filesystem::remove(directory_ / "out/0004.exr");
+  JobOptions job;
+  job.job = folder_.path();
+  farm::retry(job, out_);
+  EXPECT_EQ(state_of(folder_.read_finish_state()), "machine: frames are missing");
+}
+
+// In the loop machines come to the end one after the other.
+TEST_F(FarmTask, ThatOnlyLooksIsWaitedForByTheLastStep) {
+  submit();
+  run_all();
+  std::optional<OtherProcess> other(std::in_place, folder_.chunk(1));
+  const std::jthread end([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    other.reset();
+  });
+  EXPECT_EQ(finish(), task_status::done) << out_.str();
 }
 
 TEST_F(FarmTask, OfAnotherKindOfDeviceIsNotTaken) {
