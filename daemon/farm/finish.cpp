@@ -102,8 +102,11 @@ void TakeProof::collect(std::size_t chunk) {
     return;
   }
   wait_for_a_look(chunk);
-  if (folder_.taken(chunk) != Taken::no) {
-    faults_[chunk] = "is being rendered";
+  if (const Taken taken = folder_.taken(chunk); taken != Taken::no) {
+    faults_[chunk] = taken == Taken::shared
+                         ? "is being rendered"
+                         : "is being rendered, or was until less than three minutes ago by a "
+                           "machine that has died";
     return;
   }
   const Chunk& plan = job_.chunks[chunk];

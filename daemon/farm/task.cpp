@@ -43,6 +43,7 @@ class Task {
   bool begin();
   bool is_at_another() const;
   bool is_left_to_me();
+  bool is_rendered() const;
   bool take();
   void wait(std::chrono::seconds time) const;
   void read_finished();
@@ -123,11 +124,20 @@ bool Task::is_left_to_me() {
   return true;
 }
 
+// Returns whether the chunk's own folder has all of its frames, so that there is little to do.
+bool Task::is_rendered() const {
+  const JobTake& take = job_.takes[chunk_.take];
+  const bool is_sums = chunk_.kind == ChunkKind::sums;
+  const auto there = post::finished_frames(
+      {folder_.chunk(options_.chunk), take.exr, take.png, false}, is_sums, chunk_.frames);
+  return there.size() == length_of(chunk_.frames);
+}
+
 // Takes the chunk. Returns false if another machine has done so at the same moment, where no lock
 // tells.
 bool Task::take() {
   say(TaskOutcome::running, "");
-  if (!folder_.has_locks()) {
+  if (!folder_.has_locks() && !is_rendered()) {
     wait(for_another_to_tell);
     if (is_at_another()) return false;
   }
