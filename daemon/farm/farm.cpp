@@ -254,7 +254,7 @@ void retry(const JobOptions& options, std::ostream& out) {
   print_missing(folder, job, proof, out);
   const ScriptPlaces places = places_of(folder, job, options.program);
   write_scripts(folder, job, places);
-  if (!proof.missing.empty()) lock.end(TaskOutcome::machine, frames_are_missing);
+  if (!proof.missing.empty()) lock.end_without_word();
   if (proof.missing.empty()) {
     complete(folder, job, out);
     lock.end(TaskOutcome::done, "");
@@ -286,8 +286,7 @@ int finish(const JobOptions& options, std::ostream& out) {
     const bool is_done = status == task_status::done;
     end(is_done ? TaskOutcome::done : TaskOutcome::machine, is_done ? "" : frames_are_missing);
     return status;
-  } catch (const JobFault& error) {
-    end(TaskOutcome::job, error.what());
+  } catch (const JobFault&) {
     throw;
   } catch (const std::exception& error) {
     out << error.what() << std::endl;

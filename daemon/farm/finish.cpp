@@ -81,13 +81,14 @@ std::string TakeProof::why_not_ours(std::size_t chunk) const {
 // Waits while a task is at a chunk whose frames are all there, which it only looks at: in the loop
 // machines come to the end one after the other.
 void TakeProof::wait_for_a_look(std::size_t chunk) const {
-  constexpr std::chrono::minutes patience(5);  // a look takes seconds
-  const auto begin = std::chrono::steady_clock::now();
   const Chunk& plan = job_.chunks[chunk];
-  while (folder_.taken(chunk) != Taken::no && std::chrono::steady_clock::now() - begin < patience) {
+  for (bool is_told = false; folder_.taken(chunk) != Taken::no; is_told = true) {
     const auto there = post::finished_frames({folder_.chunk(chunk), take_.exr, take_.png, false},
                                              /*has_sums=*/false, plan.frames);
-    if (there.size() < length_of(plan.frames)) return;
+    for (std::uint64_t frame = plan.frames.first; frame <= plan.frames.last; ++frame)
+      if (!there.contains(frame) && !pictures_.finished(frame)) return;
+    if (!is_told)
+      out_ << "waits for a process that looks at the files of chunk " << chunk << std::endl;
     if (stop_.stop_requested()) throw Error(folder_.chunk(chunk).string() + ": interrupted");
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }

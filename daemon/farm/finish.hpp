@@ -41,7 +41,7 @@ Proof prove(const JobFolder& folder, const Job& job, Foreign foreign, std::ostre
             const std::stop_token& stop);
 
 // Writes the review videos of the takes and removes what is left of the chunks, but of those that a
-// process is at: it finds them finished, and removes them with its own last step.
+// process is at: it finds them finished, and in the loop removes them with its own last step.
 void complete(const JobFolder& folder, const Job& job, std::ostream& out);
 
 // Writes JOB/missing.json, or removes it if nothing is missing.

@@ -15,6 +15,7 @@
 
 #include "daemon/farm/on_one_line.hpp"
 #include "daemon/farm/signs_of_life.hpp"
+#include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
@@ -135,6 +136,7 @@ std::optional<TaskState> JobFolder::read_state_in(const std::filesystem::path& f
     state.pid = session::number_at<std::int64_t>(json, "pid");
     json.at("since").get_to(state.since);
     json.at("message").get_to(state.message);
+    state.alone = json.value("alone", false);
     return state;
   } catch (const Error&) {
     throw;
@@ -144,12 +146,18 @@ std::optional<TaskState> JobFolder::read_state_in(const std::filesystem::path& f
 }
 
 void JobFolder::write_state_in(const std::filesystem::path& file, const TaskState& state) const {
-  const nlohmann::ordered_json json{{"outcome", name_of(state.outcome)},
-                                    {"host", state.host},
-                                    {"pid", state.pid},
-                                    {"since", state.since},
-                                    {"message", state.message}};
+  nlohmann::ordered_json json{{"outcome", name_of(state.outcome)},
+                              {"host", state.host},
+                              {"pid", state.pid},
+                              {"since", state.since},
+                              {"message", state.message}};
+  if (!has_locks()) json["alone"] = true;
   session::replace_file(file, text_of(json));
+}
+
+void JobFolder::remove_finish_state() const {
+  std::error_code stays;
+  std::filesystem::remove(finish_state_file(), stays);
 }
 
 Submitted JobFolder::read_submitted() const {
@@ -180,14 +188,15 @@ std::string JobFolder::read_stopped() const {
 }
 
 bool JobFolder::has_locks() const {
-  const session::OpenFile file(plan(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK);
-  return post::why_others_are_not_seen(file.get(), path_, call_).empty();
+  const OwnedDescriptor file(
+      ::open(plan().c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  return !file || post::why_others_are_not_seen(file.get(), path_, call_).empty();
 }
 
 std::optional<TaskState> JobFolder::living(const std::filesystem::path& state_file) const {
   std::optional<TaskState> state = read_state_in(state_file);
-  const bool is_alive =
-      state && state->outcome == TaskOutcome::running && has_signs_of_life(state_file);
+  const bool is_alive = state && state->outcome == TaskOutcome::running &&
+                        (state->alone || !has_locks()) && has_signs_of_life(state_file);
   return is_alive ? state : std::nullopt;
 }
 
@@ -197,7 +206,7 @@ std::optional<TaskState> JobFolder::living_finish() const {
 
 Taken JobFolder::taken(std::size_t chunk) const {
   if (post::is_in_use(this->chunk(chunk), call_)) return Taken::shared;
-  return living(state_file(chunk)) && !has_locks() ? Taken::alone : Taken::no;
+  return living(state_file(chunk)) ? Taken::alone : Taken::no;
 }
 
 post::RenderOptions JobFolder::render_options(const Job& job, const JobTake& take) const {

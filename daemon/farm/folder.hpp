@@ -7,7 +7,7 @@
 //                           moves them into the folder of finished pictures
 //   JOB/state/0003.json     what the task of that chunk said last (TaskState); its time is
 //                           renewed as long as the task runs (SignsOfLife)
-//   JOB/state/finish.json   what the last step said last, likewise
+//   JOB/state/finish.json   what the last step, or a retry, said last, likewise
 //   JOB/log/                a log a task
 //   JOB/submitted.json      the scheduler's numbers of the job
 //   JOB/stopped.txt         why no further task starts; absent: they do
@@ -41,6 +41,7 @@ struct TaskState {
   std::int64_t pid = 0;
   std::string since;    // "2026-11-28 20:03:11 UTC"
   std::string message;  // one line: why it is not done
+  bool alone = false;   // its machine has no locks that others see: its signs of life count
 };
 
 // Returns what a process says now; `message` is put on one line.
@@ -93,9 +94,10 @@ class JobFolder {
   // Returns what the task said last; nothing if it said nothing yet, or half of it.
   std::optional<TaskState> read_state(std::size_t chunk) const;
   void write_state(std::size_t chunk, const TaskState& state) const;
-  // The same of the last step.
+  // The same of the last step, or of a retry.
   std::optional<TaskState> read_finish_state() const;
   void write_finish_state(const TaskState& state) const;
+  void remove_finish_state() const;
   Submitted read_submitted() const;
   void write_submitted(const Submitted& submitted) const;
   // Returns why no further task starts; empty: they do.
@@ -103,9 +105,11 @@ class JobFolder {
 
   // Returns who is at work on the chunk, on whatever machine.
   Taken taken(std::size_t chunk) const;
-  // Returns the process whose last step or retry shows signs of life; nothing if there is none.
+  // Returns the process whose last step or retry is known to be at work by its signs of life, and
+  // not by locks; nothing if there is none.
   std::optional<TaskState> living_finish() const;
-  // Returns whether the file system has locks that other machines see.
+  // Returns whether the file system has locks that other machines see; true where there is no plan
+  // by which that could be known.
   bool has_locks() const;
   // Returns by what files are locked: fcntl(2), but in tests.
   LockCall lock_call() const { return call_; }

@@ -24,8 +24,8 @@ JobLock::JobLock(const JobFolder& folder, const std::string& host, std::ostream&
   bool has_waited = false;
   for (;; std::this_thread::sleep_for(milliseconds(100))) {
     if (lock()) {
-      const std::optional<TaskState> before = folder.read_finish_state();
-      is_complete_ = has_waited && before && before->outcome == TaskOutcome::done;
+      before_ = folder.read_finish_state();
+      is_complete_ = has_waited && before_ && before_->outcome == TaskOutcome::done;
       if (tell()) break;
     }
     if (!std::exchange(has_waited, true)) say_that_it_waits(out);
@@ -53,7 +53,7 @@ bool JobLock::lock() {
   do result = folder_.lock_call()(file_.get(), F_OFD_SETLK, &whole);
   while (result != 0 && errno == EINTR);
   if (result != 0 && (errno == EAGAIN || errno == EACCES)) return false;
-  return folder_.has_locks() || !folder_.living_finish();
+  return !folder_.living_finish();
 }
 
 // Says that it is at work. Returns false if another process has said so at the same moment.
@@ -69,10 +69,22 @@ bool JobLock::tell() {
 
 JobLock::~JobLock() {
   try {
-    if (!has_ended_) end(TaskOutcome::stopped, "");
+    if (has_ended_) return;
+    if (before_ && before_->outcome == TaskOutcome::done) {
+      signs_.reset();
+      folder_.write_finish_state(*before_);
+    } else {
+      end(TaskOutcome::stopped, "");
+    }
   } catch (const std::exception&) {
     // Its sign of life grows old.
   }
+}
+
+void JobLock::end_without_word() {
+  has_ended_ = true;
+  signs_.reset();
+  folder_.remove_finish_state();
 }
 
 void JobLock::end(TaskOutcome outcome, const std::string& message) {

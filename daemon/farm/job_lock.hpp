@@ -19,7 +19,8 @@ class JobLock {
   // file system has no locks that other machines see, others are known by their signs of life.
   JobLock(const JobFolder& folder, const std::string& host, std::ostream& out,
           const std::stop_token& stop);
-  ~JobLock();  // says that it was stopped, unless it has ended
+  // Unless it has ended, says that the job is done if it was, and otherwise that it was stopped.
+  ~JobLock();
   JobLock(const JobLock&) = delete;
   JobLock& operator=(const JobLock&) = delete;
 
@@ -28,6 +29,8 @@ class JobLock {
 
   // Says how it has ended. Throws previz::Error where that cannot be written.
   void end(TaskOutcome outcome, const std::string& message);
+  // Leaves no word: a last step is still to come.
+  void end_without_word();
 
  private:
   bool lock();
@@ -37,6 +40,7 @@ class JobLock {
   const JobFolder& folder_;
   const std::string host_;
   session::OpenFile file_;
+  std::optional<TaskState> before_;  // what was said before
   bool is_complete_ = false, has_ended_ = false;
   std::optional<SignsOfLife> signs_;
 };

@@ -9,6 +9,9 @@
 #include <mutex>
 #include <stop_token>
 
+#include "drivers/error.hpp"
+#include "drivers/session/draft.hpp"
+
 namespace previz::farm {
 namespace {
 
@@ -34,9 +37,17 @@ SignsOfLife::SignsOfLife(const std::filesystem::path& file, std::chrono::millise
     : thread_([=](const std::stop_token& stop) { renew(stop, file, between); }) {}
 
 bool has_signs_of_life(const std::filesystem::path& file) {
-  struct stat found {};
+  struct stat found {
+  }, now{};
   if (::lstat(file.c_str(), &found) != 0) return false;
-  return std::chrono::abs(seconds(std::time(nullptr) - found.st_mtim.tv_sec)) < oldest_sign;
+  now.st_mtim.tv_sec = std::time(nullptr);
+  try {
+    const session::Draft draft(file);  // has the time of the disk
+    static_cast<void>(::fstat(draft.file().get(), &now));
+  } catch (const Error&) {
+    // Who may not write there goes by the clock.
+  }
+  return std::chrono::abs(seconds(now.st_mtim.tv_sec - found.st_mtim.tv_sec)) < oldest_sign;
 }
 
 }  // namespace previz::farm

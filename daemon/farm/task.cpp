@@ -41,6 +41,8 @@ class Task {
 
  private:
   bool begin();
+  void refuse_if_stopped() const;
+  bool is_told_mine() const;
   bool is_at_another() const;
   bool is_left_to_me();
   bool is_rendered() const;
@@ -77,8 +79,7 @@ bool Task::begin() {
                    "; the last one is " + std::to_string(job_.chunks.size() - 1));
   chunk_ = job_.chunks[options_.chunk];
   check_paths(folder_, job_, options_.any_paths);
-  if (const std::string why = folder_.read_stopped(); !why.empty())
-    throw JobFault("the job was stopped: " + on_one_line(why) + "; `previzd farm retry` goes on");
+  refuse_if_stopped();
   out_ << "chunk " << options_.chunk << ": " << on_one_line(words_of(job_, chunk_)) << ", on "
        << machine_.host << std::endl;
   is_known_ = true;
@@ -86,6 +87,7 @@ bool Task::begin() {
     throw Error(why);
   while (!is_complete()) {
     if (!is_left_to_me()) return false;
+    refuse_if_stopped();  // while it waited
     if (!take()) continue;
     if (const std::string why = why_nothing_to_merge(); !why.empty()) throw MissingSums(why);
     device_ = open_wanted_device(job_, job_.takes[chunk_.take], machine_);
@@ -94,11 +96,22 @@ bool Task::begin() {
   return false;
 }
 
-// Returns whether another process is at the chunk.
-bool Task::is_at_another() const {
+void Task::refuse_if_stopped() const {
+  if (const std::string why = folder_.read_stopped(); !why.empty())
+    throw JobFault("the job was stopped: " + on_one_line(why) + "; `previzd farm retry` goes on");
+}
+
+// Returns whether the last word on the chunk is that it runs here.
+bool Task::is_told_mine() const {
   const std::optional<TaskState> state = folder_.read_state(options_.chunk);
-  const bool is_mine = state && state->host == machine_.host && state->pid == ::getpid();
-  return !is_mine && folder_.taken(options_.chunk) != Taken::no;
+  return state && state->outcome == TaskOutcome::running && state->host == machine_.host &&
+         state->pid == ::getpid();
+}
+
+// Returns whether another process is at the chunk, while this one renders nothing.
+bool Task::is_at_another() const {
+  const Taken taken = folder_.taken(options_.chunk);
+  return taken == Taken::shared || (taken == Taken::alone && !is_told_mine());
 }
 
 // Returns whether the chunk is to be rendered here. Waits for a machine that is at it, unless it is
@@ -139,7 +152,7 @@ bool Task::take() {
   say(TaskOutcome::running, "");
   if (!folder_.has_locks() && !is_rendered()) {
     wait(for_another_to_tell);
-    if (is_at_another()) return false;
+    if (!is_told_mine()) return false;
   }
   signs_.emplace(folder_.state_file(options_.chunk));
   return true;

@@ -6,7 +6,7 @@ std::vector<Chapter> farm_chapters() {
   return {
       {"HOW A JOB GOES", R"(
 `previzd farm TAKE` opens the take and its set, so that a mistake in them is found now and not at night, divides the frames into chunks, and writes the folder of the job. That folder, the takes and the folder for the pictures must be seen by all machines at the same places. Then it submits one task per chunk and a last step to Slurm, and ends; no process of its own has to stay.
-Each task is `previzd farm task`. It checks what can be known before the first frame: version, take, clock, room and device. Then it renders the frames of its chunk into a folder of the chunk's own, and writes into the job's folder where it runs and how it ended. A task that is started again continues where the one before it stopped, and two tasks of one chunk share its frames.
+Each task is `previzd farm task`. It checks what can be known before the first frame: version, take, clock, room and device. Then it renders the frames of its chunk into a folder of the chunk's own, and writes into the job's folder where it runs and how it ended. A task that is started again continues where the one before it stopped, and two tasks of one chunk share its frames (on a disk without locks, see WITHOUT SLURM, one waits for the other).
 The last step, `previzd farm finish`, runs after all tasks have ended, whichever way. It reads every file of every frame and compares its size and SHA-256 with the line that was written when it was rendered, and that the frames have the settings, the version and the kind of device of the job. What is whole it moves into the folder of the pictures. If every frame is there it makes the review video and removes the chunks' folders; otherwise it writes missing.json and ends with 75. Only its line "every frame is there and whole" means that the job is done.
 The pictures are those of `previzd render` on one machine, to the last bit, as long as all machines have the same kind of graphics card and the same driver, or all render on processors.
 Frames that were rendered before, in the same folder with the same settings, are kept. The set file that `--set` names, the overlay of `--with` and the files that they name are copied into the job's folder: they may be edited while the job runs. A take must not be changed meanwhile.
@@ -38,7 +38,7 @@ folder: "is not beside the job's folder": a job that came from elsewhere does no
 )"},
       {"WITHOUT SLURM", R"(
 If there is no program sbatch, the job is written and the command for it printed: `bash JOB/loop.sh`, to be started on each machine, by hand, over ssh or by any scheduler, on as many machines as there are, and on further ones later. Each takes chunks that no other machine is at, waits at the end for those of the others, takes over what they do not finish, and does the last step. Started again, it continues.
-Machines know of each other by locks on files. Where the disk has none that other machines see (Lustre without `flock`, NFS with `nolock`, sshfs), each renews the time of its file in state/ instead, and a chunk whose machine has lost power is taken over three minutes later. All clocks must be right to the minute, which each task checks.
+Machines know of each other by locks on files. Where the disk has none that other machines see (Lustre without `flock`, NFS with `nolock`, sshfs), each renews the time of its file in state/ instead, and a chunk whose machine has lost power is taken over three minutes later.
 `--openjd FILE` writes the job as a template of Open Job Description (2023-09) instead, for schedulers that take it. The parameter JobFolder is the job's folder, Previzd the program on the machines.
 )"},
       {"IN THE MORNING", R"(
@@ -59,6 +59,7 @@ set/: The set file, the overlay and the files that the set names, if the command
 tasks.sh, finish.sh, loop.sh: What Slurm starts for a task and for the last step, and the script for people without a scheduler.
 chunks/0003/: The pictures of a chunk, until the last step has moved them.
 state/0003.json: What the task of that chunk said last: running, done, stopped, machine (at fault) or job (at fault), on which machine, since when, and why.
+state/finish.json: The same of the last step, or of a retry.
 log/0003.log, log/finish.log: What the tasks and the last step print under Slurm.
 submitted.json: Slurm's numbers of what was submitted last.
 stopped.txt: Why no further task starts; `previzd farm retry` removes it.

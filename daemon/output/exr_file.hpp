@@ -24,7 +24,8 @@ session::Draft exr_draft(const std::filesystem::path& path, const Imf::Header& h
                          const Imf::FrameBuffer& channels);
 
 // Throws previz::Error naming the file unless it is a flat OpenEXR file of one part whose header
-// can be read (lighting::check_exr_header()).
+// can be read and claims no more pixels than an environment may have
+// (lighting::check_exr_header()).
 void require_exr(const std::filesystem::path& path);
 
 // Returns the number of pixels of a data window. Throws previz::Error naming the file unless the
