@@ -21,8 +21,6 @@
 namespace previz::farm {
 namespace {
 
-constexpr const char* frames_are_missing = "frames are missing";
-
 std::filesystem::path own_program() {
   std::error_code code;
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", code);
@@ -64,7 +62,7 @@ class NewFolder {
     std::error_code stays;
     for (const std::filesystem::path& file :
          {folder.stopped_file(), folder.missing_file(), folder.path() / "submitted.json",
-          folder.path() / "state" / "finish.json"})
+          folder.finish_state_file()})
       std::filesystem::remove(file, stays);
     for (std::size_t chunk = 0; chunk < job.chunks.size() && was_there_; ++chunk)
       std::filesystem::remove(folder.state_file(chunk), stays);
@@ -284,7 +282,7 @@ int finish(const JobOptions& options, std::ostream& out) {
     else
       status = run_finish(folder, job, out, options.stop);
     const bool is_done = status == task_status::done;
-    end(is_done ? TaskOutcome::done : TaskOutcome::machine, is_done ? "" : frames_are_missing);
+    end(is_done ? TaskOutcome::done : TaskOutcome::machine, is_done ? "" : "frames are missing");
     return status;
   } catch (const JobFault&) {
     throw;

@@ -90,6 +90,7 @@ void TakeProof::wait_for_a_look(std::size_t chunk) const {
     if (!is_told)
       out_ << "waits for a process that looks at the files of chunk " << chunk << std::endl;
     if (stop_.stop_requested()) throw Error(folder_.chunk(chunk).string() + ": interrupted");
+    // A look ends by its lock or by a file, for which nothing can wait that a stop ends.
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
   }
 }

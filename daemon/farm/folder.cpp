@@ -8,10 +8,8 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <ctime>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "daemon/farm/on_one_line.hpp"
 #include "daemon/farm/signs_of_life.hpp"

@@ -57,7 +57,7 @@ struct Submitted {
   std::optional<std::uint64_t> finish;  // the last step
 };
 
-// Who is at work on a chunk.
+// Tells who is at work on a chunk.
 enum class Taken {
   no,
   shared,  // a process with which its frames are shared, by the locks of the file system
@@ -69,7 +69,7 @@ class JobFolder {
   using LockCall = post::LockCall;
 
   explicit JobFolder(const std::filesystem::path& folder);
-  // With the locks of another file system.
+  // Locks by `call`, which stands for another file system.
   JobFolder(const std::filesystem::path& folder, LockCall call);
 
   const std::filesystem::path& path() const { return path_; }

@@ -22,6 +22,7 @@ JobLock::JobLock(const JobFolder& folder, const std::string& host, std::ostream&
       host_(host),
       file_(folder.path() / "job.lock", O_RDWR | O_CREAT | O_NOFOLLOW | O_NONBLOCK) {
   bool has_waited = false;
+  // A lock that fcntl(2) waits for could not be given up on a stop.
   for (;; std::this_thread::sleep_for(milliseconds(100))) {
     if (lock()) {
       before_ = folder.read_finish_state();
@@ -60,7 +61,7 @@ bool JobLock::lock() {
 bool JobLock::tell() {
   folder_.write_finish_state(state_now(TaskOutcome::running, host_, ""));
   if (!folder_.has_locks()) {
-    std::this_thread::sleep_for(std::chrono::seconds(2));
+    std::this_thread::sleep_for(for_another_to_tell);
     const std::optional<TaskState> now = folder_.read_finish_state();
     if (now && (now->host != host_ || now->pid != ::getpid())) return false;
   }

@@ -1,14 +1,13 @@
 #include "daemon/farm/machine.hpp"
 
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <array>
 #include <cstdlib>
 #include <ctime>
 
+#include "daemon/farm/signs_of_life.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/draft.hpp"
 
 namespace previz::farm {
 namespace {
@@ -46,12 +45,8 @@ std::string why_no_room(const std::filesystem::path& path, std::uint64_t needed,
          megabytes(needed) + "; make room, then call `previzd farm retry`";
 }
 
-// Compares the clock with the time that the job's disk gives to a new file.
 std::string why_wrong_clock(const Machine& machine, const JobFolder& folder) {
-  const session::Draft draft(folder.place("state") / "clock");
-  struct stat file {};
-  if (::fstat(draft.file().get(), &file) != 0) return "";
-  const std::int64_t behind = file.st_mtim.tv_sec - machine.now_s();
+  const std::int64_t behind = time_of_disk_s(folder.place("state")) - machine.now_s();
   if (std::abs(behind) <= most_clock_difference_s) return "";
   return "the clock here is " + std::to_string(std::abs(behind)) + " s " +
          (behind > 0 ? "behind" : "ahead of") + " that of the job's disk; set it (timedatectl)";

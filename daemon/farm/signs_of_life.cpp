@@ -3,8 +3,10 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
+#include <cerrno>
 #include <chrono>
 #include <condition_variable>
+#include <cstring>
 #include <ctime>
 #include <mutex>
 #include <stop_token>
@@ -18,7 +20,8 @@ namespace {
 using std::chrono::seconds;
 
 // NFS may show a time that is old by a minute (acregmax in nfs(5)), and clocks may differ by a
-// minute (why_not_here()). Two of the signs, which come every 20 s, may be late.
+// minute (why_not_here()) where a client gives the times. Two of the signs, which come every 20 s,
+// may be late.
 constexpr seconds oldest_sign = seconds(60) + seconds(60) + 3 * seconds(20);
 
 void renew(const std::stop_token& stop, const std::filesystem::path& file,
@@ -36,18 +39,24 @@ void renew(const std::stop_token& stop, const std::filesystem::path& file,
 SignsOfLife::SignsOfLife(const std::filesystem::path& file, std::chrono::milliseconds between)
     : thread_([=](const std::stop_token& stop) { renew(stop, file, between); }) {}
 
+std::int64_t time_of_disk_s(const std::filesystem::path& folder) {
+  const session::Draft draft(folder / "clock");
+  struct stat made {};
+  if (::fstat(draft.file().get(), &made) != 0)
+    throw Error(folder.string() + ": its time cannot be read: " + std::strerror(errno));
+  return made.st_mtim.tv_sec;
+}
+
 bool has_signs_of_life(const std::filesystem::path& file) {
-  struct stat found {
-  }, now{};
+  struct stat found {};
   if (::lstat(file.c_str(), &found) != 0) return false;
-  now.st_mtim.tv_sec = std::time(nullptr);
+  std::int64_t now_s = std::time(nullptr);
   try {
-    const session::Draft draft(file);  // has the time of the disk
-    static_cast<void>(::fstat(draft.file().get(), &now));
+    now_s = time_of_disk_s(file.parent_path());
   } catch (const Error&) {
-    // Who may not write there goes by the clock.
+    // A user who may not write there goes by the clock.
   }
-  return std::chrono::abs(seconds(now.st_mtim.tv_sec - found.st_mtim.tv_sec)) < oldest_sign;
+  return std::chrono::abs(seconds(now_s - found.st_mtim.tv_sec)) < oldest_sign;
 }
 
 }  // namespace previz::farm

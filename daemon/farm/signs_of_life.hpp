@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <thread>
 
@@ -16,6 +17,14 @@ class SignsOfLife {
  private:
   std::jthread thread_;
 };
+
+// Two machines that take something at the same moment, where no lock tells, have both told so by
+// then.
+inline constexpr std::chrono::seconds for_another_to_tell(2);
+
+// Returns the time that the disk of a folder gives to a new file, in seconds since 1970. Throws
+// previz::Error where none can be written.
+std::int64_t time_of_disk_s(const std::filesystem::path& folder);
 
 // Returns whether the file is not older than it can be, as seen from another machine, if somebody
 // renews it: three minutes. Nor is it younger than now by more than that: clocks are not so wrong.

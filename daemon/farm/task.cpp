@@ -23,8 +23,6 @@ namespace {
 
 // Another machine is left alone for so long before it is looked at again.
 constexpr std::chrono::seconds while_another_works(3);
-// Two machines that take a chunk at the same moment have both told so by then.
-constexpr std::chrono::seconds for_another_to_tell(2);
 
 // The sums that a task merges are not rendered.
 class MissingSums : public Error {
@@ -158,6 +156,7 @@ bool Task::take() {
   return true;
 }
 
+// Another machine tells that it has ended by files alone, for which nothing can wait.
 void Task::wait(std::chrono::seconds time) const {
   if (options_.stop.stop_requested()) throw Error("interrupted while another machine rendered it");
   std::this_thread::sleep_for(time);
@@ -230,7 +229,7 @@ void Task::render() {
   }
 }
 
-// What another process says that is at the chunk stays.
+// Writes what became of the task, but over no word of another process that is at the chunk.
 void Task::say(TaskOutcome outcome, const std::string& message) {
   if (outcome != TaskOutcome::running && is_at_another()) return;
   folder_.write_state(options_.chunk, state_now(outcome, machine_.host, message));

@@ -15,7 +15,8 @@ struct LocalLocks {
   std::string_view type;  // how the file system's type begins
   std::string_view option, value;
 };
-// From nfs(5), mount.lustre(8) and mount.cifs(8); sshfs has no locks of its own.
+// The options are those of nfs(5), mount.lustre(8) and mount.cifs(8); sshfs has no locks of its
+// own.
 constexpr std::array<LocalLocks, 6> with_local_locks{{{"nfs", "local_lock", "all"},
                                                       {"nfs", "local_lock", "posix"},
                                                       {"lustre", "localflock", ""},
@@ -60,7 +61,7 @@ std::string local_locks_of(const std::filesystem::path& folder, const char* tabl
   std::size_t longest = 0;
   std::array<char, 16384> text{};
   mntent mount{};
-  // Of two at one place the later one lies above.
+  // The later of two at one place lies above.
   while (::getmntent_r(mounts.get(), &mount, text.data(), static_cast<int>(text.size()))) {
     const std::string_view place = mount.mnt_dir;
     if (place.size() < longest || !is_below(path, place)) continue;

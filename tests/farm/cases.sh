@@ -281,7 +281,7 @@ case_without_cluster() {
 }
 
 # Three machines without a scheduler, which start the loop together. A machine has a host name and process numbers of its
-# own. LP_NUM_THREADS leaves the others something.
+# own, and one processor for lavapipe.
 case_loop() {
   local ranges=("${demo[@]}" --scale 0.05 --spp 256 --neighbours 0 --frames 0-3 --no-video)
   reference loop "${ranges[@]}"

@@ -1,4 +1,4 @@
-// What lies in the folder of a farm's job, which may come from elsewhere: its plan, the lines of
+// These read the folder of a farm's job, which may come from elsewhere: its plan, the lines of
 // its frames, and the sums that its tasks merge.
 #include <array>
 #include <cstring>
@@ -17,9 +17,9 @@ namespace farm_targets_cpp {
 
 bool has_its_frames(const farm::Job& job) {
   std::uint64_t wanted = 0, pictures = 0;
-  for (const farm::JobTake& take : job.takes) wanted += take.frames.last - take.frames.first + 1;
+  for (const farm::JobTake& take : job.takes) wanted += farm::length_of(take.frames);
   for (const farm::Chunk& chunk : job.chunks)
-    if (chunk.kind != farm::ChunkKind::sums) pictures += chunk.frames.last - chunk.frames.first + 1;
+    if (chunk.kind != farm::ChunkKind::sums) pictures += farm::length_of(chunk.frames);
   return wanted == pictures;
 }
 
@@ -33,7 +33,7 @@ void read_job_plan(Bytes bytes) {
          "what is read and written is read again");
 }
 
-// What is read has the sums of every pixel, and is read again with the same bits.
+// Sums that are read are those of every pixel, and are read again with the same bits.
 void read_sums(Bytes bytes) {
   const output::RangeSums first = output::read_sums_exr(file_of(bytes, "sums.exr"));
   const std::size_t pixels =

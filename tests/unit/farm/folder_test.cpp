@@ -1,6 +1,7 @@
 // Who is at work in a job's folder, on file systems with locks and without.
 #include "daemon/farm/folder.hpp"
 
+#include <atomic>
 #include <cerrno>
 #include <mutex>
 #include <sstream>
@@ -26,7 +27,7 @@ class FarmFolder : public testing::Test {
     std::filesystem::create_directories(folder_.chunk(0));
     session::replace_file(folder_.plan(), "{}");
   }
-  // As one that cannot be seen any more.
+  // Makes the file older than a sign of life can be.
   static void grow_old(const std::filesystem::path& file) {
     std::filesystem::last_write_time(
         file, std::filesystem::last_write_time(file) - std::chrono::minutes(4));
@@ -115,6 +116,7 @@ TEST_F(FarmFolder, WithoutLocksOneOfTwoLastStepsGoesFirst) {
       order.push_back(host + what);
     };
     note(" begins");
+    // Time for the other one to begin, too, if nothing kept it from that.
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     note(" ends");
     lock.end(TaskOutcome::done, "");
@@ -126,17 +128,31 @@ TEST_F(FarmFolder, WithoutLocksOneOfTwoLastStepsGoesFirst) {
   EXPECT_EQ(order[0].substr(0, 1), order[1].substr(0, 1)) << order[0] << ", " << order[1];
 }
 
+// Notes that a line was written to it.
+class NoticedBuffer : public std::stringbuf {
+ public:
+  std::atomic<bool> has_line = false;
+
+ private:
+  int sync() override {
+    has_line = true;
+    return 0;
+  }
+};
+
 TEST_F(FarmFolder, TheLastStepWaitsForOneThatHasTheLock) {
   for (const TaskOutcome outcome : {TaskOutcome::machine, TaskOutcome::done}) {
     folder_.write_finish_state(state_now(TaskOutcome::done, "earlier", ""));
     std::optional<JobLock> first(std::in_place, folder_, "a", out_, std::stop_token());
     EXPECT_FALSE(first->is_complete()) << "nobody was waited for";
+    NoticedBuffer buffer;
+    std::ostream out(&buffer);
     const std::jthread end([&] {
-      std::this_thread::sleep_for(std::chrono::milliseconds(150));
+      EXPECT_TRUE(test::wait_until("b waits", [&] { return buffer.has_line.load(); }));
       first->end(outcome, "");
       first.reset();
     });
-    EXPECT_EQ(JobLock(folder_, "b", out_, {}).is_complete(), outcome == TaskOutcome::done);
+    EXPECT_EQ(JobLock(folder_, "b", out, {}).is_complete(), outcome == TaskOutcome::done);
   }
 }
 

@@ -404,7 +404,7 @@ TEST_F(FarmTask, ThatComesTooLateRendersNothing) {
   }
 }
 
-// Of two that share a chunk the first to end says nothing while the other is at work.
+// The first to end of two that share a chunk says nothing while the other is at work.
 TEST_F(FarmTask, ThatSharesAChunkLeavesTheLastWordToTheOther) {
   submit();
   EXPECT_EQ(run(1), task_status::done) << out_.str();
@@ -416,7 +416,7 @@ TEST_F(FarmTask, ThatSharesAChunkLeavesTheLastWordToTheOther) {
   EXPECT_EQ(state_of(folder_.read_state(1)), "done: ");
 }
 
-// What an earlier last step said is not taken for the word of one that comes after.
+// A retry that finds frames missing takes back what an earlier last step said.
 TEST_F(FarmTask, ThatIsToBeRetriedTakesBackThatTheJobIsDone) {
   submit();
   run_all();
@@ -440,6 +440,7 @@ TEST_F(FarmTask, ThatOnlyLooksIsWaitedForByTheLastStep) {
   run_all();
   std::optional<OtherProcess> other(std::in_place, folder_.chunk(1));
   const std::jthread end([&] {
+    // Time for the last step to meet it.
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     other.reset();
   });

@@ -35,7 +35,7 @@ TEST(Mounts, TellWhereLocksHoldOnOneMachineOnly) {
   EXPECT_EQ(local_locks_of(film, "/nowhere"), "");
 }
 
-// Of two file systems that are mounted at one place the later one is seen.
+// The later of two file systems at one place is seen.
 TEST(Mounts, LieAboveEarlierOnes) {
   const test::TemporaryDirectory directory;
   const std::string place = directory.path().string();
