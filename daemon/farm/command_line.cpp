@@ -44,13 +44,17 @@ void add_division(CLI::App& farm, FarmOptions& options) {
       ->check(CLI::Range(1, 16));
 }
 
-void add_wishes(CLI::App& farm, FarmOptions& options) {
-  farm.add_option("--limit", options.wishes.at_once,
+void add_wishes(CLI::App& command, Wishes& wishes) {
+  command
+      .add_option("--limit", wishes.at_once,
                   "Tasks that run at once at most (default: as many as Slurm allows)")
       ->check(CLI::Range(1, 100'000));
-  farm.add_option("--partition", options.wishes.partition, "Slurm's partition");
-  farm.add_option("--time", options.wishes.time, "Time limit of a task, as sbatch takes it");
-  farm.add_option("--mem", options.wishes.memory, "Memory of a task, as sbatch takes it");
+  command.add_option("--partition", wishes.partition, "Slurm's partition");
+  command.add_option("--time", wishes.time, "Time limit of a task, as sbatch takes it");
+  command.add_option("--mem", wishes.memory, "Memory of a task, as sbatch takes it");
+}
+
+void add_devices(CLI::App& farm, FarmOptions& options) {
   farm.add_flag_callback(
           "--gpu", [&options] { options.on_gpu = true; },
           "Render on graphics cards, one per task (default: as this computer would)")
@@ -73,7 +77,8 @@ void add_farm(CLI::App& app, Commands& commands,
                   "Folder for the job, which all machines see (default: beside the first take's "
                   "pictures, with .farm after its name)");
   add_division(farm, commands.farm);
-  add_wishes(farm, commands.farm);
+  add_wishes(farm, commands.farm.wishes);
+  add_devices(farm, commands.farm);
   add_program_options(farm, commands.farm.program, commands.farm.sbatch);
   farm.add_flag("--dry-run", commands.farm.dry_run,
                 "Print the scripts and commands, and write and submit nothing");
@@ -89,7 +94,11 @@ void add_farm(CLI::App& app, Commands& commands,
   CLI::App& retry = add_job_command(
       farm, "retry", "Submit the tasks whose frames are missing or damaged", commands.job.job);
   add_any_place(retry, commands.job.any_paths);
+  add_wishes(retry, commands.job.wishes);
   add_program_options(retry, commands.job.program, commands.job.sbatch);
+  retry.footer(
+      "--limit, --partition, --time and --mem are those of the first submission unless they are "
+      "given; --program and --sbatch are not remembered, and are given again.");
   CLI::App& task = add_job_command(farm, "task", "Render one chunk of a job, as each task does",
                                    commands.task.job);
   task.add_option("number", commands.task.chunk, "Number of the chunk")->required();

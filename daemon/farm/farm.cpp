@@ -1,8 +1,6 @@
 #include "daemon/farm/farm.hpp"
 
 #include <algorithm>
-#include <array>
-#include <nlohmann/json.hpp>
 #include <ostream>
 #include <set>
 
@@ -13,7 +11,7 @@
 #include "daemon/farm/slurm.hpp"
 #include "daemon/farm/status.hpp"
 #include "daemon/farm/task.hpp"
-#include "daemon/output/progress.hpp"
+#include "daemon/post/render_directory.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
@@ -36,14 +34,62 @@ JobFolder folder_for(const FarmOptions& options, const Job& job) {
   return JobFolder(folder);
 }
 
+// A name without a folder is looked for in PATH by each machine; tasks do not start in this folder.
+std::filesystem::path program_for(const std::filesystem::path& program) {
+  if (program.empty()) return own_program();
+  return program.has_parent_path() ? std::filesystem::absolute(program).lexically_normal()
+                                   : program;
+}
+
 ScriptPlaces places_of(const JobFolder& folder, const Job& job,
                        const std::filesystem::path& program) {
   const auto lies_elsewhere = [&](const JobTake& take) {
     return !session::lies_within(folder.path().parent_path(), take.pictures);
   };
-  return {program.empty() ? own_program() : program, folder.path(),
+  return {program_for(program), folder.path(),
           job.render.any_paths || std::ranges::any_of(job.takes, lies_elsewhere)};
 }
+
+// Removes the folder of a job that was not submitted, so that the corrected command finds none.
+class NewFolder {
+ public:
+  NewFolder(const FarmOptions& options, const JobFolder& folder, const Job& job)
+      : folder_(folder), was_there_(std::filesystem::exists(folder.path())) {
+    make_folder(options, folder, job);
+    // What an earlier job in this folder has left would be taken for this one's.
+    std::error_code stays;
+    for (const std::filesystem::path& file :
+         {folder.stopped_file(), folder.missing_file(), folder.path() / "submitted.json",
+          folder.path() / "state" / "finish.json"})
+      std::filesystem::remove(file, stays);
+    for (std::size_t chunk = 0; chunk < job.chunks.size() && was_there_; ++chunk)
+      std::filesystem::remove(folder.state_file(chunk), stays);
+  }
+  NewFolder(const NewFolder&) = delete;
+  NewFolder& operator=(const NewFolder&) = delete;
+  ~NewFolder() {
+    if (is_kept_ || may_be_queued()) return;
+    std::error_code stays;
+    std::filesystem::remove(folder_.plan(), stays);
+    if (!was_there_) std::filesystem::remove_all(folder_.path(), stays);
+  }
+  void keep() { is_kept_ = true; }
+
+ private:
+  // What could not be taken back is canceled by its folder.
+  bool may_be_queued() const {
+    try {
+      const Submitted submitted = folder_.read_submitted();
+      return !submitted.tasks.empty() || submitted.finish.has_value();
+    } catch (const Error&) {
+      return true;
+    }
+  }
+
+  const JobFolder& folder_;
+  const bool was_there_;
+  bool is_kept_ = false;
+};
 
 std::uint64_t frames_of(const Job& job) {
   std::uint64_t frames = 0;
@@ -70,6 +116,29 @@ std::set<std::size_t> chunks_to_do(const JobFolder& folder, const Job& job, std:
   return prove(folder, job, out, stop).chunks;
 }
 
+// Forgets what is finished, once for the whole job: no task does it again (`--force`).
+void forget_finished(const Job& job, const std::stop_token& stop) {
+  for (const JobTake& take : job.takes) {
+    const post::RenderDirectory pictures({take.pictures, take.exr, take.png, false}, take.settings,
+                                         /*force=*/true, {}, take.frames, stop);
+    // While others render there it forgets nothing.
+    for (std::uint64_t frame = take.frames.first; frame <= take.frames.last; ++frame)
+      if (pictures.finished(frame))
+        throw Error(take.pictures.string() +
+                    ": is being rendered, so that its frames cannot be forgotten (--force); wait "
+                    "until that has ended");
+  }
+}
+
+// Throws where parts of an earlier job in this folder would be taken for those of a new one.
+void refuse_where_others_wait(const JobFolder& folder) {
+  if (!queued_tasks(folder).empty())
+    throw Error(folder.path().string() +
+                ": tasks of an earlier job in this folder are still in the queue; cancel them by "
+                "`scancel --name=" +
+                folder.name() + "`, or give another folder with --job");
+}
+
 void refuse_while_queued(const JobStatus& status, const JobFolder& folder) {
   if (!status.is_queued && status.running == 0) return;
   throw Error(folder.path().string() +
@@ -77,78 +146,33 @@ void refuse_while_queued(const JobStatus& status, const JobFolder& folder) {
               "cancel them first (`previzd farm cancel`)");
 }
 
-std::string bar(double share) {
-  constexpr int width = 32;
-  const int full = static_cast<int>(share * width);
-  return "[" + std::string(static_cast<std::size_t>(full), '#') +
-         std::string(static_cast<std::size_t>(width - full), '-') + "]";
+void refuse_under_another_name(const JobStatus& status, const JobFolder& folder) {
+  if (status.others.empty()) return;
+  throw Error(folder.path().string() + ": its jobs " + status.others +
+              " are in the queue under another name, as they are where the folder was moved since; "
+              "look at them by `squeue --jobs=" +
+              status.others + "`, and cancel them, or wait until they have ended");
 }
 
-void print_task(const Job& job, std::size_t chunk, const ChunkStatus& status, std::ostream& out) {
-  out << "task " << chunk << ", " << words_of(job, job.chunks[chunk]) << ": ";
-  if (status.is_running)
-    out << "running on " << (status.state ? status.state->host : "a machine that says nothing")
-        << ", " << status.done << " of " << status.frames << " frames done";
-  else if (status.state && !status.state->message.empty())
-    out << (status.queue.empty() ? "" : "waiting again; ") << status.state->host << ": "
-        << status.state->message;
-  else if (status.state)
-    out << "ended on " << status.state->host << " with " << status.done << " of " << status.frames
-        << " frames done";
-  out << std::endl;
+void hand_over(const FarmOptions& options, const JobFolder& folder, const Job& job,
+               const std::set<std::size_t>& chunks, bool uses_slurm, std::ostream& out) {
+  if (uses_slurm)
+    submit_chunks(folder, job, chunks, options.sbatch, out);
+  else if (options.openjd)
+    out << options.openjd->string() << ": submit it to a scheduler that takes Open Job Descriptions"
+        << std::endl;
+  else
+    out << "There is no Slurm here (no program sbatch). Start this on each machine:\n  bash "
+        << shell_word(folder.loop_script().string()) << std::endl;
 }
 
-void print_words(const JobFolder& folder, const Job& job, const JobStatus& status, bool terminal,
-                 std::ostream& out) {
-  const auto failed = std::ranges::count_if(status.chunks, &ChunkStatus::has_failed);
-  const double share =
-      status.frames > 0 ? static_cast<double>(status.done) / static_cast<double>(status.frames) : 1;
-  if (terminal) out << bar(share) << " ";
-  out << status.done << " of " << status.frames << " frames done, " << status.running
-      << (status.running == 1 ? " task" : " tasks") << " running, " << failed << " failed";
-  if (const std::optional<double> left = status.seconds_left())
-    out << ", about " << output::duration_words(*left) << " left";
-  else if (status.done < status.frames)
-    out << (status.is_queued ? ", waiting in the queue" : "");
-  out << std::endl;
-  if (!status.stopped.empty()) out << "stopped: " << status.stopped;
-  for (std::size_t i = 0; i < status.chunks.size(); ++i)
-    if (status.chunks[i].is_running || status.chunks[i].has_failed())
-      print_task(job, i, status.chunks[i], out);
-  if (status.done < status.frames && !status.is_queued && status.running == 0)
-    out << "nothing runs: `previzd farm retry` renders what is missing" << std::endl;
-  std::error_code unknown;
-  if (status.done == status.frames &&
-      !std::filesystem::exists(folder.place("chunks/0000"), unknown))
-    for (const JobTake& take : job.takes)
-      out << "pictures: " << take.pictures.string() << std::endl;
-}
-
-void print_json(const Job& job, const JobStatus& status, std::ostream& out) {
-  nlohmann::ordered_json json{{"frames", status.frames},
-                              {"done", status.done},
-                              {"running", status.running},
-                              {"is_queued", status.is_queued},
-                              {"stopped", status.stopped}};
-  if (const std::optional<double> left = status.seconds_left()) json["seconds_left"] = *left;
-  json["tasks"] = nlohmann::ordered_json::array();
-  for (std::size_t i = 0; i < status.chunks.size(); ++i) {
-    const ChunkStatus& chunk = status.chunks[i];
-    nlohmann::ordered_json one{{"task", i},
-                               {"about", words_of(job, job.chunks[i])},
-                               {"frames", chunk.frames},
-                               {"done", chunk.done},
-                               {"running", chunk.is_running},
-                               {"failed", chunk.has_failed()}};
-    if (!chunk.queue.empty()) one["queue"] = chunk.queue;
-    if (chunk.state) {
-      one["outcome"] = name_of(chunk.state->outcome);
-      one["host"] = chunk.state->host;
-      one["message"] = chunk.state->message;
-    }
-    json["tasks"].push_back(std::move(one));
-  }
-  out << json.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
+// Returns the wishes of the plan with those that are given now.
+Wishes wishes_with(Wishes planned, const Wishes& now) {
+  if (now.at_once > 0) planned.at_once = now.at_once;
+  if (!now.partition.empty()) planned.partition = now.partition;
+  if (!now.time.empty()) planned.time = now.time;
+  if (!now.memory.empty()) planned.memory = now.memory;
+  return planned;
 }
 
 }  // namespace
@@ -166,23 +190,20 @@ void submit(const FarmOptions& options, std::ostream& out) {
     return;
   }
   const bool uses_slurm = !options.openjd && has_slurm();
-  make_folder(options, folder, job);
+  NewFolder made(options, folder, job);
+  if (uses_slurm) refuse_where_others_wait(folder);
   write_scripts(folder, job, places);
+  if (options.render.force) forget_finished(job, options.stop);
   const std::set<std::size_t> to_do = chunks_to_do(folder, job, out, options.stop);
-  if (options.openjd)
-    session::replace_file(*options.openjd, openjd_template(places, job, folder.name()));
   if (to_do.empty()) {
+    complete(folder, job, out);
     out << "all of these frames are rendered already, with these settings" << std::endl;
     return;
   }
-  if (uses_slurm)
-    submit_chunks(folder, job, to_do, options.sbatch, out);
-  else if (options.openjd)
-    out << options.openjd->string() << ": submit it to a scheduler that takes Open Job Descriptions"
-        << std::endl;
-  else
-    out << "There is no Slurm here (no program sbatch). Start this on each machine:\n  bash "
-        << shell_word(folder.loop_script().string()) << std::endl;
+  if (options.openjd)
+    session::replace_file(*options.openjd, openjd_template(places, job, folder.name()));
+  hand_over(options, folder, job, to_do, uses_slurm, out);
+  made.keep();
 }
 
 void print_status(const JobOptions& options, std::ostream& out) {
@@ -195,9 +216,19 @@ void print_status(const JobOptions& options, std::ostream& out) {
     print_words(folder, job, status, options.terminal, out);
 }
 
+// A task that is put back into the queue meanwhile finds the job stopped.
 void cancel(const JobOptions& options, std::ostream& out) {
   const JobFolder folder(options.job);
   static_cast<void>(folder.read_plan());
+  if (!was_submitted(folder))
+    throw Error(
+        folder.path().string() +
+        ": was not submitted to Slurm; end loop.sh, or what else renders it, where it runs");
+  if (queued_tasks(folder).empty()) {
+    out << folder.path().string() << ": nothing is in the queue" << std::endl;
+    return;
+  }
+  session::replace_file(folder.stopped_file(), "`previzd farm cancel`\n");
   cancel_tasks(folder);
   out << folder.path().string()
       << ": canceled; what is finished stays, and `previzd farm retry` goes on" << std::endl;
@@ -205,9 +236,12 @@ void cancel(const JobOptions& options, std::ostream& out) {
 
 void retry(const JobOptions& options, std::ostream& out) {
   const JobFolder folder(options.job);
-  const Job job = folder.read_plan();
+  Job job = folder.read_plan();
+  job.wishes = wishes_with(job.wishes, options.wishes);
   check_paths(folder, job, options.any_paths);
-  refuse_while_queued(status_of(folder, job), folder);
+  const JobStatus status = status_of(folder, job);
+  refuse_while_queued(status, folder);
+  refuse_under_another_name(status, folder);
   std::error_code stays;
   std::filesystem::remove(folder.stopped_file(), stays);
   const JobLock lock(folder, options.stop);
@@ -218,6 +252,7 @@ void retry(const JobOptions& options, std::ostream& out) {
   write_scripts(folder, job, places);
   if (proof.missing.empty()) {
     complete(folder, job, out);
+    folder.write_finish_state(state_now(TaskOutcome::done, this_machine().host, ""));
     out << folder.path().string() << ": every frame is there and whole" << std::endl;
   } else if (has_slurm()) {
     submit_chunks(folder, job, proof.chunks, options.sbatch, out);

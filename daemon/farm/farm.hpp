@@ -8,17 +8,19 @@
 
 namespace previz::farm {
 
-// Makes the job's folder and submits it; prints the scheduler's numbers. Throws previz::Error;
-// nothing is then left in the queue.
+// Makes the job's folder and submits it; prints the scheduler's numbers. Where all frames are
+// rendered already, the review videos are made at once. Throws previz::Error, which says so if a
+// part is left in the queue. Where nothing was submitted no folder is left.
 void submit(const FarmOptions& options, std::ostream& out);
 
 // Prints how many frames are done, which tasks run or have failed, where and why, and the time that
 // is left.
 void print_status(const JobOptions& options, std::ostream& out);
-// Cancels what is in the queue or runs. What is finished stays.
+// Cancels what is in the queue or runs, and stops the job, so that no task begins. What is finished
+// stays. Throws previz::Error if the job was not handed to Slurm.
 void cancel(const JobOptions& options, std::ostream& out);
-// Submits the tasks of the frames that are missing or not whole. Throws previz::Error while tasks
-// are in the queue.
+// Submits the tasks of the frames that are missing or not whole, or makes the review videos if none
+// is. Throws previz::Error while tasks are in the queue.
 void retry(const JobOptions& options, std::ostream& out);
 // Does the last step (finish.hpp); returns the exit status of `previzd farm finish`.
 int finish(const JobOptions& options, std::ostream& out);

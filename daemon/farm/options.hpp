@@ -20,7 +20,9 @@ struct FarmOptions {
   Wishes wishes;
   std::optional<bool> on_gpu;  // absent: as this computer's own device is
   bool any_device = false;
-  std::filesystem::path program;                // previzd on the machines; empty: where this one is
+  // previzd on the machines: a path, which may be relative to the current folder, or a name that
+  // they find in PATH; empty: where this one is
+  std::filesystem::path program;
   std::vector<std::string> sbatch;              // arguments for sbatch
   bool dry_run = false;                         // nothing is written or submitted, all is printed
   std::optional<std::filesystem::path> openjd;  // the job becomes this template, not Slurm's
@@ -38,6 +40,8 @@ struct JobOptions {
   bool json = false;
   bool terminal = false;
   std::stop_token stop;
+  // For retry(): those that are given replace the plan's, for this submission.
+  Wishes wishes = {};
 };
 
 }  // namespace previz::farm

@@ -16,8 +16,6 @@
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 
-extern char** environ;
-
 namespace previz::farm {
 namespace {
 

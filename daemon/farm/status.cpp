@@ -1,28 +1,19 @@
 #include "daemon/farm/status.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
-#include <nlohmann/json.hpp>
-#include <ostream>
+#include <map>
 
 #include "daemon/farm/slurm.hpp"
-#include "daemon/output/progress.hpp"
-#include "daemon/post/folder_locks.hpp"
 #include "daemon/post/render_files.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::farm {
 namespace {
 
-// Returns whether a process is at work in the chunk's folder, on whatever machine.
-bool is_taken(const std::filesystem::path& folder) {
-  std::error_code unknown;
-  if (!std::filesystem::exists(folder / post::FolderLocks::file_name, unknown)) return false;
+// Where that is not known, no task is said to run.
+bool is_taken(const JobFolder& folder, std::size_t chunk) {
   try {
-    post::FolderLocks locks(folder);
-    const post::FolderLocks::Transaction transaction(locks);
-    return !locks.others().empty();
+    return folder.is_taken(chunk);
   } catch (const Error&) {
     return false;
   }
@@ -58,11 +49,28 @@ void count(const JobFolder& folder, const Job& job, std::size_t index, JobStatus
 void add_queue(const JobFolder& folder, JobStatus& status) {
   for (const QueuedTask& task : queued_tasks(folder)) {
     status.is_queued = true;
+    if (!task.chunk) {
+      status.finish_queue = task.state;
+      status.finish_reason = task.reason;
+    }
     if (!task.chunk || *task.chunk >= status.chunks.size()) continue;
     ChunkStatus& chunk = status.chunks[*task.chunk];
     chunk.queue = task.state;
-    if (task.state == "RUNNING") chunk.is_running = true;
+    chunk.node = task.node;
+    chunk.reason = task.reason;
+    // A task that a machine has refused holds the machine for a while, and Slurm says that it runs.
+    const bool was_refused = chunk.state && (chunk.state->outcome == TaskOutcome::machine ||
+                                             chunk.state->outcome == TaskOutcome::job);
+    if (task.state == "RUNNING") chunk.is_running = !was_refused;
+    if (task.state == "SUSPENDED") chunk.is_running = false;
   }
+  if (!status.is_queued) status.others = numbers_of_others(folder);
+}
+
+bool has_parts(const JobFolder& folder) {
+  std::error_code unknown;
+  return std::filesystem::directory_iterator(folder.place("chunks"), unknown) !=
+         std::filesystem::directory_iterator();
 }
 
 }  // namespace
@@ -81,13 +89,15 @@ JobStatus status_of(const JobFolder& folder, const Job& job) {
     chunk.state = folder.read_state(i);
     chunk.frames = length_of(job.chunks[i].frames);
     const bool says_it_runs = chunk.state && chunk.state->outcome == TaskOutcome::running;
-    chunk.is_running = says_it_runs && is_taken(folder.chunk(i));
+    chunk.is_running = says_it_runs && is_taken(folder, i);
   }
   status.seconds_a_frame = status.done > 0 ? status.seconds_a_frame / double(status.done) : 0;
-  if (has_slurm()) add_queue(folder, status);
+  if (was_submitted(folder) && has_slurm()) add_queue(folder, status);
   status.running = static_cast<std::size_t>(
       std::ranges::count_if(status.chunks, [](const ChunkStatus& one) { return one.is_running; }));
   status.stopped = folder.read_stopped();
+  status.finish = folder.read_finish_state();
+  status.has_parts = has_parts(folder);
   return status;
 }
 
@@ -96,10 +106,23 @@ std::optional<double> JobStatus::seconds_left() const {
   return static_cast<double>(frames - done) * seconds_a_frame / static_cast<double>(running);
 }
 
-bool ChunkStatus::has_failed() const {
-  if (done == frames || is_running || !state) return false;
-  const bool waits = queue == "PENDING" || queue == "REQUEUED";
-  return !waits || !state->message.empty();
+std::size_t JobStatus::count(TaskPhase phase) const {
+  return static_cast<std::size_t>(std::ranges::count(chunks, phase, &ChunkStatus::phase));
+}
+
+// An earlier version of the last step left no word, but removed the folders of the chunks.
+bool JobStatus::is_complete() const {
+  if (done < frames || !finish_queue.empty()) return false;
+  return finish ? finish->outcome == TaskOutcome::done : !has_parts;
+}
+
+TaskPhase ChunkStatus::phase() const {
+  if (done == frames) return TaskPhase::done;
+  if (is_running) return TaskPhase::running;
+  const bool is_ending = queue == "RUNNING" && state && state->outcome == TaskOutcome::job;
+  if (!queue.empty() && !is_ending)
+    return state && !state->message.empty() ? TaskPhase::again : TaskPhase::waiting;
+  return state ? TaskPhase::failed : TaskPhase::idle;
 }
 
 }  // namespace previz::farm

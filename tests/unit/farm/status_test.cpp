@@ -1,0 +1,176 @@
+// What `previzd farm status` says, by a job's folder and the answers of a Slurm that scripts stand
+// in for.
+#include "daemon/farm/status.hpp"
+
+#include "daemon/farm/farm.hpp"
+#include "daemon/farm/on_one_line.hpp"
+#include "tests/support/environment_variable.hpp"
+#include "tests/support/session_fixture.hpp"
+#include "tests/support/test.hpp"
+
+namespace previz::farm::status_test {
+
+class FarmStatus : public testing::Test {
+ protected:
+  FarmStatus() {
+    job_.takes.emplace_back();
+    job_.takes[0].session = "/takes/12A";
+    job_.takes[0].pictures = directory_ / "out";
+    job_.takes[0].frames = {0, 3};
+    job_.takes[0].settings = "{}";
+    for (std::uint64_t first : {0, 2}) {
+      job_.chunks.emplace_back();
+      job_.chunks.back().frames = {first, first + 1};
+    }
+    std::filesystem::create_directories(folder_.path() / "state");
+    session::write_content(folder_.path() / "submitted.json", R"({"tasks": [17], "finish": 18})");
+    stand_in("sbatch", "");
+    queue("");
+  }
+  void stand_in(const std::string& name, const std::string& body) {
+    const std::filesystem::path file = directory_ / "bin" / name;
+    session::write_content(file, "#!/bin/sh\n" + body + "\n");
+    std::filesystem::permissions(file, std::filesystem::perms::owner_all);
+  }
+  // The lines that squeue prints for the job's name.
+  void queue(const std::string& lines) {
+    session::write_content(directory_ / "queue", lines);
+    stand_in("squeue",
+             "case \"$*\" in *--name=*) cat '" + (directory_ / "queue").string() + "';; esac");
+  }
+  void say(std::size_t chunk, TaskOutcome outcome, const std::string& message) {
+    folder_.write_state(chunk, {outcome, "node1", 1, "2026-11-28 20:03:11 UTC", message});
+  }
+  // Both chunks have finished their frames.
+  static JobStatus all_done() {
+    JobStatus status;
+    status.frames = status.done = 4;
+    status.chunks.resize(2);
+    for (ChunkStatus& chunk : status.chunks) chunk.frames = chunk.done = 2;
+    status.has_parts = true;
+    return status;
+  }
+  std::string words(const JobStatus& status) const {
+    std::ostringstream out;
+    print_words(folder_, job_, status, false, out);
+    return out.str();
+  }
+  std::string words() const { return words(status_of(folder_, job_)); }
+
+  test::TemporaryDirectory directory_;
+  const test::EnvironmentVariable path_{"PATH",
+                                        (directory_ / "bin").string() + ":" + std::getenv("PATH")};
+  const JobFolder folder_{directory_ / "job"};
+  Job job_;
+};
+
+// The machine holds the task for two minutes, and Slurm says meanwhile that it runs.
+TEST_F(FarmStatus, NamesWhyATaskWaitsToBeRequeued) {
+  say(0, TaskOutcome::machine, "previzd 0.0 is installed here");
+  queue("17_0|0|RUNNING|node1|None\n17_1|0|RUNNING|node2|None\n18||PENDING||Dependency\n");
+  EXPECT_EQ(words(),
+            "0 of 4 frames done, 1 task running, 1 waiting again, 0 failed\n"
+            "task 0, frames 0 to 1 of 12A: waiting to be requeued: node1: previzd 0.0 is installed "
+            "here\n"
+            "task 1, frames 2 to 3 of 12A: running on node2, 0 of 2 frames done\n");
+}
+
+// The task runs again elsewhere, and has not said so yet.
+TEST_F(FarmStatus, NamesTheMachineThatSlurmKnows) {
+  say(0, TaskOutcome::stopped, "");
+  queue("17_0|0|RUNNING|node3|None\n");
+  EXPECT_THAT(words(), HasSubstr("task 0, frames 0 to 1 of 12A: running on node3, 0 of 2"));
+}
+
+TEST_F(FarmStatus, SaysWhyTasksWait) {
+  queue(
+      "17_0|0|PENDING||DependencyNeverSatisfied\n17_1|0|PENDING||JobHeldUser\n"
+      "18||PENDING||DependencyNeverSatisfied\n");
+  EXPECT_EQ(words(),
+            "0 of 4 frames done, 0 tasks running, 0 failed\n"
+            "waiting in the queue: DependencyNeverSatisfied (1 task)\n"
+            "waiting in the queue: JobHeldUser (1 task)\n"
+            "waiting in the queue: DependencyNeverSatisfied (the last step)\n");
+}
+
+TEST_F(FarmStatus, TakesNoOtherStateOfSlurmForAFailure) {
+  for (const char* state :
+       {"COMPLETING", "CONFIGURING", "SUSPENDED", "REQUEUED", "REQUEUE_HOLD", "SPECIAL_EXIT"}) {
+    say(0, TaskOutcome::running, "");
+    queue("17_0|0|" + std::string(state) + "|node1|None\n");
+    EXPECT_EQ(words(), "0 of 4 frames done, 0 tasks running, 0 failed\nwaiting in the queue: " +
+                           std::string(state) + " (1 task)\n");
+  }
+}
+
+TEST_F(FarmStatus, OfATaskThatIsGoneIsAFailure) {
+  say(0, TaskOutcome::running, "");
+  say(1, TaskOutcome::machine, "no Vulkan device");
+  EXPECT_EQ(words(),
+            "0 of 4 frames done, 0 tasks running, 2 failed\n"
+            "task 0, frames 0 to 1 of 12A: ended on node1 with 0 of 2 frames done\n"
+            "task 1, frames 2 to 3 of 12A: node1: no Vulkan device\n"
+            "nothing runs: `previzd farm retry` renders what is missing\n");
+}
+
+// The folder was moved, or is given by another path: a retry would submit all again.
+TEST_F(FarmStatus, NamesJobsOfAnotherName) {
+  stand_in("squeue", "case \"$*\" in *--name=*) ;; *) echo '17|previz-01234567';; esac");
+  EXPECT_THAT(words(),
+              AllOf(HasSubstr("in the queue under another name: 17; "), Not(HasSubstr("retry"))));
+}
+
+TEST_F(FarmStatus, SaysWhatIsToBeDoneAfterALastStepThatFailed) {
+  const std::string finish = "`previzd farm finish " + folder_.path().string() + "`";
+  JobStatus status = all_done();
+  EXPECT_EQ(words(status),
+            "4 of 4 frames done, 0 tasks running, 0 failed\nthe last step has not run; " + finish +
+                " does it\n");
+  status.finish = TaskState{TaskOutcome::machine, "node1", 1, "20:03", "no space left"};
+  EXPECT_THAT(words(status), HasSubstr("\nthe last step has failed on node1: no space left; " +
+                                       finish + " does it again\n"));
+  status.finish->outcome = TaskOutcome::running;
+  EXPECT_THAT(words(status), HasSubstr("\nthe last step began on node1 at 20:03; where it does "
+                                       "not run any more, " +
+                                       finish));
+  status.finish_queue = "RUNNING";
+  EXPECT_THAT(words(status), testing::EndsWith("\nthe last step runs\n"));
+  status.finish_queue.clear();
+  status.finish->outcome = TaskOutcome::done;
+  EXPECT_THAT(words(status),
+              testing::EndsWith("\npictures: " + (directory_ / "out").string() + "\n"));
+}
+
+// Chunk 0 was rendered before, so that it has no folder, and the others are still in theirs.
+TEST_F(FarmStatus, NamesThePicturesOnlyWhenTheyAreThere) {
+  JobStatus status = all_done();
+  EXPECT_THAT(words(status), Not(HasSubstr("pictures:")));
+  status.has_parts = false;  // a last step that left no word
+  EXPECT_THAT(words(status), HasSubstr("pictures:"));
+}
+
+// What stands in files is data: it moves no cursor, and no line of it looks like one of ours.
+TEST_F(FarmStatus, PrintsEveryTextOnOneLine) {
+  job_.takes[0].session = "/takes/12A\x1b[2J";
+  say(0, TaskOutcome::machine, "a\nb\x1b]0;title\x07");
+  say(1, TaskOutcome::running, "");
+  session::write_content(folder_.stopped_file(), "chunk 0: \x1b[31mred\r\nnothing runs\n");
+  const std::string said = words();
+  EXPECT_THAT(said,
+              HasSubstr("task 0, frames 0 to 1 of 12A\\x1b[2J: node1: a b\\x1b]0;title\\x07\n"));
+  EXPECT_THAT(said, HasSubstr("\nstopped: chunk 0: \\x1b[31mred\\x0d nothing runs\n"));
+  EXPECT_THAT(said, Not(HasSubstr("\x1b")));
+}
+
+TEST(OnOneLine, KeepsWordsAndShowsTheRestAsBytes) {
+  EXPECT_EQ(on_one_line("prise 12é — 撮影\n"), "prise 12é — 撮影");
+  EXPECT_EQ(on_one_line("a\tb\nc\x7f"), "a b c\\x7f");
+  EXPECT_EQ(on_one_line("\xc2\x9b"
+                        "31m"),
+            "\\xc2\\x9b31m");                                 // U+009B is ESC [ to a terminal
+  EXPECT_EQ(on_one_line("\xe2\x80\xae"), "\\xe2\\x80\\xae");  // from right to left
+  EXPECT_EQ(on_one_line("\x9b\xff\xc0\xaf\xe2\x82"), "\\x9b\\xff\\xc0\\xaf\\xe2\\x82");
+  EXPECT_EQ(on_one_line(std::string("a\0b", 3)), "a\\x00b");
+}
+
+}  // namespace previz::farm::status_test
