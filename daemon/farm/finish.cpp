@@ -7,6 +7,7 @@
 #include <ostream>
 #include <utility>
 
+#include "daemon/farm/on_one_line.hpp"
 #include "daemon/farm/settings.hpp"
 #include "daemon/farm/task.hpp"
 #include "daemon/post/folder_locks.hpp"
@@ -115,7 +116,7 @@ std::string TakeProof::why_missing(std::size_t chunk) const {
 
 void TakeProof::run(Proof& proof) {
   for (const auto& [why, frames] : pictures_.rejected())
-    out_ << take_.pictures.string() << ": " << post::frames_words(frames) << ": " << why
+    out_ << on_one_line(take_.pictures.string() + ": " + post::frames_words(frames) + ": " + why)
          << std::endl;
   std::map<std::string, MissingFrames> missing;
   std::set<std::string> cards;
@@ -220,12 +221,13 @@ void write_missing(const JobFolder& folder, const Job& job, const Proof& proof) 
 }
 
 void print_missing(const JobFolder& folder, const Job& job, const Proof& proof, std::ostream& out) {
-  for (const std::string& note : proof.notes) out << note << std::endl;
+  for (const std::string& note : proof.notes) out << on_one_line(note) << std::endl;
   std::size_t count = 0;
   for (const MissingFrames& missing : proof.missing) {
     count += missing.frames.size();
-    out << job.takes[missing.take].session.filename().string() << ": "
-        << post::frames_words(missing.frames) << ": " << missing.why << std::endl;
+    out << on_one_line(job.takes[missing.take].session.filename().string() + ": " +
+                       post::frames_words(missing.frames) + ": " + missing.why)
+        << std::endl;
   }
   if (count > 0)
     out << folder.path().string() << ": " << count << (count == 1 ? " frame is" : " frames are")

@@ -6,6 +6,7 @@
 #include <thread>
 #include <utility>
 
+#include "daemon/farm/on_one_line.hpp"
 #include "daemon/farm/settings.hpp"
 #include "daemon/post/render.hpp"
 #include "daemon/post/render_files.hpp"
@@ -56,9 +57,9 @@ bool Task::begin() {
   chunk_ = job_.chunks[options_.chunk];
   check_paths(folder_, job_, options_.any_paths);
   if (const std::string why = folder_.read_stopped(); !why.empty())
-    throw JobFault("the job was stopped: " + one_line(why) + "; `previzd farm retry` goes on");
-  out_ << "chunk " << options_.chunk << ": " << words_of(job_, chunk_) << ", on " << machine_.host
-       << std::endl;
+    throw JobFault("the job was stopped: " + on_one_line(why) + "; `previzd farm retry` goes on");
+  out_ << "chunk " << options_.chunk << ": " << on_one_line(words_of(job_, chunk_)) << ", on "
+       << machine_.host << std::endl;
   if (options_.not_if_taken && folder_.is_taken(options_.chunk)) {
     out_ << "another machine is rendering it" << std::endl;
     return false;
@@ -137,12 +138,12 @@ void Task::say(TaskOutcome outcome, const std::string& message) {
 
 // The disk may be what is at fault.
 int Task::fail(TaskOutcome outcome, const std::string& message) {
-  out_ << machine_.host << ": " << one_line(message) << std::endl;
+  out_ << machine_.host << ": " << on_one_line(message) << std::endl;
   try {
     if (is_mine_) say(outcome, message);
     if (is_mine_ && outcome == TaskOutcome::job)
       session::replace_file(folder_.stopped_file(), "chunk " + std::to_string(options_.chunk) +
-                                                        ": " + one_line(message) + "\n");
+                                                        ": " + on_one_line(message) + "\n");
   } catch (const Error& error) {
     out_ << error.what() << std::endl;
   }

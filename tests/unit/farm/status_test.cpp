@@ -3,6 +3,7 @@
 #include "daemon/farm/status.hpp"
 
 #include "daemon/farm/farm.hpp"
+#include "daemon/farm/finish.hpp"
 #include "daemon/farm/on_one_line.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/session_fixture.hpp"
@@ -160,6 +161,16 @@ TEST_F(FarmStatus, PrintsEveryTextOnOneLine) {
               HasSubstr("task 0, frames 0 to 1 of 12A\\x1b[2J: node1: a b\\x1b]0;title\\x07\n"));
   EXPECT_THAT(said, HasSubstr("\nstopped: chunk 0: \\x1b[31mred\\x0d nothing runs\n"));
   EXPECT_THAT(said, Not(HasSubstr("\x1b")));
+}
+
+TEST_F(FarmStatus, PrintsWhatIsMissingLikewise) {
+  job_.takes[0].session = "/takes/12A\x1b[2J";
+  Proof proof;
+  proof.missing.push_back({0, {1}, "on node1: a\nb\x07"});
+  proof.notes = {"a\x1b[31m card"};
+  std::ostringstream out;
+  print_missing(folder_, job_, proof, out);
+  EXPECT_THAT(out.str(), StartsWith("a\\x1b[31m card\n12A\\x1b[2J: frame 1: on node1: a b\\x07\n"));
 }
 
 TEST(OnOneLine, KeepsWordsAndShowsTheRestAsBytes) {
