@@ -104,6 +104,23 @@ case_cancelled_job() {
   expect "the bits are those of one run" same_render "$out/reference/slow" "$pictures"
 }
 
+# A job that is cancelled while its tasks wait on the nodes that refused them: none is put back into the queue.
+case_cancelled_wait() {
+  cp --recursive config/demo "$folder/demo"
+  start_cluster
+  local k
+  for k in 1 2 3; do node on-node "$k" mount -t tmpfs none "$folder/demo/session"; done
+  PREVIZ_FARM_WAIT_S=60 submit "$folder/demo/session" --set "$folder/demo/demo.toml" --scale 0.1 --spp 4 --chunk 2 \
+    --job "$job" --out "$pictures"
+  expect "status says why a task waits" await 60 job_says "waiting to be requeued: .*$folder/demo/session"
+  timeout 30 "$previzd" farm cancel "$job"
+  expect "all leave the queue" await 40 all_have_left
+  sleep 3
+  expect "none comes back" all_have_left
+  expect "none was requeued" fails grep --recursive --quiet requeue "$cluster/log/slurmctld.log"
+  expect "status says that the job was cancelled" job_says 'stopped: .*cancel'
+}
+
 # A disk that is full: of the job's and the pictures' folders, with room for logs and for no further picture.
 case_full_disk() {
   reference slow "${slow[@]}"
