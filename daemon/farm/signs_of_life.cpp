@@ -34,6 +34,15 @@ void renew(const std::stop_token& stop, const std::filesystem::path& file,
     static_cast<void>(::utimensat(AT_FDCWD, file.c_str(), nullptr, AT_SYMLINK_NOFOLLOW));
 }
 
+// A user who may not write in the folder goes by the clock.
+std::int64_t time_now_s(const std::filesystem::path& folder) {
+  try {
+    return time_of_disk_s(folder);
+  } catch (const Error&) {
+    return std::time(nullptr);
+  }
+}
+
 }  // namespace
 
 SignsOfLife::SignsOfLife(const std::filesystem::path& file, std::chrono::milliseconds between)
@@ -50,13 +59,8 @@ std::int64_t time_of_disk_s(const std::filesystem::path& folder) {
 bool has_signs_of_life(const std::filesystem::path& file) {
   struct stat found {};
   if (::lstat(file.c_str(), &found) != 0) return false;
-  std::int64_t now_s = std::time(nullptr);
-  try {
-    now_s = time_of_disk_s(file.parent_path());
-  } catch (const Error&) {
-    // A user who may not write there goes by the clock.
-  }
-  return std::chrono::abs(seconds(now_s - found.st_mtim.tv_sec)) < oldest_sign;
+  const std::int64_t age_s = time_now_s(file.parent_path()) - found.st_mtim.tv_sec;
+  return std::chrono::abs(seconds(age_s)) < oldest_sign;
 }
 
 }  // namespace previz::farm
