@@ -45,27 +45,6 @@ std::pair<glm::dvec3, double> flattest(const Points& points) {
           std::sqrt(std::max(values(1), 0.0) / static_cast<double>(points.size()))};
 }
 
-// Returns the point that is nearest to all rays, and the largest angle between two of them.
-std::pair<glm::dvec3, double> meeting_point(const std::vector<Ray>& rays) {
-  cv::Matx33d a = cv::Matx33d::zeros();
-  cv::Vec3d b(0, 0, 0);
-  double parallax = 0;
-  for (const Ray& ray : rays) {
-    const cv::Vec3d d(ray.direction.x, ray.direction.y, ray.direction.z);
-    const cv::Vec3d o(ray.origin.x, ray.origin.y, ray.origin.z);
-    const cv::Matx33d beside = cv::Matx33d::eye() - d * d.t();
-    a += beside;
-    b += beside * o;
-    for (const Ray& other : rays)
-      parallax = std::max(
-          parallax,
-          std::asin(std::min(1.0, glm::length(glm::cross(ray.direction, other.direction)))));
-  }
-  cv::Vec3d x(0, 0, 0);
-  if (parallax > 0) cv::solve(a, b, x, cv::DECOMP_CHOLESKY);
-  return {{x[0], x[1], x[2]}, parallax};
-}
-
 std::optional<glm::dvec3> meet(const Ray& ray, const Plane& plane) {
   const double along = glm::dot(ray.direction, plane.normal);
   if (std::abs(along) < 1e-6) return {};
@@ -124,7 +103,7 @@ class Starter {
   std::optional<glm::dvec3> place_of(const std::string& point) const {
     const auto found = rays_.find(point);
     if (point.empty() || found == rays_.end() || found->second.size() < 2) return {};
-    const auto [place, parallax] = meeting_point(found->second);
+    const auto [place, parallax] = tracking::meeting_of(found->second);
     return parallax > least_parallax ? std::optional(place) : std::nullopt;
   }
 

@@ -12,6 +12,7 @@
 #include "daemon/model/parts.hpp"
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/joint_pose.hpp"
+#include "daemon/tracking/rays.hpp"
 #include "daemon/tracking/tag_detector.hpp"
 #include "drivers/calibration.hpp"
 
@@ -30,10 +31,7 @@ struct Views {
   std::vector<MarkedView> views;    // as the parts list them
 };
 
-// A ray from a camera into the world; the direction has length 1.
-struct Ray {
-  glm::dvec3 origin{0}, direction{0, 0, 1};
-};
+using tracking::Ray;
 
 // Returns how a file of parts names a picture of a source: "frame 7" of "takes/12A/observer frame
 // 7", "0012.png" of "walk/0012.png".

@@ -8,12 +8,14 @@
 namespace previz::output {
 
 // What a line shows; each has a colour of its own.
-enum class GuideKind { model, tag, horizon, x_axis, y_axis, z_axis, bounds, focus };
+enum class GuideKind { model, tag, horizon, x_axis, y_axis, z_axis, bounds, focus, mark };
 
 // From centre to centre of these pixels; (0,0) is the centre of the top left one.
 struct GuideLine {
   glm::dvec2 a{0}, b{0};
   GuideKind kind = GuideKind::model;
+
+  friend bool operator==(const GuideLine&, const GuideLine&) = default;
 };
 
 // A word, UTF-8, in the middle of which is `at`.
@@ -21,6 +23,8 @@ struct GuideWord {
   glm::dvec2 at{0};
   std::string text;
   GuideKind kind = GuideKind::model;
+
+  friend bool operator==(const GuideWord&, const GuideWord&) = default;
 };
 
 // Later lines are above earlier ones, and words above all lines.
@@ -28,6 +32,8 @@ struct GuidePage {
   int width = 0, height = 0;  // of the picture, whatever size it is shown or rendered in
   std::vector<GuideLine> lines;
   std::vector<GuideWord> words;
+
+  friend bool operator==(const GuidePage&, const GuidePage&) = default;
 };
 
 }  // namespace previz::output

@@ -22,14 +22,15 @@ constexpr Rgb dark{0, 0, 0};
 
 // Colours as the screen shows them. Red, green and blue are the axes', as in every other program.
 Rgb colour_of(GuideKind kind) {
-  static constexpr std::array<Rgb, 8> colours = {{{90, 255, 120},
+  static constexpr std::array<Rgb, 9> colours = {{{90, 255, 120},
                                                   {255, 225, 70},
                                                   {120, 215, 255},
                                                   {255, 60, 50},
                                                   {0, 200, 40},
                                                   {70, 110, 255},
                                                   {255, 140, 230},
-                                                  {255, 255, 255}}};
+                                                  {255, 255, 255},
+                                                  {255, 60, 50}}};
   return colours[static_cast<std::size_t>(kind)];
 }
 

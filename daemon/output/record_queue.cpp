@@ -51,6 +51,8 @@ std::uint64_t RecordQueue::bytes_of(const Entry& entry) {
   if (const auto* event = std::get_if<Event>(&entry)) return sizeof(Entry) + event->what.size();
   if (const auto* button = std::get_if<ButtonEvent>(&entry))
     return sizeof(Entry) + button->button.size();
+  if (const auto* mark = std::get_if<session::MarkEvent>(&entry))
+    return sizeof(Entry) + mark->point.size();
   const auto* record = std::get_if<session::TrackRecord>(&entry);
   if (!record) return 0;
   constexpr std::uint64_t of_a_name = 128;  // of a node of a map and its key

@@ -69,8 +69,8 @@ class RecordQueue {
   struct Start {};
   struct Stop {};
   struct MarkGood {};
-  using Entry =
-      std::variant<Captured, session::TrackRecord, ButtonEvent, Event, Start, Stop, MarkGood>;
+  using Entry = std::variant<Captured, session::TrackRecord, ButtonEvent, Event, Start, Stop,
+                             MarkGood, session::MarkEvent>;
   struct Queued {
     Entry entry;
     session::Losses lost;  // offered between the entry before and this one, and left out

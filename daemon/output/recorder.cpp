@@ -138,6 +138,13 @@ void Recorder::offer(const ButtonEvent& event) {
   if (status_.recording) offer_record(event);
 }
 
+bool Recorder::offer(const session::MarkEvent& mark) {
+  const std::lock_guard lock(mutex_);
+  if (!status_.recording) return false;
+  offer_record(mark);
+  return true;
+}
+
 void Recorder::offer_event(std::int64_t timestamp_ns, const std::string& what) {
   const std::lock_guard lock(mutex_);
   if (status_.recording) offer_record(RecordQueue::Event{timestamp_ns, what});
@@ -334,6 +341,8 @@ void Recorder::handle(Queued& next) {
     take_->writer->write(*button);
   } else if (const auto* event = std::get_if<RecordQueue::Event>(&entry)) {
     take_->writer->write_event(event->timestamp_ns, event->what);
+  } else if (const auto* mark = std::get_if<session::MarkEvent>(&entry)) {
+    take_->writer->write(*mark);
   }
 }
 

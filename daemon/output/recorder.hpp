@@ -98,6 +98,7 @@ class Recorder {
   // Takes the tracking of an observer frame, in order; the recorder fills in `frame`.
   void offer(const session::TrackRecord& record);
   void offer(const ButtonEvent& event);
+  bool offer(const session::MarkEvent& mark);  // returns whether a take is recorded that has it
   void offer_event(std::int64_t timestamp_ns, const std::string& what);
 
   void start();  // begins with what the ring holds

@@ -54,6 +54,7 @@ class TakeWriter {
   // Writes the track of a frame that was written before, in order; any other track is ignored.
   void write(session::TrackRecord record);
   void write(const ButtonEvent& event) { writer_.write(event); }
+  void write(const session::MarkEvent& mark) { writer_.write(mark); }
   void write_event(std::int64_t timestamp_ns, const std::string& what) {
     writer_.write_event(timestamp_ns, what);
   }

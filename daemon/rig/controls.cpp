@@ -286,6 +286,46 @@ Outcome Controls::apply(const set::ToggleGuides&) {
   return {look_.guides ? "guides on" : "guides off", false, {}};
 }
 
+Outcome Controls::apply(const set::ToggleMarking&) {
+  Marking& marking = look_.marking;
+  marking.is_on = !marking.is_on;
+  return {marking.is_on ? "aim the cross at " + marking.selected() : "marking off", false, {}};
+}
+
+// The first press shows the cross, which has to be aimed first.
+Outcome Controls::apply(const set::MarkCorner&) {
+  Marking& marking = look_.marking;
+  if (!marking.is_on) return apply(set::ToggleMarking{});
+  if (look_.state.mode != Mode::live) return {"only the live picture can be marked", true, {}};
+  if (!look_.state.recording)
+    return {"marks are kept in a take; start one with record, then mark", true, {}};
+  if (!aim_ || !aim_->ray)
+    return {"not marked: no tag in the picture shows where the camera is", true, {}};
+  Outcome outcome{"", false, {}, marking.mark(*aim_)};
+  outcome.said = outcome.mark->point + ": " + Marking::words_of(*marking.last());
+  return outcome;
+}
+
+Outcome Controls::apply(const set::Unmark&) {
+  if (!look_.state.recording && look_.marking.last())
+    return {"the take with these marks has ended", true, {}};
+  std::optional<session::MarkEvent> withdrawn = look_.marking.withdraw();
+  if (!withdrawn) return {"no corner is marked", true, {}};
+  const std::string said =
+      withdrawn->point + ": mark withdrawn, " + Marking::words_of(look_.marking.selected_corner());
+  return {said, false, {}, std::move(withdrawn)};
+}
+
+Outcome Controls::apply(const set::NextCorner&) {
+  look_.marking.next_corner();
+  return {"mark " + look_.marking.selected(), false, {}};
+}
+
+Outcome Controls::apply(const set::NextBox&) {
+  look_.marking.next_box();
+  return {"mark " + look_.marking.selected(), false, {}};
+}
+
 Outcome Controls::apply(const set::SelectObject& effect) {
   if (objects_.empty()) return none_of("virtual object");
   object_ = around(object_, effect.next, objects_.size());

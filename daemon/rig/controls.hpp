@@ -11,6 +11,7 @@
 #include "daemon/pipeline/edits.hpp"
 #include "daemon/pipeline/relight.hpp"
 #include "daemon/render/views.hpp"
+#include "daemon/rig/marking.hpp"
 #include "daemon/rig/mode.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/actions.hpp"
@@ -39,6 +40,7 @@ struct Look {
   std::uint64_t snapshots = 0;          // requested so far, of live pictures
   std::uint64_t refined_snapshots = 0;  // requested so far, of refined pictures
   std::uint64_t refinements = 0;        // begun so far
+  Marking marking;
 };
 
 // Requests that Controls cannot carry out, because they need devices or files.
@@ -57,6 +59,7 @@ struct Outcome {
   std::string said;  // words for the display, the log and whoever asked
   bool refused = false;
   std::optional<Request> request;
+  std::optional<session::MarkEvent> mark = {};  // for the running take
 };
 
 // samples_up and samples_down step through these numbers (P6).
@@ -79,6 +82,14 @@ class Controls {
 
   // Takes what the frame of the take in review was recorded with.
   void use_recorded(pipeline::RecordedLook recorded) { recorded_ = std::move(recorded); }
+
+  // Takes what the cross of the shown picture is on; nothing: no picture was shown yet.
+  void use_aim(std::optional<Aim> aim) { aim_ = std::move(aim); }
+
+  // Forgets the marks, because another take begins.
+  void begin_marks() { look_.marking.begin(); }
+  // Withdraws the last mark, which no take has.
+  void drop_mark() { look_.marking.withdraw(); }
 
   // Takes the samples per pixel that hold the set's frame rate, from which the buttons go on; 0:
   // not known.
@@ -114,6 +125,11 @@ class Controls {
   Outcome apply(const set::ToggleOsd& effect);
   Outcome apply(const set::TogglePassTimes& effect);
   Outcome apply(const set::ToggleGuides& effect);
+  Outcome apply(const set::ToggleMarking& effect);
+  Outcome apply(const set::MarkCorner& effect);
+  Outcome apply(const set::Unmark& effect);
+  Outcome apply(const set::NextCorner& effect);
+  Outcome apply(const set::NextBox& effect);
   Outcome apply(const set::SelectObject& effect);
   Outcome apply(const set::MoveObject& effect);
   Outcome apply(const set::TurnObject& effect);
@@ -150,6 +166,7 @@ class Controls {
   std::vector<std::string> objects_;  // names of the virtual objects
   std::map<std::string, Looks> looks_;
   pipeline::RecordedLook recorded_;
+  std::optional<Aim> aim_;
   std::vector<std::string> set_lights_;
   std::vector<pipeline::FoundLamp> found_;
   const bool is_animated_;

@@ -13,9 +13,8 @@
 #include <numbers>
 #include <utility>
 
-#include "daemon/fit/light_edge.hpp"
 #include "daemon/fit/visible_edges.hpp"
-#include "daemon/tracking/camera_pose.hpp"
+#include "daemon/rig/guide_drawing.hpp"
 
 namespace previz::rig {
 namespace {
@@ -27,43 +26,15 @@ constexpr double horizon_m = 1e6;   // so far away that a stage's size does not 
 constexpr int horizon_chords = 12;  // around the camera
 constexpr double cross_share = 0.02;
 
-// Collects the lines of one picture.
-class Drawing {
+class Drawing : public GuideDrawing {
  public:
-  Drawing(const PinholeIntrinsics& lens, const glm::dmat4& world_from_camera)
-      : lens_(lens), world_from_camera_(world_from_camera) {
-    page_.width = lens.width;
-    page_.height = lens.height;
-  }
-
-  void add(const std::vector<fit::Segment>& segments, GuideKind kind) {
-    for (const fit::Segment& segment : segments)
-      page_.lines.push_back({segment.a, segment.b, kind});
-  }
-  void line(const glm::dvec3& a, const glm::dvec3& b, GuideKind kind) {
-    add(fit::line_segments(a, b, lens_, world_from_camera_), kind);
-  }
-  void word(const glm::dvec3& at, std::string text, GuideKind kind) {
-    const tracking::CameraFromWorld camera = tracking::camera_from_world(world_from_camera_);
-    const auto pinhole = fit::on_pinhole(lens_, camera.rotation * at + camera.translation);
-    const auto pixel = pinhole ? fit::pixel_of(lens_, *pinhole) : std::nullopt;
-    if (pixel) page_.words.push_back({*pixel, std::move(text), kind});
-  }
+  using GuideDrawing::GuideDrawing;
 
   void tag(const set::Tag& tag, const glm::dmat4& world_from_tag);
   void horizon();
   void axes();
   void box(const glm::dmat4& world_from_box, const glm::dvec3& low, const glm::dvec3& high);
   void focus(double distance_m);
-
-  output::GuidePage page() && { return std::move(page_); }
-
- private:
-  glm::dvec3 eye() const { return world_from_camera_[3]; }
-
-  const PinholeIntrinsics& lens_;
-  const glm::dmat4& world_from_camera_;
-  output::GuidePage page_;
 };
 
 void Drawing::tag(const set::Tag& tag, const glm::dmat4& world_from_tag) {
@@ -112,12 +83,12 @@ void Drawing::box(const glm::dmat4& world_from_box, const glm::dvec3& low, const
 }
 
 void Drawing::focus(double distance_m) {
-  const glm::dvec2 middle(0.5 * (lens_.width - 1), 0.5 * (lens_.height - 1));
-  const double arm = cross_share * lens_.width;
+  const glm::dvec2 middle(0.5 * (lens().width - 1), 0.5 * (lens().height - 1));
+  const double arm = cross_share * lens().width;
   for (const glm::dvec2& way : {glm::dvec2(arm, 0), glm::dvec2(0, arm)})
-    page_.lines.push_back({middle - way, middle + way, GuideKind::focus});
-  page_.words.push_back({middle + glm::dvec2(0, 2 * arm), fmt::format("focus {:.2f} m", distance_m),
-                         GuideKind::focus});
+    drawn().lines.push_back({middle - way, middle + way, GuideKind::focus});
+  drawn().words.push_back({middle + glm::dvec2(0, 2 * arm),
+                           fmt::format("focus {:.2f} m", distance_m), GuideKind::focus});
 }
 
 }  // namespace

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "daemon/rig/marking_lines.hpp"
+
 namespace previz::rig {
 
 using Clock = std::chrono::steady_clock;
@@ -12,6 +14,28 @@ namespace {
 constexpr std::chrono::seconds figure_interval{1};
 constexpr std::chrono::milliseconds look_interval{100};  // at whether the guides are on
 constexpr const char* stage_name = "model fit";
+
+// What lines over a picture are made of.
+struct UnderLines {
+  std::shared_ptr<pipeline::Newest<std::shared_ptr<const GuideModel>>> model;
+  PinholeIntrinsics lens;
+  std::optional<GuideModel::View> view;  // absent: nobody knows where the camera was
+};
+
+std::shared_ptr<const output::GuidePage> lines_over(const UnderLines& picture, const Look& look) {
+  std::optional<output::GuidePage> page;
+  const auto model = *picture.model->get();
+  if (look.guides && model && picture.view) page = model->guides_of(*picture.view);
+  if (look.marking.is_on && look.state.mode == Mode::live) {
+    const output::GuidePage marks =
+        marking_lines(look.marking, picture.lens,
+                      picture.view ? std::optional(picture.view->world_from_camera) : std::nullopt);
+    if (!page) page = output::GuidePage{marks.width, marks.height, {}, {}};
+    page->lines.insert(page->lines.end(), marks.lines.begin(), marks.lines.end());
+    page->words.insert(page->words.end(), marks.words.begin(), marks.words.end());
+  }
+  return page ? std::make_shared<const output::GuidePage>(*std::move(page)) : nullptr;
+}
 
 }  // namespace
 
@@ -35,12 +59,10 @@ GuidesOf LiveGuides::look_at(const Shot& shot) {
     if (shot.track.pose) seen.world_from_camera = shot.track.pose->world_from_camera;
     seen_.push(std::move(seen));
   }
-  const glm::dmat4* pose = world_from_camera(shot);
-  if (!pose) return {};
-  return [model = model_, view = GuideModel::View{*pose, shot.scene, shot.motion.carriers}] {
-    const ModelPtr made = *model->get();
-    return made ? std::make_shared<const output::GuidePage>(made->guides_of(view)) : nullptr;
-  };
+  UnderLines picture{.model = model_, .lens = camera_.intrinsics, .view = {}};
+  if (const glm::dmat4* pose = world_from_camera(shot))
+    picture.view = GuideModel::View{*pose, shot.scene, shot.motion.carriers};
+  return [picture = std::move(picture)](const Look& look) { return lines_over(picture, look); };
 }
 
 void LiveGuides::run() {

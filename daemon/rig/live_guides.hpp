@@ -18,9 +18,10 @@
 
 namespace previz::rig {
 
-// Computes the lines over one picture, on the thread that shows it; null: there are none, or not
-// yet. It may be called as long as there is a picture, also after LiveGuides has gone.
-using GuidesOf = std::function<std::shared_ptr<const output::GuidePage>()>;
+// Computes the lines over one picture that a look asks for, on the thread that shows it; null:
+// there are none, or not yet. It may be called as long as there is a picture, also after LiveGuides
+// has gone.
+using GuidesOf = std::function<std::shared_ptr<const output::GuidePage>(const Look&)>;
 
 // Nothing is computed or kept while Look::guides is false, but for the model that was made before.
 class LiveGuides {

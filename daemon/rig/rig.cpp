@@ -125,6 +125,7 @@ Rig::Rig(Parts parts)
       folders_watch_(parts_.kept.metrics, "folders of takes",
                      [this] { return waiting_for_folders(recorder_); }),
       inbox_watch_(parts_.kept.metrics, "main loop", [this] { return inbox_.waiting(); }),
+      lens_(pipeline::observer_calibration(loaded_.set, cameras_.recorded.info).intrinsics),
       guides_({loaded_.set, loaded_.scene, look_, parts_.kept},
               pipeline::observer_calibration(loaded_.set, cameras_.recorded.info)),
       pipeline_({.set = loaded_.set,
@@ -216,6 +217,7 @@ void Rig::close_take() {
 void Rig::know_picture() {
   controls_.use_found(pipeline_.found_lamps());
   controls_.use_recorded(pipeline_.recorded_look());
+  controls_.use_aim(*aim_.get());
   controls_.use_governed(pipeline_.governed().samples);
 }
 
@@ -240,6 +242,10 @@ Outcome Rig::apply(Outcome outcome, const std::string& by, Severity severity) {
       outcome = {*std::move(why_not), true, {}};
     else if (outcome.request == Request::keep_edits && parts_.sets.is_reading())
       outcome.said = "keeping the changes in the set file";
+  }
+  if (outcome.mark && !recorder_.offer(*outcome.mark)) {
+    if (!outcome.mark->is_withdrawn) controls_.drop_mark();
+    outcome = {"no take is recorded that could keep the mark", true, {}};
   }
   publish_look();  // after the request, so that a take exists before its first shown picture
   if (outcome.refused) severity = Severity::warning;
@@ -280,6 +286,7 @@ std::optional<std::string> Rig::carry_out(Request request, const std::string& by
     case Request::start_take:
       try {
         recorder_.start();
+        controls_.begin_marks();
       } catch (const std::bad_alloc& error) {
         controls_.happened(Event::recorder_failed);
         return std::string("the take is not begun: ") + reason_of(error);
@@ -457,6 +464,7 @@ void Rig::look_at_guides() {
 }
 
 void Rig::show_picture(pipeline::Shot shot) {
+  if (!shot.frozen) aim_.set(aim_of(shot, lens_));
   GuidesOf guides = guides_.look_at(shot);
   parts_.show(std::move(shot), *look_.get(), std::move(guides));
 }

@@ -122,6 +122,8 @@ class Rig {
   std::unique_ptr<Review> review_;  // at most one, even if it takes long to end
   std::function<void()> changed_;
   std::optional<std::uint64_t> free_bytes_;
+  const PinholeIntrinsics lens_;
+  pipeline::Newest<std::optional<Aim>> aim_{std::nullopt};  // of the picture that was shown last
   LiveGuides guides_;
   LivePipeline pipeline_;  // last: its threads use all of the above
 };

@@ -97,7 +97,7 @@ struct Screen::Impl {
   void run();
   void look_after(std::optional<Picture>& newest);
   void begin_anew();
-  bool renew_guides(bool fresh, bool wanted);
+  bool renew_guides(const Look& look);
   void put(const output::OsdPage& next, bool fresh);
   Screenful compose(const DisplayMode& mode, const output::OsdPage& next);
   void was_shown(const Shown& shown, bool fresh);
@@ -173,17 +173,19 @@ void Screen::Impl::look_after(std::optional<Picture>& newest) {
   dark = false;
   output::OsdPage next;
   if (facts->look.osd) next = osd_page(*facts, picture ? &picture->facts : nullptr, pace.read());
-  const bool other_guides = renew_guides(fresh, facts->look.guides);
+  const bool other_guides = renew_guides(facts->look);
   if (fresh || !up_to_date || other_guides || next != page) put(next, fresh);
 }
 
 // Returns whether the screen has other lines to show. Those of a picture that stands may come late:
 // when they are asked for, or once the model is there.
-bool Screen::Impl::renew_guides(bool fresh, bool wanted) {
-  if (!wanted) return std::exchange(guides, nullptr) != nullptr;
-  if (guides && !fresh) return false;
-  guides = picture && picture->guides ? picture->guides() : nullptr;
-  return guides != nullptr;
+bool Screen::Impl::renew_guides(const Look& look) {
+  const bool wanted = look.guides || look.marking.is_on;
+  std::shared_ptr<const output::GuidePage> next =
+      wanted && picture && picture->guides ? picture->guides(look) : nullptr;
+  const bool same = next && guides ? *next == *guides : next == guides;
+  guides = std::move(next);
+  return !same;
 }
 
 void Screen::Impl::put(const output::OsdPage& next, bool fresh) {

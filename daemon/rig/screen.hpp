@@ -39,7 +39,8 @@ class Screen {
   Screen& operator=(const Screen&) = delete;
 
   // These return at once and may be called from any thread. The latest picture and facts are shown.
-  // `guides` is called, on the screen's thread, only while Look::guides is on; it may be empty.
+  // `guides` is called, on the screen's thread, only while Look::guides or
+  // the cross of Look::marking is on; it may be empty.
   void show(const pipeline::Shot& shot, GuidesOf guides);
   void show(RigFacts facts);
   // Returns the card whose pictures the screen shows where they are (Display::card()); nothing

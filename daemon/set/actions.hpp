@@ -42,6 +42,11 @@ struct NextView {};
 struct ToggleOsd {};
 struct TogglePassTimes {};
 struct ToggleGuides {};
+struct ToggleMarking {};  // shows the cross with which corners are marked, or hides it
+struct MarkCorner {};     // marks the selected corner of a real box where the cross is
+struct Unmark {};         // withdraws the last mark
+struct NextCorner {};
+struct NextBox {};
 struct SelectObject {
   int next = 1;
 };
@@ -78,9 +83,10 @@ struct ChangeExposure {
 using Effect =
     std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits, OtherSet,
                  ChangeSamples, HoldRate, ToggleAccumulation, NextEstimator, NextLightMode,
-                 NextView, ToggleOsd, TogglePassTimes, ToggleGuides, SelectObject, MoveObject,
-                 TurnObject, ScaleObject, ChangeVariant, ResetObject, ToggleTags, PlayAnimations,
-                 HoldAnimations, SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
+                 NextView, ToggleOsd, TogglePassTimes, ToggleGuides, ToggleMarking, MarkCorner,
+                 Unmark, NextCorner, NextBox, SelectObject, MoveObject, TurnObject, ScaleObject,
+                 ChangeVariant, ResetObject, ToggleTags, PlayAnimations, HoldAnimations,
+                 SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
 
 struct Action {
   const char* name;

@@ -194,6 +194,19 @@ std::optional<ButtonEvent> parse_button_line(const Json& json) {
   return event;
 }
 
+std::optional<MarkEvent> parse_mark_line(const Json& json) {
+  if (!json.contains("mark") && json.is_object()) return std::nullopt;
+  MarkEvent mark;
+  json.at("mark").get_to(mark.point);
+  get(json.at("timestamp_ns"), mark.timestamp_ns);
+  if (json.contains("withdrawn")) get(json.at("withdrawn"), mark.is_withdrawn);
+  if (mark.is_withdrawn) return mark;
+  std::array<double, 2> px{};
+  get(json.at("px"), px);
+  mark.px = {px[0], px[1]};
+  return mark;
+}
+
 bool in_order(const FrameLine& before, const FrameLine& line) {
   return before.record.frame < line.record.frame;
 }
@@ -202,6 +215,9 @@ bool in_order(const TrackRecord& before, const TrackRecord& record) {
 }
 // Events of several devices are written as they arrive, so any order is right.
 bool in_order(const ButtonEvent&, const ButtonEvent&) {
+  return true;
+}
+bool in_order(const MarkEvent&, const MarkEvent&) {
   return true;
 }
 
@@ -270,6 +286,15 @@ std::string to_line(const ButtonEvent& event) {
       .dump();
 }
 
+std::string to_line(const MarkEvent& mark) {
+  Json json{{"timestamp_ns", mark.timestamp_ns}, {"mark", mark.point}};
+  if (mark.is_withdrawn)
+    json["withdrawn"] = true;
+  else
+    json["px"] = {finite(mark.px.x, "mark px"), finite(mark.px.y, "mark px")};
+  return json.dump();
+}
+
 std::string to_line(std::int64_t timestamp_ns, const std::string& event) {
   return Json{{"timestamp_ns", timestamp_ns}, {"event", event}}.dump();
 }
@@ -284,6 +309,10 @@ Lines<TrackRecord> read_track_lines(const std::filesystem::path& file) {
 
 Lines<ButtonEvent> read_button_lines(const std::filesystem::path& file) {
   return read_lines<ButtonEvent>(file, parse_button_line);
+}
+
+Lines<MarkEvent> read_mark_lines(const std::filesystem::path& file) {
+  return read_lines<MarkEvent>(file, parse_mark_line);
 }
 
 }  // namespace previz::session

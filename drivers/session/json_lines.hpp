@@ -24,6 +24,7 @@ struct FrameLine {
 std::string to_line(const FrameLine& line);
 std::string to_line(const TrackRecord& record);
 std::string to_line(const ButtonEvent& event);
+std::string to_line(const MarkEvent& mark);
 std::string to_line(std::int64_t timestamp_ns, const std::string& event);
 
 template <typename Record>
@@ -37,5 +38,7 @@ Lines<FrameLine> read_frame_lines(const std::filesystem::path& file);
 Lines<TrackRecord> read_track_lines(const std::filesystem::path& file);
 // Returns the edges among the events: lines that have a "button". Other events are not looked at.
 Lines<ButtonEvent> read_button_lines(const std::filesystem::path& file);
+// Likewise the marks among the events: lines that have a "mark".
+Lines<MarkEvent> read_mark_lines(const std::filesystem::path& file);
 
 }  // namespace previz::session

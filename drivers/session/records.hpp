@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <glm/mat4x4.hpp>
+#include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 #include <map>
 #include <optional>
@@ -72,6 +73,17 @@ struct SessionInfo {
 
 // Returns the timecode of a take or of an imported clip; nothing if it has none.
 std::optional<Timecode> timecode_of(const SessionInfo& info);
+
+// A point of a real thing that somebody has marked in a picture of the observer; or that mark
+// withdrawn.
+struct MarkEvent {
+  std::int64_t timestamp_ns = 0;  // of the picture
+  std::string point;
+  glm::dvec2 px{0};  // in it; (0, 0) is the centre of the top left pixel
+  bool is_withdrawn = false;
+
+  friend bool operator==(const MarkEvent&, const MarkEvent&) = default;
+};
 
 // A lamp of the set that was moved or relit.
 struct LightState {

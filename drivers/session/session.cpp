@@ -20,7 +20,9 @@
 //                     world_from_camera (16 numbers, row-major) and covariance (36 numbers);
 //                     objects, lights and variants of objects that are not as the set has them
 //     events.jsonl    a line an event, in order of arrival: timestamp_ns and what happened; of a
-//                     button: button (its name), pressed; of all else: event, in words
+//                     button: button (its name), pressed; of a mark: mark (the point's name), px
+//                     in the observer's picture of that time, or withdrawn; of all else: event, in
+//                     words
 //     assets/         files of the set, named by the SHA-256 of their content
 #include "drivers/session/session.hpp"
 

@@ -83,6 +83,7 @@ class SessionWriter {
   void write(const Frame& frame);
   void write(const TrackRecord& record);
   void write(const ButtonEvent& event);  // writes to events.jsonl
+  void write(const MarkEvent& mark);     // likewise
   // Writes anything else that happened, in words, to events.jsonl.
   void write_event(std::int64_t timestamp_ns, const std::string& what);
   void set_take(const TakeInfo& take);          // replaces session.toml

@@ -255,6 +255,10 @@ void SessionWriter::write(const ButtonEvent& event) {
   impl_->append(impl_->events, "events.jsonl", to_line(event));
 }
 
+void SessionWriter::write(const MarkEvent& mark) {
+  impl_->append(impl_->events, "events.jsonl", to_line(mark));
+}
+
 void SessionWriter::write_event(std::int64_t timestamp_ns, const std::string& what) {
   impl_->append(impl_->events, "events.jsonl", to_line(timestamp_ns, what));
 }

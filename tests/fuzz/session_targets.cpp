@@ -38,6 +38,9 @@ void frame_lines(Bytes bytes) {
 void track_lines(Bytes bytes) {
   read_lines<session::TrackRecord>(session::read_track_lines, bytes);
 }
+void mark_lines(Bytes bytes) {
+  read_lines<session::MarkEvent>(session::read_mark_lines, bytes);
+}
 void button_lines(Bytes bytes) {
   read_lines<ButtonEvent>(session::read_button_lines, bytes);
 }
@@ -62,6 +65,7 @@ constexpr Target own[] = {
     {"session_toml", "session.toml of a take", session_toml, mutate_toml},
     {"frame_lines", "observer.jsonl or light.jsonl", frame_lines, mutate_json_lines},
     {"track_lines", "track.jsonl", track_lines, mutate_json_lines},
+    {"mark_lines", "the marks in events.jsonl", mark_lines, mutate_json_lines},
     {"button_lines", "events.jsonl", button_lines, mutate_json_lines},
     {"matroska", "observer.mkv, of 24x18 pixels", matroska, mutate_matroska},
 };

@@ -1,0 +1,88 @@
+// Corners of real boxes that the crew marks in the live picture, under a cross in its middle, for
+// `previzd model`. Each is marked from two sides or more, by which it is found in space.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <glm/vec2.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/tracking/rays.hpp"
+#include "drivers/calibration.hpp"
+#include "drivers/session/marks.hpp"
+#include "drivers/session/records.hpp"
+
+namespace previz::rig {
+
+// What the cross of a shown picture is on.
+struct Aim {
+  std::int64_t timestamp_ns = 0;     // of the picture
+  glm::dvec2 px{0};                  // the picture's middle
+  double px_per_rad = 0;             // there
+  std::optional<tracking::Ray> ray;  // nothing: no tag of the set shows where the camera is
+};
+Aim aim_of(const pipeline::Shot& shot, const PinholeIntrinsics& lens);
+
+struct MarkedCorner {
+  struct Mark {
+    std::int64_t timestamp_ns = 0;
+    tracking::Ray ray;
+    double px_per_rad = 0;
+
+    friend bool operator==(const Mark&, const Mark&) = default;
+  };
+  std::vector<Mark> marks;
+
+  // Where the rays meet, and how well.
+  struct Place {
+    glm::dvec3 at{0};
+    double parallax_rad = 0;  // the largest angle between two of the rays
+    double off_px = 0;        // of the ray that is farthest off, in its picture
+  };
+  // Returns nothing of fewer than two marks, or if their rays are parallel.
+  std::optional<Place> place() const;
+
+  friend bool operator==(const MarkedCorner&, const MarkedCorner&) = default;
+};
+
+class Marking {
+ public:
+  bool is_on = false;  // the cross is shown
+
+  // Forgets all marks: those of a take belong to it.
+  void begin();
+  // Marks the selected corner and selects the box's next one. `aim` has a ray.
+  session::MarkEvent mark(const Aim& aim);
+  // Withdraws the last mark and selects its corner; nothing if there is none.
+  std::optional<session::MarkEvent> withdraw();
+  void next_corner();
+  // Selects the first corner of the next box: a new one after the last that has marks, then the
+  // first again.
+  void next_box();
+
+  // Returns the name of the selected corner, as the take and the model have it: "box 1 corner 2".
+  std::string selected() const { return session::name_of({box_, corner_}); }
+  const MarkedCorner& selected_corner() const { return boxes_[box_][corner_]; }
+  // Returns in words what the marks of a corner are worth: "marked twice, 0.8 px apart".
+  static std::string words_of(const MarkedCorner& corner);
+
+  using Box = std::array<MarkedCorner, session::corners_of_a_box>;
+  const std::vector<Box>& boxes() const { return boxes_; }
+  // Returns the corner that was marked last; null if there is none.
+  const MarkedCorner* last() const;
+
+  friend bool operator==(const Marking&, const Marking&) = default;
+
+ private:
+  std::vector<Box> boxes_ = {Box{}};                        // never empty
+  std::size_t box_ = 0, corner_ = 0;                        // selected
+  std::vector<std::pair<std::size_t, std::size_t>> order_;  // of the marks
+};
+
+}  // namespace previz::rig

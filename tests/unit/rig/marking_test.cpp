@@ -1,0 +1,193 @@
+// Corners that the crew marks: which is next, where they are, and what the crew is told.
+#include "daemon/rig/marking.hpp"
+
+#include <glm/geometric.hpp>
+
+#include "daemon/rig/controls.hpp"
+#include "daemon/rig/marking_lines.hpp"
+#include "tests/support/test.hpp"
+#include "tests/support/tracking_synthetic.hpp"
+
+namespace previz::rig::marking_test {
+
+constexpr int width = 640, height = 480;
+constexpr double focal_px = 600;
+
+// The cross on a point, of a camera at `eye` that is turned aside from it by so many pixels.
+Aim aim(const glm::dvec3& eye, const glm::dvec3& at, double off_px = 0, std::int64_t when = 1) {
+  const glm::dvec3 towards = glm::normalize(at - eye);
+  const glm::dvec3 aside = glm::normalize(glm::cross(towards, glm::dvec3(0, 0, 1)));
+  return {when,
+          {319.5, 239.5},
+          focal_px,
+          tracking::Ray{eye, glm::normalize(towards + off_px / focal_px * aside)}};
+}
+
+const glm::dvec3 corner{0.1, 0.2, 0.3}, left{-1, -1, 1}, right{1, -1, 1}, above{0, 0, 2};
+
+TEST(Marking, FindsACornerWhereItsRaysMeet) {
+  Marking marking;
+  marking.mark(aim(left, corner));
+  EXPECT_FALSE(marking.last()->place());
+  EXPECT_EQ(Marking::words_of(*marking.last()), "marked once");
+  marking.next_box();  // there and back
+  marking.next_box();
+  marking.mark(aim(right, corner));
+  const auto place = marking.boxes()[0][0].place();
+  ASSERT_TRUE(place);
+  EXPECT_LT(glm::distance(place->at, corner), 1e-12);
+  EXPECT_LT(place->off_px, 1e-6);
+  EXPECT_EQ(Marking::words_of(*marking.last()), "marked twice, 0.0 px apart");
+}
+
+TEST(Marking, GoesAroundTheCornersAndOnToOtherBoxes) {
+  Marking marking;
+  std::vector<std::string> marked;
+  for (int i = 0; i < 4; ++i) marked.push_back(marking.mark(aim(left, corner)).point);
+  EXPECT_THAT(marked, testing::ElementsAre("box 1 corner 1", "box 1 corner 2", "box 1 corner 3",
+                                           "box 1 corner 1"));
+  EXPECT_EQ(marking.selected(), "box 1 corner 2");
+  marking.next_box();
+  EXPECT_EQ(marking.selected(), "box 2 corner 1");
+  marking.next_box();  // the second has no mark, so that there is no third
+  EXPECT_EQ(marking.selected(), "box 1 corner 1");
+  marking.next_box();
+  marking.next_corner();
+  EXPECT_EQ(marking.mark(aim(left, corner)).point, "box 2 corner 2");
+  marking.next_box();
+  EXPECT_EQ(marking.selected(), "box 3 corner 1");
+}
+
+TEST(Marking, WithdrawsMarksFromTheLastOneOn) {
+  Marking marking;
+  EXPECT_FALSE(marking.withdraw());
+  marking.mark(aim(left, corner, 0, 7));
+  marking.mark(aim(left, corner, 0, 8));
+  const session::MarkEvent second{8, "box 1 corner 2", {}, true},
+      first{7, "box 1 corner 1", {}, true};
+  EXPECT_EQ(marking.withdraw(), second);
+  EXPECT_EQ(marking.selected(), "box 1 corner 2");
+  EXPECT_EQ(marking.withdraw(), first);
+  EXPECT_EQ(marking.selected(), "box 1 corner 1");
+  EXPECT_EQ(marking, Marking());
+}
+
+// Two rays that miss each other are each half of that away from where they are nearest.
+TEST(Marking, SaysWhatIsWrongWithACorner) {
+  MarkedCorner apart;
+  for (const Aim& a : {aim(left, corner, -20), aim(right, corner), aim(above, corner)})
+    apart.marks.push_back({1, *a.ray, a.px_per_rad});
+  EXPECT_GT(apart.place()->off_px, 8);
+  EXPECT_THAT(Marking::words_of(apart), HasSubstr("px apart; unmark, and aim at the same spot"));
+  MarkedCorner near;
+  for (const glm::dvec3& eye : {left, left + glm::dvec3(0.05, 0, 0)})
+    near.marks.push_back({1, *aim(eye, corner).ray, focal_px});
+  EXPECT_EQ(Marking::words_of(near),
+            "marked twice from nearly the same place; go farther aside and mark it again");
+  MarkedCorner same;
+  for (int i = 0; i < 2; ++i) same.marks.push_back({1, *aim(left, corner).ray, focal_px});
+  EXPECT_FALSE(same.place());
+}
+
+TEST(Marking, IsAimedWithTheMiddleOfThePictureIfTagsShowTheCamera) {
+  const PinholeIntrinsics lens = test::plain_lens(width, height, focal_px);
+  pipeline::Shot shot;
+  Frame frame;
+  frame.timestamp_ns = 5;
+  shot.frame = std::make_shared<Frame>(frame);
+  EXPECT_FALSE(aim_of(shot, lens).ray);
+  shot.track.pose.emplace();
+  shot.track.pose->world_from_camera = {{1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}, {1, 2, 3, 1}};
+  EXPECT_FALSE(aim_of(shot, lens).ray);  // another tracker's
+  shot.track.pose->tags = {3};
+  const Aim middle = aim_of(shot, lens);
+  ASSERT_TRUE(middle.ray);
+  EXPECT_EQ(middle.timestamp_ns, 5);
+  EXPECT_EQ(middle.px, glm::dvec2(319.5, 239.5));
+  EXPECT_EQ(middle.ray->origin, glm::dvec3(1, 2, 3));
+  // plain_lens() has its principal point in the middle.
+  EXPECT_LT(glm::distance(middle.ray->direction, glm::dvec3(0, 0, -1)), 1e-9);
+}
+
+// A camera at `left` or `right` that looks at the corner.
+glm::dmat4 looking_from(const glm::dvec3& eye) {
+  const glm::dvec3 z = glm::normalize(corner - eye);
+  const glm::dvec3 x = glm::normalize(glm::cross(z, glm::dvec3(0, 0, 1)));
+  return {glm::dvec4(x, 0), glm::dvec4(glm::cross(z, x), 0), glm::dvec4(z, 0), glm::dvec4(eye, 1)};
+}
+
+bool has_word(const output::GuidePage& page, const std::string& text, const glm::dvec2& at) {
+  return std::ranges::any_of(page.words, [&](const output::GuideWord& word) {
+    return word.text == text && glm::distance(word.at, at) < 40;
+  });
+}
+
+TEST(MarkingLines, LeaveTheMiddleFreeAndNameTheCorner) {
+  const PinholeIntrinsics lens = test::plain_lens(width, height, focal_px);
+  const output::GuidePage page = marking_lines({}, lens, {});
+  EXPECT_EQ(page.width, width);
+  ASSERT_EQ(page.lines.size(), 4u);
+  const glm::dvec2 middle(319.5, 239.5);
+  for (const output::GuideLine& line : page.lines) {
+    EXPECT_GT(glm::distance(line.a, middle), 4);
+    EXPECT_EQ(line.kind, output::GuideKind::mark);
+  }
+  EXPECT_TRUE(has_word(page, "box 1 corner 1", middle));
+}
+
+TEST(MarkingLines, ShowCornersThatAreFoundAndTheRayOfOneThatIsMarkedOnce) {
+  const PinholeIntrinsics lens = test::plain_lens(width, height, focal_px);
+  Marking marking;
+  marking.mark(aim(left, corner));
+  marking.next_box();
+  marking.next_box();  // the first corner again
+  const output::GuidePage once = marking_lines(marking, lens, looking_from(right));
+  EXPECT_GT(once.lines.size(), 4u + 5u);  // the ray crosses the picture in many segments
+  marking.mark(aim(right, corner));
+  const output::GuidePage found = marking_lines(marking, lens, looking_from(right));
+  EXPECT_EQ(found.lines.size(), 4u + 2u);
+  EXPECT_TRUE(has_word(found, "1.1", {319.5, 239.5}));
+  // A corner out of the picture has no cross there.
+  EXPECT_EQ(marking_lines(marking, lens, looking_from(2.0 * corner - right)).words.size(), 2u);
+}
+
+struct Desk {
+  set::Set set = {};
+  Controls controls{set};
+  Outcome operator()(const char* action) { return controls.perform(*set::find_action(action)); }
+};
+
+TEST(MarkingControls, MarkOnlyWhereAMarkIsKeptAndMeansSomething) {
+  Desk desk;
+  EXPECT_EQ(desk("mark").said, "aim the cross at box 1 corner 1");
+  EXPECT_TRUE(desk.controls.look().marking.is_on);
+  EXPECT_EQ(desk("mark").said, "marks are kept in a take; start one with record, then mark");
+  desk("record");
+  EXPECT_EQ(desk("mark").said, "not marked: no tag in the picture shows where the camera is");
+  desk.controls.use_aim(Aim{});
+  EXPECT_TRUE(desk("mark").refused);
+  desk.controls.use_aim(aim(left, corner, 0, 5));
+  const Outcome marked = desk("mark");
+  EXPECT_EQ(marked.said, "box 1 corner 1: marked once");
+  EXPECT_EQ(marked.mark, (session::MarkEvent{5, "box 1 corner 1", {319.5, 239.5}}));
+  EXPECT_EQ(desk("next_corner").said, "mark box 1 corner 3");
+  EXPECT_EQ(desk("next_box").said, "mark box 2 corner 1");
+  const Outcome withdrawn = desk("unmark");
+  EXPECT_EQ(withdrawn.said, "box 1 corner 1: mark withdrawn, not marked");
+  EXPECT_EQ(withdrawn.mark, (session::MarkEvent{5, "box 1 corner 1", {}, true}));
+  EXPECT_EQ(desk("unmark").said, "no corner is marked");
+  desk.controls.happened(Event::good_frame);
+  desk("refine");
+  EXPECT_EQ(desk("mark").said, "only the live picture can be marked");
+  desk("live");
+  desk("mark");
+  desk("record");
+  EXPECT_EQ(desk("unmark").said, "the take with these marks has ended");
+  EXPECT_EQ(desk("marking").said, "marking off");
+  EXPECT_EQ(desk("marking").said, "aim the cross at box 1 corner 2");
+  desk.controls.begin_marks();
+  EXPECT_EQ(desk("unmark").said, "no corner is marked");
+  EXPECT_TRUE(desk.controls.look().marking.is_on);
+}
+
+}  // namespace previz::rig::marking_test
