@@ -210,7 +210,8 @@ void add_model(CLI::App& app, model::ModelOptions& options) {
       ->required();
   CLI::Option* const parts = command.add_option(
       "--parts", options.parts_file,
-      "File of the scene's planes, boxes, cylinders and scans, and of the marked points");
+      "File of the scene's planes, boxes, cylinders and scans, and of the marked points "
+      "(default: the boxes that were marked on the rig while the session was recorded)");
   CLI::Option* const pictures = command
                                     .add_option("--pictures", options.pictures,
                                                 "Only write pictures to mark points in, and a file "
@@ -219,8 +220,9 @@ void add_model(CLI::App& app, model::ModelOptions& options) {
   command.add_option("--set", options.set_file,
                      "Set file with the tags and the film camera's lens (default: the session's)");
   command
-      .add_option("--out", options.out,
-                  "File of the model, .glb (default: as the file of parts is named)")
+      .add_option(
+          "--out", options.out,
+          "File of the model, .glb (default: as the file of parts, or the session, is named)")
       ->excludes(pictures);
   command
       .add_option("--overlay", options.overlay,

@@ -16,7 +16,9 @@
 #include "daemon/model/on_phantom.hpp"
 #include "daemon/model/overlay.hpp"
 #include "daemon/model/parts.hpp"
+#include "daemon/model/parts_text.hpp"
 #include "daemon/model/pictures.hpp"
+#include "daemon/model/rig_marks.hpp"
 #include "daemon/model/scans.hpp"
 #include "daemon/model/solids.hpp"
 #include "daemon/model/start.hpp"
@@ -47,7 +49,12 @@ set::Set set_of(const ModelOptions& options) {
 }
 
 std::filesystem::path file_of(const ModelOptions& options) {
-  return options.out.value_or(std::filesystem::path(options.parts_file).replace_extension(".glb"));
+  if (options.out) return *options.out;
+  if (!options.parts_file.empty())
+    return std::filesystem::path(options.parts_file).replace_extension(".glb");
+  // Marks of the rig: the model is named as the take is, which it does not go into.
+  const std::filesystem::path take = std::filesystem::absolute(options.footage / "");
+  return take.lexically_normal().parent_path().filename().string() + ".glb";
 }
 
 // The three marks that are farthest off: where to look again.
@@ -221,7 +228,7 @@ std::optional<std::string> with_model(const std::filesystem::path& set_file, con
   edit.append(fmt::format("[[object]]\nname = {}\nfile = {}\npresence = \"phantom\"\n",
                           codec::quote(own), codec::quote(name)));
   // The model is not there yet; another file stands in for it.
-  set::parse_set(edit.text(), set_file, {{name, std::filesystem::absolute(options.parts_file)}});
+  set::parse_set(edit.text(), set_file, {{name, std::filesystem::absolute(set_file)}});
   return edit.text();
 }
 
@@ -324,6 +331,22 @@ std::string coloured_model(const ModelOptions& options, const set::Set& set, con
   return glb_of(meshes, albedos);
 }
 
+// Returns the parts that the file lists; without one, those that were marked on the rig.
+Parts parts_of(const ModelOptions& options, const ObserverCalibration& camera,
+               const set::Tracking& tracking, std::ostream& out) {
+  if (!options.parts_file.empty())
+    return parse_parts(session::read_file(options.parts_file), options.parts_file);
+  const RigMarks marks = rig_marks(options.footage, camera, tracking);
+  if (marks.pictures.empty())
+    throw Error(options.footage.string() +
+                ": nothing was marked on the rig while it was recorded; give --parts, the file "
+                "that lists the scene's parts, which --pictures FOLDER writes to be filled in");
+  // The model follows the edges of further pictures, too.
+  const auto pictures = with_marks(pictures_apart(options.footage, camera, tracking), marks);
+  const auto boxes = boxes_of(marks, tracking.tags, out);
+  return parse_parts(parts_text(pictures, tracking.tags, boxes), options.footage / "events.jsonl");
+}
+
 }  // namespace
 
 void make_model(const ModelOptions& options, std::ostream& out) {
@@ -331,18 +354,14 @@ void make_model(const ModelOptions& options, std::ostream& out) {
     return write_pictures(options.footage,
                           calibrate::known_observer(options.set_file, options.footage),
                           set_of(options).tracking, *options.pictures, out);
-  if (options.parts_file.empty())
-    throw Error(
-        "model needs --parts, the file that lists the scene's parts; --pictures FOLDER writes one "
-        "to fill in");
   if (options.write && !options.set_file)
     throw Error("--write needs --set: it changes that set file");
-  const Parts parts = parse_parts(session::read_file(options.parts_file), options.parts_file);
+  const set::Set set = set_of(options);
+  const ObserverCalibration camera = calibrate::known_observer(options.set_file, options.footage);
+  const Parts parts = parts_of(options, camera, set.tracking, out);
   insist_on_outputs(options, parts);
   const std::vector<ScanFile> scan_files = read_scans(parts);
-  const set::Set set = set_of(options);
   const auto edited = options.write ? with_model(*options.set_file, set, options) : std::nullopt;
-  const ObserverCalibration camera = calibrate::known_observer(options.set_file, options.footage);
   const auto source = calibrate::open_source(options.footage, "observer");
   const Views views = find_views(*source, camera, set.tracking, parts);
   const Start start = first_guess(parts, views, set.tracking.tags);

@@ -11,11 +11,12 @@
 namespace previz::model {
 
 struct ModelOptions {
-  std::filesystem::path footage;                  // session, folder of pictures, or video
-  std::filesystem::path parts_file;               // parts.hpp
+  std::filesystem::path footage;     // session, folder of pictures, or video
+  std::filesystem::path parts_file;  // parts.hpp; empty: what was marked on the rig (rig_marks.hpp)
   std::optional<std::filesystem::path> pictures;  // only write pictures to mark into this folder
   std::optional<std::filesystem::path> set_file;  // default: the session's own
-  std::optional<std::filesystem::path> out;       // default: the parts file's name, ending in .glb
+  std::optional<std::filesystem::path>
+      out;  // default: the parts file's name, or the session's, ending in .glb
   std::optional<std::filesystem::path>
       overlay;                   // pictures with the model over them, into this folder
   bool write = false;            // add the model to the set file

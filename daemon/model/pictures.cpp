@@ -7,9 +7,10 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
-#include <set>
 
 #include "daemon/calibrate/lens/source.hpp"
+#include "daemon/model/parts_text.hpp"
+#include "daemon/model/rig_marks.hpp"
 #include "daemon/model/views.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/tracking/tag_detector.hpp"
@@ -23,8 +24,6 @@ namespace {
 
 // So many pictures are looked at.
 constexpr std::size_t most_examined = 150;
-// Tags lie in one plane within so much.
-constexpr double flat_m = 4e-3, flat_cos = 0.998;
 
 // A picture that shows tags, and where its camera stood.
 struct Candidate {
@@ -86,55 +85,16 @@ std::vector<Candidate> apart(const std::vector<Candidate>& all) {
   return result;
 }
 
-std::string file_of(const std::string& name) {
-  std::string file = name.ends_with(".png") ? name : name + ".png";
-  std::ranges::replace(file, ' ', '_');
-  return file;
-}
-
-// Groups of tags that lie in one plane.
-std::vector<std::vector<int>> flat_groups(const std::vector<set::Tag>& tags) {
-  std::vector<std::vector<int>> groups;
-  std::set<int> used;
-  for (const set::Tag& first : tags) {
-    if (used.contains(first.id)) continue;
-    std::vector<int>& group = groups.emplace_back();
-    const glm::dvec3 normal(first.world_from_tag[2]), at(first.world_from_tag[3]);
-    for (const set::Tag& tag : tags) {
-      const glm::dvec3 its(tag.world_from_tag[2]), off = glm::dvec3(tag.world_from_tag[3]) - at;
-      const bool is_flat =
-          glm::dot(its, normal) > flat_cos && std::abs(glm::dot(off, normal)) < flat_m;
-      if (!used.contains(tag.id) && is_flat) {
-        group.push_back(tag.id);
-        used.insert(tag.id);
-      }
-    }
-  }
-  return groups;
-}
-
-std::string parts_text(const std::vector<std::string>& names, const std::vector<set::Tag>& tags) {
-  std::string text =
-      "# The parts of the real scene, for previzd model; previzd(8), \"The model\", says what can "
-      "be listed.\n"
-      "# Mark the same corners in two pictures or more: pixels from the centre of the top left "
-      "one.\n";
-  for (const std::string& name : names)
-    text += fmt::format(
-        "\n[[picture]]\nfile = \"{}\"  # {}\n[picture.points]\n# crate_1 = [312.4, 200.1]\n", name,
-        file_of(name));
-  int number = 0;
-  for (const std::vector<int>& group : flat_groups(tags))
-    text += fmt::format("\n[[plane]]\nname = \"plane {}\"\ntags = [{}]\n", ++number,
-                        fmt::join(group, ", "));
-  text +=
-      "\n# [[box]]\n# name = \"crate\"\n# on = \"plane 1\"\n# top = [\"crate_1\", \"crate_2\", "
-      "\"crate_3\", \"\"]  # in order "
-      "around\n";
-  return text;
-}
-
 }  // namespace
+
+std::vector<std::string> pictures_apart(const std::filesystem::path& footage,
+                                        const ObserverCalibration& camera,
+                                        const set::Tracking& tracking) {
+  std::vector<std::string> names;
+  for (const Candidate& candidate : apart(candidates_of(footage, camera, tracking)))
+    names.push_back(short_name(candidate.name));
+  return names;
+}
 
 void write_pictures(const std::filesystem::path& footage, const ObserverCalibration& camera,
                     const set::Tracking& tracking, const std::filesystem::path& folder,
@@ -145,17 +105,19 @@ void write_pictures(const std::filesystem::path& footage, const ObserverCalibrat
                 ": already exists and may hold marks; name another folder, or delete the file");
   if (std::filesystem::weakly_canonical(folder) == std::filesystem::weakly_canonical(footage))
     throw Error(folder.string() + ": is the footage; name another folder for the pictures to mark");
-  std::vector<std::string> names;
-  const std::vector<Candidate> chosen = apart(candidates_of(footage, camera, tracking));
+  const RigMarks marks = rig_marks(footage, camera, tracking);
+  const std::vector<MarkedPicture> pictures =
+      with_marks(pictures_apart(footage, camera, tracking), marks);
+  const std::vector<BoxPart> boxes = boxes_of(marks, tracking.tags, out);
   session::make_folders(folder);
   const auto source = calibrate::open_source(footage, "observer");
   for (auto picture = source->next(); picture; picture = source->next()) {
-    if (std::ranges::find(chosen, picture->name, &Candidate::name) == chosen.end()) continue;
-    names.push_back(short_name(picture->name));
-    output::write_png(folder / file_of(names.back()), to_plate(*picture->frame));
+    const std::string name = short_name(picture->name);
+    if (std::ranges::find(pictures, name, &MarkedPicture::name) != pictures.end())
+      output::write_png(folder / picture_file(name), to_plate(*picture->frame));
   }
-  session::replace_file(parts, parts_text(names, tracking.tags));
-  fmt::print(out, "{} pictures to mark points in, and {} to list them\n", names.size(),
+  session::replace_file(parts, parts_text(pictures, tracking.tags, boxes));
+  fmt::print(out, "{} pictures to mark points in, and {} to list them\n", pictures.size(),
              parts.string());
 }
 
