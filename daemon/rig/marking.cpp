@@ -91,7 +91,7 @@ std::string Marking::words_of(const MarkedCorner& corner) {
   const std::string times = count == 2 ? "twice" : fmt::format("{} times", count);
   const auto place = corner.place();
   if (!place || place->parallax_rad < least_parallax_rad)
-    return "marked " + times + " from nearly the same place; go farther aside and mark it again";
+    return "marked " + times + " from one place; go aside and mark it again";
   if (place->off_px > most_off_px)
     return fmt::format("its marks are {:.0f} px apart; unmark, and aim at the same spot",
                        place->off_px);

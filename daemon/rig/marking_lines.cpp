@@ -24,7 +24,7 @@ void add_cross(output::GuidePage& page, const std::string& name) {
   for (const glm::dvec2& way :
        {glm::dvec2(1, 0), glm::dvec2(-1, 0), glm::dvec2(0, 1), glm::dvec2(0, -1)})
     page.lines.push_back({middle + from * way, middle + to * way, GuideKind::mark});
-  page.words.push_back({middle + glm::dvec2(0, 1.5 * to), name, GuideKind::mark});
+  page.words.push_back({middle + glm::dvec2(0, -1.5 * to), name, GuideKind::mark});
 }
 
 void add_corner(output::GuidePage& page, const output::GuideWord& corner) {

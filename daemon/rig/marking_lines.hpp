@@ -11,7 +11,7 @@
 namespace previz::rig {
 
 // Returns a cross that leaves the middle of the picture free, with the name of the selected corner
-// under it. Where the camera is known, also a cross at each corner that was found in space, with
+// above it. Where the camera is known, also a cross at each corner that was found in space, with
 // its numbers, and, of a selected corner that was marked once, the ray of that mark: the corner is
 // on it.
 output::GuidePage marking_lines(const Marking& marking, const PinholeIntrinsics& lens,

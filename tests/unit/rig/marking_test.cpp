@@ -82,8 +82,7 @@ TEST(Marking, SaysWhatIsWrongWithACorner) {
   MarkedCorner near;
   for (const glm::dvec3& eye : {left, left + glm::dvec3(0.05, 0, 0)})
     near.marks.push_back({1, *aim(eye, corner).ray, focal_px});
-  EXPECT_EQ(Marking::words_of(near),
-            "marked twice from nearly the same place; go farther aside and mark it again");
+  EXPECT_EQ(Marking::words_of(near), "marked twice from one place; go aside and mark it again");
   MarkedCorner same;
   for (int i = 0; i < 2; ++i) same.marks.push_back({1, *aim(left, corner).ray, focal_px});
   EXPECT_FALSE(same.place());
