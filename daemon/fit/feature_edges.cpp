@@ -66,10 +66,12 @@ using Ends = std::pair<std::uint32_t, std::uint32_t>;  // the lower number first
 struct Side {
   Ends ends;
   glm::dvec3 into{0};
+  std::size_t thing = no_thing;
 };
 
 // Returns the sides of all triangles that have an area, sorted by their ends.
-std::vector<Side> sides_of(const std::vector<glm::dvec3>& triangles, Welder& welder) {
+std::vector<Side> sides_of(const std::vector<glm::dvec3>& triangles,
+                           const std::vector<std::size_t>& things, Welder& welder) {
   std::vector<Side> sides;
   for (std::size_t t = 0; t + 2 < triangles.size(); t += 3) {
     std::array<std::uint32_t, 3> corner{};
@@ -82,7 +84,9 @@ std::vector<Side> sides_of(const std::vector<glm::dvec3>& triangles, Welder& wel
       const glm::dvec3 along = glm::normalize(pb - pa);
       const glm::dvec3 across = pc - pa - glm::dot(pc - pa, along) * along;
       if (glm::length(across) > weld_m)
-        sides.push_back({{std::min(a, b), std::max(a, b)}, glm::normalize(across)});
+        sides.push_back({{std::min(a, b), std::max(a, b)},
+                         glm::normalize(across),
+                         things.empty() ? no_thing : things[t / 3]});
     }
   }
   std::ranges::stable_sort(sides, {}, &Side::ends);
@@ -93,6 +97,7 @@ std::vector<Side> sides_of(const std::vector<glm::dvec3>& triangles, Welder& wel
 struct Part {
   Ends ends;
   std::vector<glm::dvec3> into;
+  std::size_t thing = no_thing;
   bool is_used = false;
 };
 
@@ -106,6 +111,12 @@ std::vector<glm::dvec3> directions(const Side* side, const Side* end) {
   return different;
 }
 
+std::size_t thing_of(const Side* side, const Side* end) {
+  const bool is_one =
+      std::all_of(side, end, [side](const Side& other) { return other.thing == side->thing; });
+  return is_one ? side->thing : no_thing;
+}
+
 bool is_feature(const std::vector<glm::dvec3>& into) {
   return into.size() != 2 || glm::dot(into[0], into[1]) > -cos_fold;
 }
@@ -117,7 +128,7 @@ std::vector<Part> parts_of(const std::vector<Side>& sides) {
     const Side* next = side;
     while (next != end && next->ends == side->ends) ++next;
     if (auto into = directions(side, next); is_feature(into))
-      parts.push_back({side->ends, std::move(into)});
+      parts.push_back({side->ends, std::move(into), thing_of(side, next)});
     side = next;
   }
   return parts;
@@ -139,23 +150,25 @@ class Joiner {
       if (std::exchange(part.is_used, true)) continue;
       const auto [a, b] = part.ends;
       const glm::dvec3 along = glm::normalize(places_[b] - places_[a]);
-      edges.push_back({places_[last(a, -along)], places_[last(b, along)], part.into});
+      edges.push_back({places_[last(a, -along, part.thing)], places_[last(b, along, part.thing)],
+                       part.into, part.thing});
     }
     return edges;
   }
 
  private:
   // Returns the corner at which a line ends that goes on from this one.
-  std::uint32_t last(std::uint32_t corner, const glm::dvec3& along) {
-    while (const auto next = after(corner, along)) corner = *next;
+  std::uint32_t last(std::uint32_t corner, const glm::dvec3& along, std::size_t thing) {
+    while (const auto next = after(corner, along, thing)) corner = *next;
     return corner;
   }
 
-  std::optional<std::uint32_t> after(std::uint32_t corner, const glm::dvec3& along) {
+  std::optional<std::uint32_t> after(std::uint32_t corner, const glm::dvec3& along,
+                                     std::size_t thing) {
     const auto [begin, end] = at_.equal_range(corner);
     for (auto at = begin; at != end; ++at) {
       Part& part = parts_[at->second];
-      if (part.is_used) continue;
+      if (part.is_used || part.thing != thing) continue;
       const std::uint32_t other = part.ends.first == corner ? part.ends.second : part.ends.first;
       if (glm::dot(glm::normalize(places_[other] - places_[corner]), along) < cos_straight)
         continue;
@@ -172,9 +185,10 @@ class Joiner {
 
 }  // namespace
 
-std::vector<FeatureEdge> feature_edges(const std::vector<glm::dvec3>& triangles) {
+std::vector<FeatureEdge> feature_edges(const std::vector<glm::dvec3>& triangles,
+                                       const std::vector<std::size_t>& things) {
   Welder welder;
-  std::vector<Part> parts = parts_of(sides_of(triangles, welder));
+  std::vector<Part> parts = parts_of(sides_of(triangles, things, welder));
   return Joiner(std::move(parts), welder.places()).joined();
 }
 

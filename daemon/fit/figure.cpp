@@ -1,8 +1,10 @@
 #include "daemon/fit/figure.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <glm/geometric.hpp>
+#include <map>
 
 #include "daemon/fit/light_edge.hpp"
 #include "daemon/fit/visible_edges.hpp"
@@ -15,22 +17,6 @@ namespace {
 constexpr double between_lines_px = 3;
 // Two findings that are as near as this are the same edge of light.
 constexpr double same_px = 0.5;
-// Edges agree on how far the model is off within this.
-constexpr double agree_px = 1;
-constexpr double shift_step_px = 0.5;
-// A shift that is a pixel longer must convince so many more of the pieces.
-constexpr double share_a_px = 0.005;
-
-// An edge of light near a piece of an edge of the model.
-struct Light {
-  double along_normal_px = 0;  // of its middle, from the piece's
-  double off_px = 0;           // of its ends, >= 0, in the mean
-};
-
-struct Looked {
-  glm::dvec2 normal{0};
-  std::vector<Light> lights;  // not empty
-};
 
 std::vector<Light> look_near(const tracking::Luminance& luminance, const PinholeIntrinsics& lens,
                              const Segment& piece, const glm::dvec2& normal) {
@@ -50,33 +36,14 @@ std::vector<Light> look_near(const tracking::Luminance& luminance, const Pinhole
   return lights;
 }
 
-// Returns the edge of light that is nearest to where the piece is after a shift.
-const Light& nearest(const Looked& looked, const glm::dvec2& shift) {
-  const double at = glm::dot(looked.normal, shift);
-  return *std::ranges::min_element(
-      looked.lights, {}, [&](const Light& light) { return std::abs(light.along_normal_px - at); });
-}
-
-double agreement(const Looked& looked, const glm::dvec2& shift) {
-  const double off = nearest(looked, shift).along_normal_px - glm::dot(looked.normal, shift);
-  return std::max(0.0, 1 - off * off / (agree_px * agree_px));
-}
-
-// Returns the shift of the model, px, on which most pieces agree. A picture has edges of light that
-// are not the model's, and each piece alone would take the nearest: of a model that is off, that
-// is mostly another's.
-glm::dvec2 common_shift(const std::vector<Looked>& pieces) {
-  glm::dvec2 best(0);
-  double most = -1;
-  const int steps = int(reach_px / shift_step_px);
-  for (int y = -steps; y <= steps; ++y)
-    for (int x = -steps; x <= steps; ++x) {
-      const glm::dvec2 shift = shift_step_px * glm::dvec2(x, y);
-      double sum = -share_a_px * double(pieces.size()) * glm::length(shift);
-      for (const Looked& looked : pieces) sum += agreement(looked, shift);
-      if (sum > most) most = sum, best = shift;
-    }
-  return best;
+// Returns how a point in a depth moves in the picture if it does in the world.
+std::array<glm::dvec3, 2> px_per_m(const PinholeIntrinsics& lens,
+                                   const glm::dmat4& world_from_camera, const glm::dvec2& px,
+                                   double depth_m) {
+  const glm::dvec3 right(world_from_camera[0]), down(world_from_camera[1]),
+      ahead(world_from_camera[2]);
+  return {(lens.fx * right - (px.x - lens.cx) * ahead) / depth_m,
+          (lens.fy * down - (px.y - lens.cy) * ahead) / depth_m};
 }
 
 double percentile(std::vector<double> values, double share) {
@@ -96,19 +63,32 @@ void Measurement::look(const Frame& frame, const glm::dmat4& world_from_camera) 
   const auto luminance = [&](int x, int y) { return photometry.luminance(frame, x, y); };
   ++frames_;
   std::vector<Looked> found;
+  std::map<std::size_t, ThingVotes> things;
   for (const Segment& piece : measurable_pieces(model_, camera_.intrinsics, world_from_camera)) {
     ++looked_at_;
+    ThingVotes& thing = things[piece.thing];
+    ++thing.looked_at;
     const glm::dvec2 along = glm::normalize(piece.b - piece.a), normal(-along.y, along.x);
-    Looked looked{normal, look_near(luminance, camera_.intrinsics, piece, normal)};
-    if (!looked.lights.empty()) found.push_back(std::move(looked));
+    Looked looked{normal,
+                  look_near(luminance, camera_.intrinsics, piece, normal),
+                  0.5 * (piece.a + piece.b),
+                  piece.thing,
+                  {}};
+    looked.px_per_m = px_per_m(camera_.intrinsics, world_from_camera, looked.at, piece.depth_m);
+    if (looked.lights.empty()) continue;
+    thing.votes.add(looked);
+    found.push_back(std::move(looked));
   }
-  const glm::dvec2 shift = common_shift(found);
+  Votes all;
+  for (const auto& [number, thing] : things) all.add(thing.votes);
+  things_.look(things, all, found);
+  const glm::dvec2 shift = all.best();
   for (const Looked& looked : found) off_px_.push_back(nearest(looked, shift).off_px);
   if (!found.empty()) shift_px_.push_back(glm::length(shift));
 }
 
 Figure Measurement::figure() const {
-  Figure figure{frames_, looked_at_, off_px_.size(), {}, {}};
+  Figure figure{frames_, looked_at_, off_px_.size(), {}, {}, things_.off(model_.things())};
   if (frames_ == 0)
     figure.why = "none of the pictures looked at has a pose";
   else if (looked_at_ < least_pieces)

@@ -8,15 +8,11 @@
 #include <vector>
 
 #include "daemon/fit/real_model.hpp"
+#include "daemon/fit/things.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz::fit {
-
-// Edges of light are looked for within this distance.
-inline constexpr double reach_px = 12;
-// Fewer pieces of edges than this give no figure.
-inline constexpr std::size_t least_pieces = 8;
 
 struct Figure {
   struct Off {
@@ -27,15 +23,13 @@ struct Figure {
     // the figures above can be much smaller.
     double shift_px = 0;
   };
-  std::size_t frames = 0;     // pictures looked at
-  std::size_t looked_at = 0;  // pieces of edges of 12 to 40 px in all of them
-  std::size_t found = 0;      // of these, pieces where the picture has an edge of light
-  std::optional<Off> off;     // absent: too few were found
-  std::string why;            // the reason then, in plain words
+  std::size_t frames = 0;            // pictures looked at
+  std::size_t looked_at = 0;         // pieces of edges of 12 to 40 px in all of them
+  std::size_t found = 0;             // of these, pieces where the picture has an edge of light
+  std::optional<Off> off;            // absent: too few were found
+  std::string why;                   // the reason then, in plain words
+  std::vector<ThingOff> things_off;  // while the rest fits; the worst first
 };
-
-// A model that is farther off than this casts shadows that a viewer sees beside their things.
-inline constexpr double most_off_px = 2;
 
 // Returns how far off the model is, to compare with most_off_px: the median of its edges or the
 // shift, whichever is more. It is 0 px without a figure.
@@ -58,6 +52,7 @@ class Measurement {
   std::size_t frames_ = 0, looked_at_ = 0;
   std::vector<double> off_px_;    // of the pieces that were found
   std::vector<double> shift_px_;  // of the frames in which some were
+  Things things_;
 };
 
 }  // namespace previz::fit

@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <glm/geometric.hpp>
+#include <map>
 #include <utility>
-
-#include "daemon/fit/feature_edges.hpp"
 
 namespace previz::fit {
 namespace {
@@ -48,6 +47,30 @@ bool is_touched(const lighting::Room& surface, const FeatureEdge& edge) {
   return false;
 }
 
+// Gives the things of a scene numbers.
+class Naming {
+ public:
+  std::size_t number_of(const scene::Instance& instance) {
+    if (instance.tag != scene::TagPart::none) return no_thing;
+    auto& named = objects_[instance.object];
+    const auto [at, is_new] = named.try_emplace(instance.name, count_);
+    if (is_new) ++count_;
+    return at->second;
+  }
+
+  std::vector<std::string> names(const set::Set& set) const {
+    std::vector<std::string> names(count_);
+    for (const auto& [object, nodes] : objects_)
+      for (const auto& [name, number] : nodes)
+        names[number] = nodes.size() == 1 || name.empty() ? set.objects[object].name : name;
+    return names;
+  }
+
+ private:
+  std::size_t count_ = 0;
+  std::map<std::uint32_t, std::map<std::string, std::size_t>> objects_;
+};
+
 }  // namespace
 
 bool stands_still(const scene::Instance& instance, const set::Set& set) {
@@ -65,15 +88,20 @@ void append(const scene::Scene& scene, const scene::Instance& instance,
 
 RealModel::RealModel(const scene::Scene& scene, const set::Set& set) {
   lighting::Triangles all, opaque;
+  std::vector<std::size_t> things;  // of the triangles of `opaque`
+  Naming naming;
   for (const scene::Instance& instance : scene.instances) {
     if (!(instance.presence & scene::world_real) || !stands_still(instance, set)) continue;
     append(scene, instance, all);
-    if (has_edges(scene.materials[instance.material])) append(scene, instance, opaque);
+    if (!has_edges(scene.materials[instance.material])) continue;
+    append(scene, instance, opaque);
+    things.resize(opaque.size() / 3, naming.number_of(instance));
   }
   if (all.empty()) return;
   surface_.emplace(all, middle_of(all));
-  for (const FeatureEdge& edge : feature_edges(opaque))
-    edges_.push_back({edge.a, edge.b, is_touched(*surface_, edge)});
+  for (const FeatureEdge& edge : feature_edges(opaque, things))
+    edges_.push_back({edge.a, edge.b, is_touched(*surface_, edge), edge.thing});
+  things_ = naming.names(set);
 }
 
 bool RealModel::is_seen(const glm::dvec3& eye, const glm::dvec3& point) const {

@@ -1,10 +1,13 @@
 // Holds what a set says about the real scene, as edges and as a surface that hides them.
 #pragma once
 
+#include <cstddef>
 #include <glm/vec3.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "daemon/fit/feature_edges.hpp"
 #include "daemon/lighting/room.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/set.hpp"
@@ -23,6 +26,7 @@ struct ModelEdge {
   // Something of the model touches it: a shadow begins there, which moves the edge of light by half
   // a pixel and more.
   bool is_touched = false;
+  std::size_t thing = no_thing;  // in RealModel::things()
 };
 
 // The parts of a scene that exist in the real world and stand still: phantoms and removed objects
@@ -36,6 +40,11 @@ class RealModel {
   // These are the edges of feature_edges().
   const std::vector<ModelEdge>& edges() const { return edges_; }
 
+  // Returns the names of the things that the model consists of: the nodes of the files, or the
+  // object itself where its file has one node, or where a node has no name. Printed tags, and what
+  // is under them, are no things.
+  const std::vector<std::string>& things() const { return things_; }
+
   // Returns whether the model does not hide a point of an edge from an eye, to one part in a
   // thousand of the distance.
   bool is_seen(const glm::dvec3& eye, const glm::dvec3& point) const;
@@ -43,6 +52,7 @@ class RealModel {
  private:
   std::optional<lighting::Room> surface_;  // absent: nothing is real
   std::vector<ModelEdge> edges_;
+  std::vector<std::string> things_;
 };
 
 }  // namespace previz::fit

@@ -22,11 +22,13 @@ constexpr std::size_t steps_of_segment = 10;
 struct Sample {
   glm::dvec2 pinhole{0};
   std::optional<glm::dvec2> pixel;  // absent: outside the picture, or hidden
+  double depth_m = 0;
 };
 
 struct SampledEdge {
   bool is_touched = false;
   std::vector<Sample> samples;  // at even distances on the pinhole plane
+  std::size_t thing = no_thing;
 };
 
 // Cuts a line to where it is `from` or more in front of a plane through the camera; returns false
@@ -67,7 +69,7 @@ class Camera {
   }
 
   SampledEdge see(const ModelEdge& edge) const {
-    SampledEdge seen{edge.is_touched, {}};
+    SampledEdge seen{edge.is_touched, {}, edge.thing};
     glm::dvec3 a = in_camera(edge.a), b = in_camera(edge.b);
     if (!clip_to_picture(lens_, a, b)) return seen;
     const auto pa = on_pinhole(lens_, a), pb = on_pinhole(lens_, b);
@@ -79,7 +81,7 @@ class Camera {
       const double share = double(i) / steps;
       // A share of the line in the picture is this share of it in space.
       const double in_space = share * a.z / ((1 - share) * b.z + share * a.z);
-      Sample sample{*pa + share * (*pb - *pa), {}};
+      Sample sample{*pa + share * (*pb - *pa), {}, a.z + in_space * (b.z - a.z)};
       sample.pixel = pixel_of(lens_, sample.pinhole);
       if (sample.pixel && !is_seen(a + in_space * (b - a))) sample.pixel.reset();
       seen.samples.push_back(sample);
@@ -193,9 +195,14 @@ std::vector<Segment> measurable_pieces(const RealModel& model, const PinholeIntr
           return sample.pixel && !neighbours.has_other(*sample.pixel, e);
         },
         [&](std::size_t first, std::size_t last) {
-          const glm::dvec2 a = edges[e].samples[first].pinhole, b = edges[e].samples[last].pinhole;
-          for (const Share& share : cut(glm::distance(a, b), corner_px))
-            pieces.push_back({a + share.from * (b - a), a + share.to * (b - a)});
+          const Sample &from = edges[e].samples[first], &to = edges[e].samples[last];
+          const glm::dvec2 a = from.pinhole, b = to.pinhole;
+          for (const Share& share : cut(glm::distance(a, b), corner_px)) {
+            // In a picture, the inverse of the depth changes evenly along a line.
+            const double middle = 0.5 * (share.from + share.to);
+            pieces.push_back({a + share.from * (b - a), a + share.to * (b - a), edges[e].thing,
+                              1 / ((1 - middle) / from.depth_m + middle / to.depth_m)});
+          }
         });
   }
   return pieces;

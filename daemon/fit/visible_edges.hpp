@@ -1,6 +1,7 @@
 // Finds the parts of a model's edges that a camera sees.
 #pragma once
 
+#include <cstddef>
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
 #include <vector>
@@ -12,6 +13,9 @@ namespace previz::fit {
 
 struct Segment {
   glm::dvec2 a{0}, b{0};
+  // These are of measurable_pieces().
+  std::size_t thing = no_thing;  // in RealModel::things()
+  double depth_m = 0;            // of its middle, from the camera's plane
 };
 
 // Returns the edges that the model does not hide as segments in pixels of the picture, to draw over

@@ -131,9 +131,14 @@ std::string to_json(const MetricsSnapshot& snapshot) {
     json["passes"][name] = {{"runs", pass.runs}, {"busy_s", pass.busy_s}};
   json["latency_s"] = {{"p50", snapshot.latency_p50_s}, {"p99", snapshot.latency_p99_s}};
   json["model_fit_px"] = nullptr;
-  if (const std::optional<ModelFit>& fit = snapshot.model_fit)
-    json["model_fit_px"] = {
+  if (const std::optional<ModelFit>& fit = snapshot.model_fit) {
+    auto& of_model = json["model_fit_px"];
+    of_model = {
         {"median", fit->median_px}, {"of_90_percent", fit->most_px}, {"shift", fit->shift_px}};
+    of_model["things_off"] = nlohmann::ordered_json::array();
+    for (const auto& [name, shift_px] : fit->things_off)
+      of_model["things_off"].push_back({{"name", name}, {"shift", shift_px}});
+  }
   // A device's name, or what a tracker has read, need not be UTF-8.
   return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

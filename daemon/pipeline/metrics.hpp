@@ -37,6 +37,8 @@ struct ModelFit {
   double median_px = 0;  // >= 0
   double most_px = 0;    // 90 % of the edges are nearer
   double shift_px = 0;   // of the whole model
+  // Things that are off while the rest fits, by name, and by how much, px; the worst first.
+  std::vector<std::pair<std::string, double>> things_off;
 };
 
 struct MetricsSnapshot {
@@ -156,7 +158,8 @@ class DeviceCounts {
 //  "dropped": {"newer frame": ...}}}, "counts": {...},
 //  "devices": {"observer": {"lost": ..., "stream missing packets": ...}},
 //  "passes": {"extend": {"runs": ..., "busy_s": ...}}, "latency_s": {"p50": ..., "p99": ...},
-//  "model_fit_px": {"median": ..., "of_90_percent": ..., "shift": ...}}; the last is null if absent
+//  "model_fit_px": {"median": ..., "of_90_percent": ..., "shift": ...,
+//                   "things_off": [{"name": ..., "shift": ...}]}}; the last is null if absent
 std::string to_json(const MetricsSnapshot& snapshot);
 
 // Returns the smallest value that at least `fraction` (0..1) of the values do not exceed; 0 if

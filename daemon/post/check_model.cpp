@@ -6,6 +6,7 @@
 #include <ostream>
 
 #include "daemon/pipeline/track_stage.hpp"
+#include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::post {
@@ -83,6 +84,13 @@ void describe_fit(const fit::Figure& figure, const set::Set& set, std::ostream& 
 
 void remark_on_fit(const fit::Figure& figure, const set::Set& set, set::Findings& findings) {
   if (!has_real(set)) return;
+  for (const fit::ThingOff& thing : figure.things_off)
+    findings.remarks.push_back(fmt::format(
+        "\"{}\" is {:.1f} px beside the pictures' edges, by {} of it, while the rest of the model "
+        "fits: it was moved, or its place in the model is wrong. Put it back, or measure its place "
+        "again",
+        set::printable(thing.name), thing.shift_px, pieces(thing.pieces)));
+  if (!figure.things_off.empty()) return;
   const double off_px = fit::off_px(figure);
   if (off_px > fit::most_off_px)
     findings.remarks.push_back(fmt::format(

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "daemon/set/names.hpp"
+#include "daemon/set/problems.hpp"
 
 namespace previz::rig {
 namespace {
@@ -91,7 +92,7 @@ OsdText tracking_words(const PictureFacts& picture) {
 }
 
 OsdTone tone_of(const fit::Figure& figure) {
-  if (fit::off_px(figure) > fit::most_off_px) return OsdTone::alarm;
+  if (!figure.things_off.empty() || fit::off_px(figure) > fit::most_off_px) return OsdTone::alarm;
   return OsdTone::plain;
 }
 
@@ -121,6 +122,18 @@ void add_notices(const RigFacts& rig, const PictureFacts* picture, OsdPage& page
     page.notices.push_back({words_of(*rig.fit), tone_of(*rig.fit)});
   for (const report::Notice& news : rig.news)
     page.notices.push_back({line_of(news), tone_of(news.severity)});
+}
+
+std::string pixels(double px) {
+  return fmt::format("{:.{}f} px", px, px < 9.95 ? 1 : 0);
+}
+
+std::string words_of(const std::vector<fit::ThingOff>& things) {
+  std::string text = fmt::format("\"{}\" off by {}: moved, or misplaced in the model",
+                                 set::printable(things[0].name), pixels(things[0].shift_px));
+  if (things.size() > 1)
+    text += "; " + counted(static_cast<int>(things.size() - 1), "other thing") + " off";
+  return text;
 }
 
 // Two digits of what takes little, and one of what takes long.
@@ -189,10 +202,10 @@ PictureFacts facts_of(const pipeline::Shot& shot) {
 
 std::string words_of(const fit::Figure& figure) {
   if (!figure.off) return "model: no figure: " + figure.why;
+  if (!figure.things_off.empty()) return words_of(figure.things_off);
   const double off_px = fit::off_px(figure);
   if (off_px > fit::most_off_px)
-    return fmt::format("model off by {:.{}f} px: check phantom or tags", off_px,
-                       off_px < 9.95 ? 1 : 0);
+    return fmt::format("model off by {}: check phantom or tags", pixels(off_px));
   return fmt::format("model {:.1f} px (90 % {:.1f})", figure.off->median_px, figure.off->most_px);
 }
 

@@ -56,8 +56,8 @@ struct RigFacts {
   std::optional<fit::Figure> fit;           // of the model; none: the guides are off
 };
 
-// Returns "model 0.3 px (90 % 0.8)", or what is wrong: that the model is off, or why there is no
-// figure.
+// Returns "model 0.3 px (90 % 0.8)", or what is wrong: that a thing of the model or all of it is
+// off, or why there is no figure.
 std::string words_of(const fit::Figure& figure);
 
 // Returns the overlay's words. `picture` is null before the first picture.

@@ -53,6 +53,43 @@ TEST(RealModel, KnowsWhereAThingStandsOnAnother) {
   EXPECT_EQ(touched, 4u);
 }
 
+// Printed tags lie on things, and are none: the crew does not measure their places by hand.
+TEST(RealModel, NamesItsThingsAsTheSetAndItsFilesDo) {
+  RealScene real({cube, test::table(), test::box({1, 0, 0}, test::cube_size),
+                  test::box({2, 0, 0}, test::cube_size), test::box({3, 0, 0}, test::cube_size)});
+  const std::vector<std::string> nodes = {"Cube.001", "table", "red cube", "red cube", "tag 3"};
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    real.scene.instances[i].name = nodes[i];
+    real.scene.instances[i].object = i == 0 ? 0 : 1;
+  }
+  real.scene.instances[4].tag = scene::TagPart::printed;
+  real.set.objects[0].name = "crate";
+  real.set.objects[1].name = "set";
+  const auto model = real.model();
+  EXPECT_EQ(model.things(), (std::vector<std::string>{"crate", "table", "red cube"}));
+  const std::vector<std::size_t> of_instances = {0, 1, 2, 2, fit::no_thing};
+  for (const fit::ModelEdge& edge : model.edges()) {
+    const double x = 0.5 * (edge.a.x + edge.b.x);
+    const bool is_of_table = std::max(std::abs(edge.a.x), std::abs(edge.b.x)) == 4;
+    EXPECT_EQ(edge.thing, is_of_table ? 1 : of_instances[x < 0.5 ? 0 : 1 + std::size_t(x + 0.2)])
+        << x;
+  }
+}
+
+// Where things meet, neither's edge is its own; and what lies in one line is not one edge.
+TEST(RealModel, EdgesOfTwoThingsAreOfNone) {
+  const RealScene apart({test::sheet({{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}}),
+                         test::sheet({{{1, 0, 0}, {1, 0, 1}, {1, 1, 1}, {1, 1, 0}}})});
+  std::size_t of_none = 0;
+  const auto folded = apart.model();
+  for (const fit::ModelEdge& edge : folded.edges()) of_none += edge.thing == fit::no_thing;
+  EXPECT_EQ(folded.edges().size(), 7u);
+  EXPECT_EQ(of_none, 1u);
+  const RealScene in_line({test::sheet({{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}}),
+                           test::sheet({{{1, 1, 0}, {2, 1, 0}, {2, 2, 0}, {1, 2, 0}}})});
+  EXPECT_EQ(in_line.model().edges().size(), 8u);
+}
+
 TEST(RealModel, OfNothingHidesNothing) {
   const auto model = RealScene().model();
   EXPECT_TRUE(model.edges().empty());

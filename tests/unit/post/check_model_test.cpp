@@ -11,8 +11,10 @@ namespace previz::post::check_model_test {
 constexpr double focal_px = 800, half_side_m = 0.15;
 constexpr int frames = 5;
 
-// A card of 0.3 m, seen from a metre above.
-Frame picture_of_card(double card_light) {
+constexpr double small_half_m = 0.075, small_right_px = -220;
+
+// A card of 0.3 m, seen from a metre above; a small one may lie left of it.
+Frame picture_of_card(double card_light, bool has_small) {
   test::LinearPicture light{640, 480, std::vector<double>(std::size_t{640} * 480, 0.3)};
   constexpr double half = focal_px * half_side_m;
   add_polygon(light,
@@ -21,6 +23,12 @@ Frame picture_of_card(double card_light) {
                {319.5 + half, 239.5 + half},
                {319.5 - half, 239.5 + half}},
               card_light - 0.3);
+  if (has_small) {
+    constexpr double x = 319.5 + small_right_px, s = focal_px * small_half_m;
+    add_polygon(light,
+                {{x - s, 239.5 - s}, {x + s, 239.5 - s}, {x + s, 239.5 + s}, {x - s, 239.5 + s}},
+                0.3);
+  }
   std::mt19937 random(1);
   return expose(light, test::Sensor{}, random);
 }
@@ -41,12 +49,16 @@ class CheckModel : public testing::Test {
     info.observer->intrinsics = test::plain_lens(640, 480, focal_px);
     session::SessionWriter writer(take_, info);
     writer.add_asset("card.gltf", card);
+    if (has_small_) {
+      test::write_square(directory_ / "small.gltf", 2 * small_half_m, 0);
+      writer.add_asset("small.gltf", directory_ / "small.gltf");
+    }
     Frame light;
     light.source = "light";
     light.width = light.height = 16;
     light.bytes.resize(frame_bytes(light.format, light.width, light.height));
     writer.write(light);
-    Frame frame = picture_of_card(card_light);
+    Frame frame = picture_of_card(card_light, has_small_);
     frame.source = "observer";
     for (int i = 0; i < frames; ++i) {
       frame.timestamp_ns = 1'000'000 + i * test::small_take_interval_ns;
@@ -73,6 +85,15 @@ class CheckModel : public testing::Test {
            std::to_string(-off_px / focal_px) + ", 0.0]\n";
   }
 
+  // The small card's phantom, which is so many pixels right of it and as many below it.
+  static std::string small_phantom(double off_px) {
+    return "[[object]]\nname = 'small card'\nfile = 'small.gltf'\npresence = 'phantom'\n"
+           "position_m = [" +
+           std::to_string((small_right_px + off_px) / focal_px) + ", " +
+           std::to_string(-off_px / focal_px) + ", 0.0]\n";
+  }
+
+  bool has_small_ = false;  // in pictures, and as a file
   test::TemporaryDirectory directory_;
   const std::filesystem::path take_ = directory_ / "take";
 };
@@ -95,6 +116,30 @@ TEST_F(CheckModel, SaysWhatToDoIfItIsOff) {
   EXPECT_THAT(said, HasSubstr("the model of what is real is 4.2 px beside the pictures' edges"));
   EXPECT_THAT(said, HasSubstr("action `guides`"));
   EXPECT_THAT(said, HasSubstr("`previzd calibrate tags`"));
+}
+
+// The small card's sides are 120 px long: three pieces each, in five frames.
+TEST_F(CheckModel, NamesTheThingThatIsOffWhileTheRestFits) {
+  has_small_ = true;
+  write_take(phantom(0) + small_phantom(3));
+  const std::string said = checked();
+  EXPECT_THAT(said, HasSubstr("model: 180 of 180 pieces of edges in 5 frames are 0.0"));
+  EXPECT_THAT(said, HasSubstr("\"small card\" is 4.2 px beside the pictures' edges, by 60 pieces "
+                              "of edges of it, while the rest of the model fits: it was moved, or "
+                              "its place in the model is wrong"));
+  EXPECT_THAT(said, Not(HasSubstr("the model of what is real is")));
+  EXPECT_THAT(said, Not(HasSubstr("\"card\" is")));
+}
+
+TEST_F(CheckModel, NamesNoThingIfAllFitOrAllAreOff) {
+  has_small_ = true;
+  write_take(phantom(0) + small_phantom(0));
+  EXPECT_THAT(checked(), Not(HasSubstr("beside the pictures' edges")));
+  std::filesystem::remove_all(take_);
+  write_take(phantom(3) + small_phantom(3));
+  const std::string said = checked();
+  EXPECT_THAT(said, HasSubstr("the model of what is real is 4.2 px beside the pictures' edges"));
+  EXPECT_THAT(said, Not(HasSubstr("card\" is")));
 }
 
 TEST_F(CheckModel, SaysWhatToDoIfThePicturesDoNotShowIt) {

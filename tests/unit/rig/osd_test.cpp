@@ -194,6 +194,23 @@ TEST(OsdWords, AModelThatIsOffIsAlarming) {
   }
 }
 
+TEST(OsdWords, AThingThatIsOffIsNamedAndAlarming) {
+  const PictureFacts picture = tracked();
+  RigFacts rig = in(Mode::live);
+  const auto before = osd_page(rig, &picture, pace).bottom_right.size();
+  rig.fit = figure_of(0.1, 4, 0);
+  rig.fit->things_off = {{"red cube", 4.14, 20}};
+  OsdPage page = osd_page(rig, &picture, pace);
+  EXPECT_EQ(
+      page.notices,
+      (Texts{{"\"red cube\" off by 4.1 px: moved, or misplaced in the model", OsdTone::alarm}}));
+  EXPECT_EQ(page.bottom_right.size(), before);
+  rig.fit->things_off.push_back({"chair", 2.5, 20});
+  rig.fit->things_off.push_back({"b\n", 2.5, 20});
+  EXPECT_EQ(words_of(*rig.fit),
+            "\"red cube\" off by 4.1 px: moved, or misplaced in the model; 2 other things off");
+}
+
 TEST(OsdWords, SayWhyThereIsNoFigureOfTheModel) {
   const PictureFacts picture = tracked();
   RigFacts rig = in(Mode::live);
