@@ -5,6 +5,7 @@
 #include <glm/mat4x4.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/fit/real_model.hpp"
@@ -37,14 +38,16 @@ double off_px(const Figure& figure);
 
 class Measurement {
  public:
-  // Both must outlive this.
-  Measurement(const RealModel& model, const ObserverCalibration& camera)
-      : model_(model), camera_(camera) {}
+  // The model and the camera must outlive this. `things` is that of an earlier measurement of the
+  // same model, which is gone on with.
+  Measurement(const RealModel& model, const ObserverCalibration& camera, Things things = {})
+      : model_(model), camera_(camera), things_(std::move(things)) {}
 
   // The frame is of the size that the camera is calibrated for.
   void look(const Frame& frame, const glm::dmat4& world_from_camera);
 
   Figure figure() const;
+  const Things& things() const { return things_; }
 
  private:
   const RealModel& model_;

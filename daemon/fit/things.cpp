@@ -17,20 +17,33 @@ constexpr double clearly = 0.3;
 
 void Things::look(const std::map<std::size_t, ThingVotes>& things, const Votes& all,
                   const std::vector<Looked>& found) {
+  JudgedThings& judged_now = frames_.emplace_back();
+  if (frames_.size() > frames_judged) frames_.pop_front();
   for (const auto& [number, thing] : things) {
     if (number == no_thing || thing.votes.pieces() == 0) continue;
     const auto rest = shift_of_rest(number, all.without(thing.votes), found);
     if (!rest) continue;
-    Judged& judged = judged_[number];
-    judged.looked_at += thing.looked_at;
+    Judged& judged = judged_now[number];
+    judged.looked_at = thing.looked_at;
     for (const Looked& looked : found)
       if (looked.thing == number) judged.pieces.push_back({looked, *rest});
   }
 }
 
+Things::JudgedThings Things::judged() const {
+  JudgedThings all;
+  for (const JudgedThings& frame : frames_)
+    for (const auto& [number, judged] : frame) {
+      Judged& sum = all[number];
+      sum.looked_at += judged.looked_at;
+      sum.pieces.insert(sum.pieces.end(), judged.pieces.begin(), judged.pieces.end());
+    }
+  return all;
+}
+
 std::vector<ThingOff> Things::off(const std::vector<std::string>& names) const {
   std::vector<ThingOff> all;
-  for (const auto& [number, judged] : judged_) {
+  for (const auto& [number, judged] : judged()) {
     const double count = double(judged.pieces.size());
     if (judged.pieces.size() < least_pieces) continue;
     std::vector<Looked> pieces;

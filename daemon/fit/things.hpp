@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <map>
 #include <string>
 #include <vector>
@@ -15,7 +16,7 @@ namespace previz::fit {
 struct ThingOff {
   std::string name;
   double shift_px = 0;     // in the pictures, the mean of its pieces
-  std::size_t pieces = 0;  // that were found of it, in all frames in which the rest fits
+  std::size_t pieces = 0;  // that were found of it, in the frames in which the rest fits
 };
 
 // What one frame shows of a thing.
@@ -24,7 +25,10 @@ struct ThingVotes {
   Votes votes;  // of the pieces that were found
 };
 
-// A thing is off if its pieces of all frames
+// So many frames, the last ones, decide on a thing: one alone mostly shows too little of it.
+inline constexpr std::size_t frames_judged = 5;
+
+// A thing is off if its pieces of these frames
 // - agree on a way of it in the world that is more than most_off_px in the pictures, and most of
 //   those that were looked at do,
 // - lie clearly worse where the model says, and where the rest of the model is (RestShift),
@@ -48,7 +52,11 @@ class Things {
     std::size_t looked_at = 0;
     std::vector<Piece> pieces;
   };
-  std::map<std::size_t, Judged> judged_;
+  using JudgedThings = std::map<std::size_t, Judged>;
+
+  JudgedThings judged() const;  // in all frames
+
+  std::deque<JudgedThings> frames_;
 };
 
 }  // namespace previz::fit

@@ -12,7 +12,7 @@
 namespace previz::post {
 namespace {
 
-constexpr std::size_t frames_looked_at = 5;
+constexpr std::size_t frames_looked_at = fit::frames_judged;
 
 bool has_real(const set::Set& set) {
   return std::ranges::any_of(set.objects, [](const set::Object& object) {

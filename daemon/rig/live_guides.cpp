@@ -70,7 +70,9 @@ void LiveGuides::run() {
   while (!seen_.finished()) {
     const std::optional<Seen> seen = seen_.pop_for(look_interval);
     if (!parts_.look.get()->guides) {
-      if (figure()) publish(std::nullopt);
+      if (!figure()) continue;
+      things_ = {};
+      publish(std::nullopt);
     } else if (seen || !*model_->get()) {
       keeper.attempt([&] {
         if (!*model_->get()) make_model();
@@ -92,8 +94,9 @@ void LiveGuides::measure(const Seen& seen) {
   }
   const auto begin = Clock::now();
   const ModelPtr model = *model_->get();
-  fit::Measurement measurement(model->real(), model->camera());
+  fit::Measurement measurement(model->real(), model->camera(), std::move(things_));
   measurement.look(*seen.frame, *seen.world_from_camera);
+  things_ = measurement.things();
   publish(measurement.figure());
   parts_.kept.metrics.worked(stage_name,
                              std::chrono::duration<double>(Clock::now() - begin).count());

@@ -263,6 +263,27 @@ TEST(ModelFigure, NamesWhatIsOffInMostFrames) {
   }
 }
 
+// What was put back is off no more after so many frames.
+TEST(ModelFigure, NamesThingsByTheLastFrames) {
+  const fit::RealModel model = model_of(boxes()).model();
+  const ObserverCalibration camera = test::camera_of_tests();
+  auto moved = boxes();
+  moved[0].low += way_of(5, moved[0].low, {1, 0, 0});
+  fit::Things things;
+  const auto names_after = [&](const std::vector<Box>& drawn) {
+    fit::Measurement measurement(model, camera, things);
+    measurement.look(picture_of(drawn), test::place_of_camera());
+    things = measurement.things();
+    return names_of(measurement.figure());
+  };
+  EXPECT_EQ(names_after(moved), "red;");
+  std::string names;
+  for (std::size_t i = 0; i < fit::frames_judged; ++i) names = names_after(boxes());
+  EXPECT_EQ(names, "");
+  for (std::size_t i = 0; i < fit::frames_judged; ++i) names = names_after(moved);
+  EXPECT_EQ(names, "red;");
+}
+
 TEST(ModelFigure, IsOfAllFrames) {
   const fit::RealModel model = RealScene({test::sheet(card(0))}).model();
   const ObserverCalibration camera = test::camera_of_tests();
