@@ -1,11 +1,13 @@
 #include "daemon/command_line.hpp"
 #include "daemon/post/sample_ranges.hpp"
+#include "daemon/set/problems.hpp"
 #include "daemon/trade/axes.hpp"
 #include "drivers/error.hpp"
 
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace previz {
 namespace {
@@ -309,6 +311,21 @@ void add_commands(CLI::App& app, CommandLine& said) {
                        "(default: the set's output.directory)");
   });
   add_takes(app, said.takes);
+}
+
+std::string meant_option(const CLI::App& app) {
+  for (const CLI::App* command : app.get_subcommands())
+    if (const std::string meant = meant_option(*command); !meant.empty()) return meant;
+  std::vector<std::string> known;
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& name : option->get_lnames()) known.push_back(name);
+  for (const std::string& given : app.remaining()) {
+    if (!given.starts_with("--")) continue;
+    const std::string name = given.substr(2, given.find('=') - 2);
+    if (const std::string near = set::nearest(name, known); !near.empty())
+      return "did you mean --" + near + "?";
+  }
+  return "";
 }
 
 }  // namespace previz

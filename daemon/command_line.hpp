@@ -46,4 +46,8 @@ struct CommandLine {
 // outlive `app`.
 void add_commands(CLI::App& app, CommandLine& said);
 
+// Returns "did you mean --hide-tags?" for the first option that `app` was given and does not know,
+// if it has one of a similar name; otherwise "". `app` has refused what it parsed last.
+std::string meant_option(const CLI::App& app);
+
 }  // namespace previz

@@ -168,7 +168,9 @@ int main(int argc, char** argv) {
     if (app.got_subcommand("trade")) return do_trade(said.trade, stop);
     return do_run(said.run, stop);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    if (app.exit(error) == 0) return 0;
+    if (const std::string meant = meant_option(app); !meant.empty()) std::cerr << meant << '\n';
+    return 2;
   } catch (const std::exception& error) {
     report_end(error);
     return 1;

@@ -56,6 +56,22 @@ TEST(CommandLine, SaysBothSidesOfAChoice) {
   EXPECT_EQ(render_options("--noisy").denoise, false);
 }
 
+TEST(CommandLine, AnUnknownOptionHasTheOneThatIsMeant) {
+  const auto meant = [](const std::string& arguments) {
+    CLI::App app;
+    CommandLine said;
+    add_commands(app, said);
+    EXPECT_THROW(app.parse(arguments, false), CLI::ParseError);
+    return meant_option(app);
+  };
+  EXPECT_EQ(meant("render session --adaptiv"), "did you mean --adaptive?");
+  EXPECT_EQ(meant("render session --neighbour=3"), "did you mean --neighbours?");
+  EXPECT_EQ(meant("calibrate tags session --ot out.toml"), "did you mean --out?");
+  EXPECT_EQ(meant("--log-levl info run set.toml"), "did you mean --log-level?");
+  EXPECT_EQ(meant("render session --nothing-like-it"), "");
+  EXPECT_EQ(meant("render session more"), "");
+}
+
 TEST(CommandLine, APictureHasUpToFourNeighboursOnEitherSide) {
   EXPECT_EQ(render_options("--neighbours 0").neighbours, 0);
   EXPECT_EQ(render_options("--neighbours 4").neighbours, 4);
