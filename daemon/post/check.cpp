@@ -69,7 +69,8 @@ int refuse(const std::vector<std::string>& problems, std::ostream& out) {
 
 void describe(const set::CheckedSet& checked, const scene::Scene& scene, std::ostream& out) {
   const set::Set& set = checked.set;
-  out << set.name << " (" << set.file.string() << ") is valid\n";
+  out << set.name << " ("
+      << (checked.is_take ? "the set recorded with the take" : set.file.string()) << ") is valid\n";
   set::describe_cameras(set, out);
   tracking::describe(set.tracking, out);
   scene::describe_objects(set, scene, out);

@@ -102,6 +102,7 @@ class CheckModel : public testing::Test {
 TEST_F(CheckModel, SaysHowFarItIsFromThePictures) {
   write_take(phantom(0));
   const std::string said = checked();
+  EXPECT_THAT(said, testing::StartsWith("card (the set recorded with the take) is valid\n"));
   EXPECT_THAT(said, HasSubstr("\nmodel: 120 of 120 pieces of edges in 5 frames are 0.0"));
   EXPECT_THAT(said, HasSubstr(" px off in the median, and 90 % of them by at most 0.0"));
   EXPECT_THAT(said, Not(HasSubstr("beside the pictures' edges")));
