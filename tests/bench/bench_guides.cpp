@@ -55,6 +55,8 @@ void run(const Options& options) {
   const output::GuidePainter painter(mode.width, mode.height, DisplayScale::letterbox);
   pipeline::TrackStage track(take.set, take.observer, take.session.track, pipeline::start_of(take));
   Spent spent;
+  fit::Things things;
+  std::size_t found = 0;
   for (std::size_t i = 0; i < take.observer_stream->records().size(); ++i) {
     pipeline::Shot shot;
     shot.index = i;
@@ -79,10 +81,13 @@ void run(const Options& options) {
                      display->show({plate, i % 2 == 0 ? tiles : std::vector<Overlay>()});
                    }).cpu_ms);
     spent.figure.push_back(time_of([&] {
-                             fit::Measurement measurement(model->real(), take.observer);
+                             fit::Measurement measurement(model->real(), take.observer, things);
                              measurement.look(*shot.frame, shot.track.pose->world_from_camera);
+                             found += measurement.figure().found;
+                             things = measurement.things();
                            }).cpu_ms);
   }
+  if (found == 0) std::printf("no edge of light was found\n");
   print(model_ms, spent);
   if (!options.picture.empty()) output::write_png(options.picture, display->read_back());
 }
