@@ -459,9 +459,10 @@ std::vector<Part> values_of(const Drafts<Part>& drafts) {
 }
 
 // Where [[picture]] is forgotten, its points are a second table of the picture before.
-toml::table parsed(const std::string& text, const std::string& file, Problems& problems) {
+toml::table parsed(const std::string& text, const std::string& file,
+                   const std::vector<Section>& sections, Problems& problems) {
   try {
-    return set::parse_toml(text, file, problems);
+    return set::parse_toml(text, file, sections, problems);
   } catch (const Error& error) {
     const std::string what = error.what();
     const bool is_second = what.find("'picture.points'") != std::string::npos;
@@ -488,7 +489,8 @@ Parts parse_parts(const std::string& text, const std::filesystem::path& file) {
     Draft scratch;
     return set::home_among(sections(scratch), key);
   };
-  set::read_tables(parsed(text, file.string(), problems), sections(draft), home_of, problems);
+  const std::vector<Section> all = sections(draft);
+  set::read_tables(parsed(text, file.string(), all, problems), all, home_of, problems);
   problems.throw_if_any();
   Checker(draft, problems).check();
   problems.throw_if_any();

@@ -26,7 +26,8 @@ std::string home_of(const std::string& key) {
 void read_over(Draft& draft, const Overlay& with, const std::string& text, Problems& problems) {
   const auto lines = static_cast<std::uint32_t>(std::ranges::count(text, '\n') + 1);
   problems.go_on_with(with.file.string(), lines);
-  toml::table root = parse_toml(std::string(lines, '\n') + with.text, with.file.string(), problems);
+  toml::table root = parse_toml(std::string(lines, '\n') + with.text, with.file.string(),
+                                sections(draft), problems);
   constexpr std::string_view allowed[] = {"quality", "estimator", "lighting"};
   std::vector<std::string> others;
   for (const auto& [name, node] : root)
@@ -47,7 +48,8 @@ Set parse_set(const std::string& text, const std::filesystem::path& file, const 
               Origin origin, const std::optional<Overlay>& with) {
   Problems problems(file.string());
   Draft draft;
-  read_tables(parse_toml(text, file.string(), problems), sections(draft), home_of, problems);
+  const std::vector<Section> all = sections(draft);
+  read_tables(parse_toml(text, file.string(), all, problems), all, home_of, problems);
   if (with) read_over(draft, *with, text, problems);
   auto set = resolve(std::move(draft), file, assets, origin, problems);
   problems.throw_if_any();

@@ -1,6 +1,8 @@
 #include "daemon/set/read_tables.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <sstream>
 #include <utility>
 
 #include "drivers/keys/toml_value.hpp"
@@ -119,6 +121,45 @@ class Reader {
   Problems& problems_;
 };
 
+// Returns where a header is first, "[tag]" for example; the file's beginning if it is nowhere.
+Position first_header(const std::string& text, const std::string& header) {
+  Position at;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line); ++at.line) {
+    const std::size_t begin = line.find_first_not_of(" \t");
+    if (begin == std::string::npos || line.compare(begin, header.size(), header) != 0) continue;
+    at.column = static_cast<std::uint32_t>(begin + 1);
+    return at;
+  }
+  return {};
+}
+
+// The parser takes what comes first for right, and reports the second: [tag] after a [[tag]], or
+// the other way round. Adds the problem where the brackets are not those of the section, if that is
+// what the parser means.
+bool add_other_brackets(const std::string& what, const std::string& text,
+                        const std::vector<Section>& sections, Problems& problems) {
+  const std::size_t begin = what.find('\''), end = what.rfind('\'');
+  if (what.find("cannot redefine existing") == std::string::npos || begin >= end) return false;
+  const std::string path = what.substr(begin + 1, end - begin - 1);
+  const auto section = std::ranges::find(sections, path, &Section::path);
+  if (section == sections.end() || what.find("array") == std::string::npos) return false;
+  const std::string one = '[' + path + ']', many = '[' + one + ']';
+  if (section->kind != Section::Kind::repeated) {
+    problems.add(first_header(text, many), path,
+                 "is one table; allowed: all its keys under one " + one);
+    return true;
+  }
+  std::vector<std::string> single;
+  for (const Section& other : sections)
+    if (other.kind != Section::Kind::repeated) single.push_back(other.path);
+  const std::string meant = nearest(path, single);
+  problems.add(first_header(text, one), path,
+               "is a list of tables; allowed: " + many +
+                   (meant.empty() ? "" : "; did you mean [" + meant + "]?"));
+  return true;
+}
+
 }  // namespace
 
 std::string home_among(const std::vector<Section>& sections, const std::string& key) {
@@ -130,12 +171,14 @@ std::string home_among(const std::vector<Section>& sections, const std::string& 
   return "";
 }
 
-toml::table parse_toml(const std::string& text, const std::string& file, Problems& problems) {
+toml::table parse_toml(const std::string& text, const std::string& file,
+                       const std::vector<Section>& sections, Problems& problems) {
   try {
     return toml::parse(text, file);
   } catch (const toml::parse_error& error) {
-    problems.add(position(error.source()), "",
-                 "not valid TOML: " + std::string(error.description()));
+    const std::string what(error.description());
+    if (!add_other_brackets(what, text, sections, problems))
+      problems.add(position(error.source()), "", "not valid TOML: " + what);
     problems.throw_if_any();
     throw;
   }

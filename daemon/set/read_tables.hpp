@@ -18,8 +18,10 @@ using Homes = std::function<std::string(const std::string& key)>;
 // Looks among these sections, each of which is opened for it.
 std::string home_among(const std::vector<Section>& sections, const std::string& key);
 
-// Parses TOML text; throws previz::Error naming file and line if it is none.
-toml::table parse_toml(const std::string& text, const std::string& file, Problems& problems);
+// Parses TOML text; throws previz::Error naming file and line if it is none, or if a table of these
+// sections has the other kind of brackets.
+toml::table parse_toml(const std::string& text, const std::string& file,
+                       const std::vector<Section>& sections, Problems& problems);
 
 // Reads the whole file into what the sections are bound to. An unknown key, a value that is not
 // allowed and a required key that is missing become problems, each with what is allowed in its

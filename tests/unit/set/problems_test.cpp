@@ -54,6 +54,14 @@ const Mistake syntax[] = {
     {"[quality]\nsamples = 1\nsamples = 2\n", "3:", "not valid TOML"},
     {"\n\n[set]\nname = \"a\n", "4:10: not valid TOML", ""},
     {"[set]\nname = \"\xff\"\n", "2:", "not valid TOML"},
+    {TAG "[tag]\nhide=true\n", "4:1: tag: is a list of tables; allowed: [[tag]]",
+     "did you mean [tags]?"},
+    {"[set]\n  [tag]\nhide=true\n" TAG, "2:3: tag: is a list of tables", "did you mean [tags]?"},
+    {"[[object]]\nname='v'\n[object]\n", "3:1: object: is a list of tables; allowed: [[object]]",
+     ""},
+    {"[quality]\nsamples = 1\n[[quality]]\n", "3:1: quality: is one table",
+     "all its keys under one [quality]"},
+    {"[[quality]]\n[quality]\n", "1:1: quality: is one table", ""},
 };
 INSTANTIATE_TEST_SUITE_P(Syntax, SetMistake, testing::ValuesIn(syntax));
 
