@@ -1,0 +1,27 @@
+// Checks and decodes pictures from elsewhere, PNG and JPEG, without trusting what they claim.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace previz::scene {
+
+struct PictureSize {
+  int width = 0, height = 0;  // at least 1, at most max_texture_side
+};
+
+// Returns the size of a PNG or JPEG whose bytes may be decoded. Throws previz::Error, "WHERE: ...":
+// it is of another kind or damaged, a side is too long, or it claims more than its bytes can hold.
+PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std::string& where);
+
+// Returns why the last picture of this thread could not be decoded.
+std::string picture_failure();
+
+// Returns the luma of each pixel as encoded in the picture (sRGB), row-major from the top.
+// `bytes` must have passed checked_picture_size. Throws previz::Error, "WHERE: ...".
+std::vector<std::uint8_t> decoded_luma(std::span<const unsigned char> bytes,
+                                       const std::string& where);
+
+}  // namespace previz::scene
