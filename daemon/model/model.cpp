@@ -371,7 +371,8 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   const Fit fit = adjust_to_edges(parts, views, start, camera.response);
   print_fit(parts, start.layout, fit, out);
   print_faces(fit, out);
-  const std::vector<NamedMesh> scans = place_scans(parts, start.layout, fit.shape, scan_files, out);
+  const std::vector<NamedMesh> scans =
+      place_scans(parts, start.layout, fit.shape, scan_files, set.tracking, out);
   const std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
   const std::string model = coloured_model(options, set, {parts, views, start.layout, fit.shape},
                                            solids, scans, camera.response, out);

@@ -427,10 +427,11 @@ class Checker {
   }
 
   void check(const Given& given, const Given& points_given, const ScanPart& s) {
-    if (s.points.size() < 3)
+    if (!s.points.empty() && s.points.size() < 3)
       add(given, "points",
           fmt::format("scan \"{}\" has {} points, and needs 3 that are marked in pictures; give "
-                      "the scan's own coordinates of them under [scan.points]",
+                      "the scan's own coordinates of them under [scan.points], or remove "
+                      "[scan.points] to place the scan by the set's tags that its colours show",
                       s.name, s.points.size()));
     for (const ScanPoint& point : s.points) {
       points(points_given, point.name, {point.name}, 2);

@@ -89,7 +89,8 @@ struct ScanPoint {
   glm::dvec3 at{0};  // in the scan's own coordinates and unit
 };
 
-// A mesh of a real thing, from a scanner or from photogrammetry, placed by points that are marked.
+// A mesh of a real thing, from a scanner or from photogrammetry, placed by points that are marked,
+// or, without points, by the set's tags that its colours show.
 struct ScanPart {
   std::string name;
   std::filesystem::path file;

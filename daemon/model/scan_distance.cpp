@@ -1,13 +1,10 @@
 #include "daemon/model/scan_distance.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <string>
 
-#include "drivers/embree.hpp"
-#include "drivers/error.hpp"
+#include "daemon/model/embree_surface.hpp"
 
 namespace previz::model {
 namespace {
@@ -32,18 +29,12 @@ glm::dvec3 nearest_of_triangle(const glm::dvec3& p, const glm::dvec3& a, const g
   return a + (vb * ab + vc * ac) / (va + vb + vc);
 }
 
-struct ReleaseEmbree {
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-};
-
 }  // namespace
 
 struct SurfaceDistance::Impl {
   const std::vector<glm::vec3>& positions;
   const std::vector<unsigned>& indices;
-  std::unique_ptr<RTCDeviceTy, ReleaseEmbree> device{rtcNewDevice(nullptr)};
-  std::unique_ptr<RTCSceneTy, ReleaseEmbree> scene{rtcNewScene(device.get())};
+  EmbreeSurface embree{positions, indices, Faces::both};
 
   struct Query {
     const Impl* surface = nullptr;
@@ -71,23 +62,7 @@ struct SurfaceDistance::Impl {
 
 SurfaceDistance::SurfaceDistance(const std::vector<glm::vec3>& positions,
                                  const std::vector<unsigned>& indices)
-    : impl_(new Impl{positions, indices}) {
-  RTCGeometry geometry = rtcNewGeometry(impl_->device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
-  if (void* vertices =
-          rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
-                                  sizeof(glm::vec3), positions.size()))
-    std::copy_n(positions.data(), positions.size(), static_cast<glm::vec3*>(vertices));
-  if (void* triangles =
-          rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                  3 * sizeof(unsigned), indices.size() / 3))
-    std::copy_n(indices.data(), indices.size(), static_cast<unsigned*>(triangles));
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometry(impl_->scene.get(), geometry);
-  rtcReleaseGeometry(geometry);
-  rtcCommitScene(impl_->scene.get());
-  if (const RTCError error = rtcGetDeviceError(impl_->device.get()); error != RTC_ERROR_NONE)
-    throw Error("Embree cannot build the surface of a scan, error " + std::to_string(error));
-}
+    : impl_(new Impl{positions, indices}) {}
 
 SurfaceDistance::~SurfaceDistance() = default;
 
@@ -98,7 +73,7 @@ double SurfaceDistance::from(const glm::vec3& point, double limit) const {
   RTCPointQuery sphere{point.x, point.y, point.z, 0, static_cast<float>(limit)};
   RTCPointQueryContext context;
   rtcInitPointQueryContext(&context);
-  rtcPointQuery(impl_->scene.get(), &sphere, &context, &Impl::look, &query);
+  rtcPointQuery(impl_->embree.scene(), &sphere, &context, &Impl::look, &query);
   return query.nearest;
 }
 

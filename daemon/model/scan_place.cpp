@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
+#include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::model {
@@ -42,6 +43,10 @@ struct Fitted {
   double rms_m = 0;
   std::vector<double> off_m;
 };
+
+bool are_tags(const Pairs& points) {
+  return !points.empty() && points.front().tag >= 0;
+}
 
 enum class Size { fixed, free };
 enum class Hand { rotation, either };
@@ -109,6 +114,7 @@ void insist_on_spread(const std::string& subject, const Pairs& points) {
         "mark a point beside the line",
         subject, names_of(points), where));
   };
+  if (are_tags(points)) return;  // a tag alone shows how it is turned
   check([](const PointPair& p) { return p.in_scan; }, "in the scan");
   check([](const PointPair& p) { return p.in_world; }, "in the pictures");
 }
@@ -119,7 +125,9 @@ void insist_on_size(const std::string& subject, const Pairs& points, double unit
   const Fitted free = best_fit(points, Size::free, 1, Hand::either);
   const double larger = free.scale / unit_m;
   if (std::max(larger, 1 / larger) < most_scale || worst_of(free) > most_off_m) return;
-  std::string advice = "; check its unit, and that its points are those that are marked";
+  std::string advice = are_tags(points)
+                           ? "; check its unit, and the sizes of the tags in the set"
+                           : "; check its unit, and that its points are those that are marked";
   for (const auto& [name, unit] : names(LengthUnit{}))
     if (std::abs(std::log(free.scale / metres(unit))) < std::log(most_scale))
       advice = fmt::format(": is its unit \"{0}\"? Set unit = \"{0}\"", name);
@@ -143,6 +151,35 @@ std::pair<std::string, double> culprit_of(const Pairs& points, const Fitted& all
         glm::distance(fit.scale * (fit.turn * points[i].in_scan) + fit.shift, points[i].in_world);
   }
   return {points[worst].name, off_m};
+}
+
+// Says which tag is off, if one is without which the others fit.
+void refuse_tags(const std::string& subject, const Pairs& points, double unit_m,
+                 double most_off_m) {
+  std::vector<int> all, culprits;
+  for (const PointPair& p : points)
+    if (std::ranges::find(all, p.tag) == all.end()) all.push_back(p.tag);
+  double off_m = 0;
+  for (const int tag : all) {
+    Pairs others = points;
+    std::erase_if(others, [&](const PointPair& p) { return p.tag == tag; });
+    if (others.empty()) continue;
+    const Fitted fit = best_fit(others, Size::fixed, unit_m, Hand::rotation);
+    if (worst_of(fit) > most_off_m) continue;
+    culprits.push_back(tag);
+    for (const PointPair& p : points)
+      if (p.tag == tag)
+        off_m = std::max(off_m,
+                         glm::distance(fit.scale * (fit.turn * p.in_scan) + fit.shift, p.in_world));
+  }
+  const std::string advice =
+      "; if one was moved after the scan or the measurement, measure the set's tags with previzd "
+      "calibrate tags, or place the scan by points";
+  if (culprits.size() == 1)
+    throw Error(fmt::format("{}: {} is {:.1f} mm from where the other tags put it{}", subject,
+                            tracking::tags_in_words(culprits), 1000 * off_m, advice));
+  throw Error(fmt::format("{}: {} are not where the set has them relative to each other{}", subject,
+                          tracking::tags_in_words(all), advice));
 }
 
 }  // namespace
@@ -169,11 +206,12 @@ Placement place_scan(const std::string& subject, const std::vector<PointPair>& p
   const Fitted fit = best_fit(points, Size::fixed, unit_m, Hand::rotation);
   const Fitted either = best_fit(points, Size::fixed, unit_m, Hand::either);
   if (either.is_mirrored && clearly * either.rms_m < fit.rms_m && fit.rms_m > 0.005 * extent)
-    throw Error(
-        fmt::format("{}: its points fit to {:.1f} mm if the scan is mirrored, but to {:.1f} mm as "
-                    "it is; export it with right-handed axes, without mirroring any of them",
-                    subject, 1000 * either.rms_m, 1000 * fit.rms_m));
+    throw Error(fmt::format(
+        "{}: its {} fit to {:.1f} mm if the scan is mirrored, but to {:.1f} mm as "
+        "it is; export it with right-handed axes, without mirroring any of them",
+        subject, are_tags(points) ? "tags" : "points", 1000 * either.rms_m, 1000 * fit.rms_m));
   if (worst_of(fit) > most_off_m) {
+    if (are_tags(points)) refuse_tags(subject, points, unit_m, most_off_m);
     const auto [name, off_m] = culprit_of(points, fit, unit_m);
     throw Error(fmt::format(
         "{}: point \"{}\" is {:.1f} mm from where the other points put it, more than {:g} % of "

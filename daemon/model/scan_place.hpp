@@ -15,6 +15,7 @@ struct PointPair {
   std::string name;
   glm::dvec3 in_scan{0};   // in the scan's unit
   glm::dvec3 in_world{0};  // metres
+  int tag = -1;            // whose corner it is; -1: a marked point
 };
 
 struct Placement {
@@ -29,7 +30,8 @@ double metres(LengthUnit unit);
 // Least squares by a rotation and a translation (Kabsch 1976; Umeyama 1991, eq. 34-43). Throws
 // previz::Error, "SUBJECT: ...", naming the points at fault: they lie on one line, the scan has
 // another size (with the likely unit), a mirrored scan would fit, or a point is off by more than
-// most_off_fraction of the largest distance between two of them. At least three points.
+// most_off_fraction of the largest distance between two of them. At least three points, all of them
+// marked or all of them corners of tags.
 Placement place_scan(const std::string& subject, const std::vector<PointPair>& points,
                      double unit_m);
 inline constexpr double most_off_fraction = 0.03;

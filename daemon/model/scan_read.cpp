@@ -30,8 +30,8 @@ std::string extension_of(const std::filesystem::path& file) {
 }
 
 // Appends the triangles of a node and of those below it.
-void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
-            TriangleMesh& mesh) {
+void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, TriangleMesh& mesh,
+            ColourReader* colours) {
   const aiMatrix4x4 to_file = parent * node.mTransformation;
   const bool is_mirrored = to_file.Determinant() < 0;  // glTF 2.0, 3.7.4
   for (unsigned m = 0; m < node.mNumMeshes; ++m) {
@@ -41,6 +41,7 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
       const aiVector3D p = to_file * from.mVertices[v];
       mesh.positions.emplace_back(p.x, p.y, p.z);
     }
+    const std::size_t before = mesh.triangles();
     for (unsigned f = 0; f < from.mNumFaces; ++f) {
       const aiFace& face = from.mFaces[f];
       // Indices are as the file has them; one that is out of range stays so.
@@ -50,8 +51,10 @@ void append(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent,
       if (is_mirrored && face.mNumIndices == 3)
         std::swap(mesh.indices[mesh.indices.size() - 2], mesh.indices.back());
     }
+    if (colours) colours->append(from, mesh.triangles() - before);
   }
-  for (unsigned c = 0; c < node.mNumChildren; ++c) append(scene, *node.mChildren[c], to_file, mesh);
+  for (unsigned c = 0; c < node.mNumChildren; ++c)
+    append(scene, *node.mChildren[c], to_file, mesh, colours);
 }
 
 // Releases of Assimp differ in the type.
@@ -89,35 +92,39 @@ void insist_on_triangles(const std::filesystem::path& path, const TriangleMesh& 
 
 }  // namespace
 
-ScanFile read_scan(const std::filesystem::path& path) {
+ScanFile read_scan(const std::filesystem::path& path, Colouring colouring) {
   const std::string extension = extension_of(path);
   if (std::ranges::find(formats, extension) == formats.end())
     throw Error(path.string() + ": is not a scan; allowed: .obj, .ply, .stl, .fbx, .gltf, .glb");
   if (!std::filesystem::is_regular_file(path)) throw Error(path.string() + ": file not found");
   Assimp::Importer importer;
-  for (const char* unneeded :
-       {AI_CONFIG_IMPORT_FBX_READ_MATERIALS, AI_CONFIG_IMPORT_FBX_READ_TEXTURES,
-        AI_CONFIG_IMPORT_FBX_READ_CAMERAS, AI_CONFIG_IMPORT_FBX_READ_LIGHTS,
-        AI_CONFIG_IMPORT_FBX_READ_ANIMATIONS})
+  const bool has_colours = colouring == Colouring::read;
+  for (const char* look : {AI_CONFIG_IMPORT_FBX_READ_MATERIALS, AI_CONFIG_IMPORT_FBX_READ_TEXTURES})
+    importer.SetPropertyBool(look, has_colours);
+  for (const char* unneeded : {AI_CONFIG_IMPORT_FBX_READ_CAMERAS, AI_CONFIG_IMPORT_FBX_READ_LIGHTS,
+                               AI_CONFIG_IMPORT_FBX_READ_ANIMATIONS})
     importer.SetPropertyBool(unneeded, false);
   const aiScene* const scene = importer.ReadFile(path.string(), aiProcess_Triangulate);
   if (!scene || !scene->mRootNode)
     throw Error(path.string() + ": cannot be read: " + printable(importer.GetErrorString()) +
                 "; export it again, as binary PLY for example");
   ScanFile file;
+  ColourReader reader(*scene, path);
+  ColourReader* const colours = has_colours ? &reader : nullptr;
   if (extension == ".fbx") {
     // Some releases of Assimp turn and scale the root by what the metadata says, some do not.
     for (unsigned c = 0; c < scene->mRootNode->mNumChildren; ++c)
-      append(*scene, *scene->mRootNode->mChildren[c], {}, file.mesh);
+      append(*scene, *scene->mRootNode->mChildren[c], {}, file.mesh, colours);
     if (scene->mMetaData) read_fbx_units(*scene->mMetaData, file);
   } else {
-    append(*scene, *scene->mRootNode, {}, file.mesh);
+    append(*scene, *scene->mRootNode, {}, file.mesh, colours);
   }
   if (extension == ".gltf" || extension == ".glb") {
     file.unit_m = 1;
     file.up = {0, 1, 0};
   }
   insist_on_triangles(path, file.mesh);
+  file.colours = reader.take();
   return file;
 }
 

@@ -8,11 +8,14 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "daemon/model/scan_distance.hpp"
 #include "daemon/model/scan_place.hpp"
 #include "daemon/model/scan_simplify.hpp"
+#include "daemon/model/scan_tags.hpp"
+#include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::model {
@@ -33,6 +36,14 @@ glm::dvec3 world_place_of(const std::string& point, const Layout& layout, const 
   return model::place_of(shape, layout.places.at(point));
 }
 
+std::vector<PointPair> marked_pairs(const ScanPart& part, const Layout& layout,
+                                    const Shape& shape) {
+  std::vector<PointPair> points;
+  for (const ScanPoint& point : part.points)
+    points.push_back({point.name, point.at, world_place_of(point.name, layout, shape)});
+  return points;
+}
+
 glm::dvec3 direction_of(UpAxis up) {
   return {up == UpAxis::x, up == UpAxis::y, up == UpAxis::z};
 }
@@ -48,8 +59,9 @@ ScanUnits units_of(const std::string& subject, const ScanPart& part, const ScanF
   std::string missing;
   const auto add = [&](const char* key, const std::string& likely) {
     missing += fmt::format(
-        "{}{}: {} is missing, and {} does not give it; its points fit best with {} = \"{}\"",
-        missing.empty() ? "" : "\n", subject, key, part.file.filename().string(), key, likely);
+        "{}{}: {} is missing, and {} does not give it; its {} fit best with {} = \"{}\"",
+        missing.empty() ? "" : "\n", subject, key, part.file.filename().string(),
+        part.points.empty() ? "tags" : "points", key, likely);
   };
   if (!part.unit && !file.unit_m) add("unit", name_of(likely_unit(points)));
   if (!part.up && !file.up) add("up", name_of(likely_up(points)));
@@ -58,17 +70,31 @@ ScanUnits units_of(const std::string& subject, const ScanPart& part, const ScanF
           part.up ? direction_of(*part.up) : *file.up};
 }
 
-void print_placement(const ScanPart& part, const ScanUnits& units, const Placement& placed,
-                     std::ostream& out) {
-  fmt::print(out,
-             "scan {}: {} points, rms {:.2f} mm; they would fit best at {:.4f} times its size\n",
-             part.name, part.points.size(), 1000 * placed.rms_m, placed.best_scale);
+void print_placement(const ScanPart& part, const std::string& placed_by, const ScanUnits& units,
+                     const Placement& placed, std::ostream& out) {
+  fmt::print(out, "scan {}: {}, rms {:.2f} mm; they would fit best at {:.4f} times its size\n",
+             part.name, placed_by, 1000 * placed.rms_m, placed.best_scale);
   const double tilt = std::acos(std::clamp((placed.rotation * units.up).z, -1.0, 1.0));
   if (tilt > most_tilt)
     fmt::print(out,
                "warning: scan {}: its up axis is {:.0f} degrees from the vertical; check up, and "
-               "that no two of its points are swapped\n",
-               part.name, tilt * 180 / std::numbers::pi);
+               "that {}\n",
+               part.name, tilt * 180 / std::numbers::pi,
+               part.points.empty() ? "the scan is neither mirrored nor inside out"
+                                   : "no two of its points are swapped");
+}
+
+// What is known to half a pixel at the corners of one tag is less certain farther away.
+void print_tags(const ScanPart& part, const ScanTags& tags, double unit_m, std::ostream& out) {
+  for (const std::string& note : tags.notes)
+    fmt::print(out, "warning: scan {}: {}\n", part.name, note);
+  if (tags.ids.size() != 1) return;
+  const double side_m = glm::distance(tags.corners[0].in_world, tags.corners[1].in_world);
+  fmt::print(out,
+             "warning: scan {}: {} is its only tag; 1 m from it the scan is accurate to about "
+             "{:.0f} mm; scan it with two or more tags, far apart\n",
+             part.name, tracking::tags_in_words(tags.ids),
+             std::ceil(1000 * 0.5 * tags.grain * unit_m / side_m));
 }
 
 void print_faults(const std::string& name, const MeshFaults& faults, std::ostream& out) {
@@ -146,24 +172,33 @@ NamedMesh placed_scan(const ScanPart& part, const ScanFile& file, const ScanUnit
 std::vector<ScanFile> read_scans(const Parts& parts) {
   std::vector<ScanFile> files;
   for (const ScanPart& part : parts.scans) {
-    files.push_back(read_scan(part.file));
-    insist_on_surface(subject_of(parts, part), part, files.back());
+    const bool is_by_tags = part.points.empty();
+    files.push_back(read_scan(part.file, is_by_tags ? Colouring::read : Colouring::ignored));
+    if (!is_by_tags) insist_on_surface(subject_of(parts, part), part, files.back());
   }
   return files;
 }
 
 std::vector<NamedMesh> place_scans(const Parts& parts, const Layout& layout, const Shape& shape,
-                                   const std::vector<ScanFile>& files, std::ostream& out) {
+                                   const std::vector<ScanFile>& files,
+                                   const set::Tracking& tracking, std::ostream& out) {
   std::vector<NamedMesh> scans;
   for (std::size_t i = 0; i < parts.scans.size(); ++i) {
     const ScanPart& part = parts.scans[i];
     const std::string subject = subject_of(parts, part);
-    std::vector<PointPair> points;
-    for (const ScanPoint& point : part.points)
-      points.push_back({point.name, point.at, world_place_of(point.name, layout, shape)});
+    std::optional<ScanTags> tags;
+    if (part.points.empty())
+      tags = find_scan_tags(fmt::format("{}, {}", subject, part.file.filename().string()), files[i],
+                            tracking, part.unit ? metres(*part.unit) : files[i].unit_m);
+    const std::vector<PointPair> points = tags ? tags->corners : marked_pairs(part, layout, shape);
     const ScanUnits units = units_of(subject, part, files[i], points);
     const Placement placed = place_scan(subject, points, units.unit_m);
-    print_placement(part, units, placed, out);
+    print_placement(part,
+                    tags ? fmt::format("placed by {} ({} corners)",
+                                       tracking::tags_in_words(tags->ids), points.size())
+                         : fmt::format("{} points", points.size()),
+                    units, placed, out);
+    if (tags) print_tags(part, *tags, units.unit_m, out);
     scans.push_back(placed_scan(part, files[i], units, placed, out));
   }
   return scans;

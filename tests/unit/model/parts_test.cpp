@@ -71,6 +71,13 @@ c = [0, 1, 0]
   EXPECT_EQ(parts.scans[0].points[1].at, glm::dvec3(0.5, 0, 0));
 }
 
+TEST(ModelParts, AScanNeedsNoPoints) {
+  const model::Parts parts =
+      model::parse_parts("[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n", "model.toml");
+  ASSERT_EQ(parts.scans.size(), 1u);
+  EXPECT_THAT(parts.scans[0].points, testing::IsEmpty());
+}
+
 TEST(ModelParts, MistakesAreNamedWithTheirLine) {
   const struct {
     const char* parts;
@@ -107,10 +114,9 @@ TEST(ModelParts, MistakesAreNamedWithTheirLine) {
       {"[[scan]]\nname = \"s\"\n", "scan.file: is missing"},
       {"[[scan]]\nname = \"s\"\nfile = \"s.obj\"\nunit = \"ft\"\n",
        "is not allowed; allowed: \"m\" | \"cm\" | \"mm\" | \"in\""},
-      {"[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n",
-       "scan \"s\" has 0 points, and needs 3 that are marked in pictures"},
       {"[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n[scan.points]\na = [0, 0, 0]\nb = [1, 0, 0]\n",
-       "scan \"s\" has 2 points"},
+       "scan \"s\" has 2 points, and needs 3 that are marked in pictures; give the scan's own "
+       "coordinates of them under [scan.points], or remove [scan.points] to place"},
       {"[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n[scan.points]\na = [0, 0, 0]\nb = [1, 0, "
        "0]\nonce = "
        "[0, 1, 0]\n",

@@ -162,7 +162,7 @@ class Scans : public testing::Test {
     const model::Fit fit = model::adjust(parts_, views, start);
     std::ostringstream out;
     auto scans =
-        model::place_scans(parts_, start.layout, fit.shape, model::read_scans(parts_), out);
+        model::place_scans(parts_, start.layout, fit.shape, model::read_scans(parts_), {}, out);
     report_ = out.str();
     return scans;
   }

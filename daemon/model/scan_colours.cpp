@@ -1,0 +1,155 @@
+#include "daemon/model/scan_colours.hpp"
+
+#include <assimp/scene.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "daemon/scene/picture_bytes.hpp"
+#include "daemon/tracking/photometry.hpp"
+#include "drivers/error.hpp"
+#include "drivers/keys/value.hpp"
+
+namespace previz::model {
+namespace {
+
+// All pictures of a scan together: 64 of 4096 x 4096.
+constexpr std::size_t most_texels = std::size_t{1} << 30;
+constexpr std::uintmax_t most_texture_bytes = std::uintmax_t{1} << 30;
+
+// Returns the path with %20 and the like decoded, as glTF writes it (RFC 3986, 2.1).
+std::string without_escapes(const std::string& path) {
+  std::string plain;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    const auto digit = [&](std::size_t k) {
+      return k < path.size() && std::isxdigit(static_cast<unsigned char>(path[k])) != 0;
+    };
+    if (path[i] == '%' && digit(i + 1) && digit(i + 2)) {
+      plain += static_cast<char>(std::strtol(path.substr(i + 1, 2).c_str(), nullptr, 16));
+      i += 2;
+    } else {
+      plain += path[i];
+    }
+  }
+  return plain;
+}
+
+// Returns where a texture may be: as written, and beside the scan, if the path is another
+// computer's.
+std::vector<std::filesystem::path> candidates_for(const std::filesystem::path& scan,
+                                                  std::string path) {
+  std::ranges::replace(path, '\\', '/');
+  std::vector<std::filesystem::path> candidates;
+  for (const std::string& written : {path, without_escapes(path)}) {
+    const std::filesystem::path texture(written);
+    candidates.push_back(scan.parent_path() / texture);
+    candidates.push_back(scan.parent_path() / texture.filename());
+  }
+  return candidates;
+}
+
+std::uint8_t luma_of(const aiColor4D& colour, bool is_linear) {
+  double luma = 0.2126 * static_cast<double>(colour.r) + 0.7152 * static_cast<double>(colour.g) +
+                0.0722 * static_cast<double>(colour.b);
+  if (!std::isfinite(luma)) return 0;
+  if (is_linear) luma = tracking::srgb_encode(luma);
+  return static_cast<std::uint8_t>(std::lround(255 * std::clamp(luma, 0.0, 1.0)));
+}
+
+std::string texture_of(const aiMaterial& material, unsigned& uv_channel) {
+  for (const aiTextureType type :
+       {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE, aiTextureType_EMISSIVE}) {
+    aiString path;
+    if (material.GetTexture(type, 0, &path, nullptr, &uv_channel) == aiReturn_SUCCESS &&
+        path.length > 0)
+      return path.C_Str();
+  }
+  return {};
+}
+
+}  // namespace
+
+ColourReader::ColourReader(const aiScene& scene, std::filesystem::path file)
+    : scene_(scene), file_(std::move(file)) {
+  const std::string extension = file_.extension().string();
+  is_linear_ =
+      extension.size() > 1 && std::tolower(static_cast<unsigned char>(extension[1])) == 'g';
+}
+
+void ColourReader::append(const aiMesh& mesh, std::size_t triangles) {
+  const Material material = material_of(mesh);
+  const bool has_uvs = mesh.HasTextureCoords(material.uv_channel);
+  const bool has_colours = mesh.HasVertexColors(0);
+  int source = material.source;
+  if (source < 0 || !has_uvs) source = has_colours ? from_vertices : colourless;
+  for (unsigned v = 0; v < mesh.mNumVertices; ++v) {
+    const aiVector3D uv = has_uvs ? mesh.mTextureCoords[material.uv_channel][v] : aiVector3D();
+    colours_.uvs.emplace_back(uv.x, uv.y);
+    colours_.luma.push_back(has_colours ? luma_of(mesh.mColors[0][v], is_linear_) : 0);
+  }
+  colours_.sources.insert(colours_.sources.end(), triangles, source);
+}
+
+ColourReader::Material ColourReader::material_of(const aiMesh& mesh) {
+  Material found;
+  if (mesh.mMaterialIndex >= scene_.mNumMaterials) return found;
+  const std::string path = texture_of(*scene_.mMaterials[mesh.mMaterialIndex], found.uv_channel);
+  if (found.uv_channel >= AI_MAX_NUMBER_OF_TEXTURECOORDS) found.uv_channel = 0;
+  if (!path.empty()) found.source = picture(path);
+  return found;
+}
+
+int ColourReader::picture(const std::string& path) {
+  if (const auto known = used_.find(path); known != used_.end()) return known->second;
+  const int index = decoded(bytes_of(path), path);
+  used_[path] = index;
+  return index;
+}
+
+// Adds the picture and returns its index.
+int ColourReader::decoded(const std::vector<unsigned char>& bytes, const std::string& name) {
+  const std::string where = fmt::format("{}: its texture \"{}\"", file_.string(), printable(name));
+  const auto [width, height] = scene::checked_picture_size(bytes, where);
+  texels_ += static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  if (texels_ > most_texels)
+    throw Error(
+        fmt::format("{}: its textures have more than {} pixels together; export the scan "
+                    "with smaller ones",
+                    file_.string(), most_texels));
+  colours_.pictures.push_back({name, width, height, scene::decoded_luma(bytes, where)});
+  return static_cast<int>(colours_.pictures.size() - 1);
+}
+
+std::vector<unsigned char> ColourReader::bytes_of(const std::string& path) const {
+  if (const aiTexture* embedded = scene_.GetEmbeddedTexture(path.c_str())) {
+    if (embedded->mHeight != 0)
+      throw Error(fmt::format("{}: its texture \"{}\" is not compressed; export it as PNG or JPEG",
+                              file_.string(), printable(path)));
+    const auto* first = reinterpret_cast<const unsigned char*>(embedded->pcData);
+    return {first, first + embedded->mWidth};
+  }
+  for (const std::filesystem::path& file : candidates_for(file_, path)) {
+    std::error_code ignored;
+    if (!std::filesystem::is_regular_file(file, ignored)) continue;
+    if (std::filesystem::file_size(file, ignored) > most_texture_bytes)
+      throw Error(file.string() + ": is larger than 1 GiB; export the scan with smaller textures");
+    std::ifstream in(file, std::ios::binary);
+    std::vector<unsigned char> bytes{std::istreambuf_iterator<char>(in), {}};
+    if (in.bad() || !in.is_open()) throw Error(file.string() + ": cannot be read");
+    return bytes;
+  }
+  throw Error(
+      fmt::format("{}: its texture \"{}\" is missing; put it beside the scan, or place the "
+                  "scan by three or more points, under [scan.points]",
+                  file_.string(), printable(path)));
+}
+
+}  // namespace previz::model

@@ -1,0 +1,62 @@
+// Looks for tags in pictures of a scan, and measures where their corners are on its surface.
+#pragma once
+
+#include <array>
+#include <glm/vec3.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/model/scan_painter.hpp"
+#include "daemon/set/set.hpp"
+#include "daemon/tracking/tag_detector.hpp"
+
+namespace previz::model {
+
+// A tag on the scan; lengths are in the scan's unit.
+struct TagSighting {
+  int id = 0;
+  std::array<glm::dvec3, 4> corners{};  // in the order of tracking::TagDetection
+  glm::dvec3 normal{0};                 // unit vector, towards who sees it
+  double uneven = 0;                    // root mean square of the surface's distance from a plane
+};
+
+glm::dvec3 centre_of(const TagSighting& tag);
+double side_of(const TagSighting& tag);  // the mean of four
+
+enum class Mirroring { off, on };  // of pictures
+
+class TagSightings {
+ public:
+  // Both must outlive this.
+  TagSightings(const ScanFile& scan, const set::Tracking& tracking);
+
+  double grain() const { return painter_.grain(); }
+
+  // Returns what pictures from all sides show whose pixels are of this size, or larger if there
+  // would be too many. The same tag is in it many times.
+  std::vector<TagSighting> from_all_sides(double pixel, Mirroring mirroring);
+
+  // Returns the tag as seen from the front and from places around it, from wherever it is found.
+  std::vector<TagSighting> close_to(const TagSighting& tag);
+
+ private:
+  struct Side;
+  std::vector<Side> sides(Mirroring mirroring) const;
+  void look(const ScanView& view, std::vector<TagSighting>& seen);
+  void look_in_tiles(const Side& side, double pixel, std::vector<TagSighting>& seen);
+  std::optional<TagSighting> on_surface(const ScanView& view,
+                                        const tracking::TagDetection& found) const;
+
+  // Returns a detector for pictures of this size, which it relies on.
+  tracking::TagDetector& detector_for(int width, int height);
+
+  const ScanFile& scan_;
+  const set::Tracking& tracking_;
+  ScanPainter painter_;
+  std::array<int, 2> detector_px_{};
+  std::unique_ptr<tracking::TagDetector> detector_;
+};
+
+}  // namespace previz::model

@@ -1,0 +1,217 @@
+// Scans that are placed by the tags of the set that their own colours show.
+#include "daemon/model/scans.hpp"
+
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
+#include "tests/support/tracking_synthetic.hpp"
+#include "tests/unit/model/scan_files.hpp"
+#include "tests/unit/model/tagged_scan.hpp"
+
+namespace previz::test {
+namespace {
+
+constexpr double texel_m = 1e-3;
+
+class ScanTags : public testing::Test {
+ protected:
+  ScanTags() {
+    parts_.file = folder_ / "model.toml";
+    parts_.scans.push_back({.name = "set",
+                            .file = folder_ / "set.obj",
+                            .unit = model::LengthUnit::mm,
+                            .up = model::UpAxis::y,
+                            .error_m = 0,
+                            .points = {}});
+    tracking_.tags = tags_of(faces_);
+  }
+
+  // In millimetres, turned Y up and moved.
+  static glm::dvec3 in_mm(const glm::dvec3& p) {
+    return 1000.0 * (glm::dvec3(p.x, p.z, -p.y) + glm::dvec3(0.3, -0.1, 0.7));
+  }
+
+  // Writes set.obj of the faces.
+  void write(const std::function<glm::dvec3(const glm::dvec3&)>& scan_from_world = in_mm) {
+    TaggedScan scan = textured_scan(faces_, texel_m);
+    scan.move(scan_from_world);
+    write_textured_obj(folder_ / "set.obj", scan);
+  }
+
+  std::vector<model::NamedMesh> placed() {
+    std::ostringstream out;
+    auto scans = model::place_scans(parts_, {}, {}, model::read_scans(parts_), tracking_, out);
+    report_ = out.str();
+    return scans;
+  }
+
+  std::string refusal() {
+    return error_of([&] { placed(); });
+  }
+
+  // Returns how far the placed scan's vertices are from those of the truth, at most.
+  double worst_of(const std::vector<model::NamedMesh>& scans, const TaggedScan& truth) const {
+    const model::ShadedMesh& mesh = scans.at(0).mesh;
+    EXPECT_EQ(mesh.indices.size(), truth.indices.size());
+    double worst = 0;
+    for (std::size_t i = 0; i < std::min(mesh.indices.size(), truth.indices.size()); ++i)
+      worst = std::max(worst, double(glm::distance(mesh.positions[mesh.indices[i]],
+                                                   truth.positions[truth.indices[i]])));
+    return worst;
+  }
+
+  TemporaryDirectory folder_;
+  std::vector<TaggedFace> faces_ = table_with_box();
+  set::Tracking tracking_;
+  model::Parts parts_;
+  std::string report_;
+};
+
+// A corner is the crossing of edges that are eight cells of 10 pixels long, so that it is known to
+// a fraction of a pixel; the scan ends at most 1.5 times as far from the centre of its tags as they
+// do. One pixel is therefore a generous bound.
+TEST_F(ScanTags, PlaceOneWhoseTextureHasThemInPieces) {
+  write();
+  const auto scans = placed();
+  EXPECT_LT(worst_of(scans, textured_scan(faces_, texel_m)), texel_m);
+  EXPECT_THAT(report_, HasSubstr("scan set: placed by tags 3, 5 and 7 (12 corners), rms 0."));
+  EXPECT_THAT(report_, HasSubstr("times its size"));
+  EXPECT_THAT(report_, Not(HasSubstr("tag 3 ")));
+}
+
+TEST_F(ScanTags, AreFoundInAGlbWithItsTexture) {
+  TaggedScan scan = textured_scan(faces_, texel_m);
+  scan.move([](const glm::dvec3& p) { return 1e-3 * in_mm(p); });
+  write_textured_glb(folder_ / "set.glb", scan);
+  parts_.scans[0].file = folder_ / "set.glb";
+  parts_.scans[0].unit.reset();
+  parts_.scans[0].up.reset();
+  EXPECT_LT(worst_of(placed(), textured_scan(faces_, texel_m)), texel_m);
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
+}
+
+// As much as of a texture of 2 mm is shown by vertices that are 2 mm apart.
+TEST_F(ScanTags, AreFoundInTheColoursOfVertices) {
+  constexpr double step_m = 2e-3;
+  const TaggedScan truth = vertex_coloured_scan(faces_, step_m);
+  TaggedScan scan = truth;
+  scan.move(in_mm);
+  write_coloured_ply(folder_ / "set.ply", scan);
+  parts_.scans[0].file = folder_ / "set.ply";
+  EXPECT_LT(worst_of(placed(), truth), step_m);
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
+}
+
+TEST_F(ScanTags, GiveTheLikelyUnitAndAxis) {
+  write();
+  parts_.scans[0].unit.reset();
+  parts_.scans[0].up.reset();
+  const std::string missing = refusal();
+  EXPECT_THAT(missing, HasSubstr("unit is missing, and set.obj does not give it; its tags fit best "
+                                 "with unit = \"mm\""));
+  EXPECT_THAT(missing, HasSubstr("its tags fit best with up = \"y\""));
+  parts_.scans[0].unit = model::LengthUnit::m;
+  parts_.scans[0].up = model::UpAxis::y;
+  EXPECT_THAT(refusal(), HasSubstr("1000 times smaller: is its unit \"mm\"?"));
+}
+
+TEST_F(ScanTags, OfAMirroredScanAreRefused) {
+  TaggedScan scan = textured_scan(faces_, texel_m);
+  scan.move([](const glm::dvec3& p) { return in_mm({-p.x, p.y, p.z}); });
+  write_textured_obj(folder_ / "set.obj", scan);
+  EXPECT_THAT(refusal(), HasSubstr("tags fit to 0."));  // its faces are inside out
+  EXPECT_THAT(refusal(), HasSubstr("mm if the scan is mirrored"));
+  for (std::size_t i = 0; i < scan.indices.size(); i += 3)
+    std::swap(scan.indices[i], scan.indices[i + 1]);
+  write_textured_obj(folder_ / "set.obj", scan);
+  EXPECT_THAT(refusal(), HasSubstr("scan \"set\", set.obj: is mirrored, or its faces are inside "
+                                   "out"));
+}
+
+TEST_F(ScanTags, NeedColours) {
+  write_obj(folder_ / "set.obj", lump(6), 1e-3);
+  EXPECT_THAT(refusal(), HasSubstr("set.obj: has no points, and neither a texture nor colours"));
+  EXPECT_THAT(refusal(), HasSubstr("under [scan.points]"));
+}
+
+TEST_F(ScanTags, NeedTagsInTheSet) {
+  write();
+  tracking_.tags.clear();
+  EXPECT_THAT(refusal(), HasSubstr("the set has no tag to place it by"));
+}
+
+TEST_F(ScanTags, OfTexturesThatCannotBeReadAreNamed) {
+  write();
+  std::filesystem::rename(folder_ / "set.png", folder_ / "other.png");
+  EXPECT_THAT(refusal(), HasSubstr("set.obj: its texture \"set.png\" is missing; put it beside"));
+  std::ofstream(folder_ / "set.png") << "junk";
+  EXPECT_THAT(refusal(), HasSubstr("set.obj: its texture \"set.png\": is neither PNG nor JPEG"));
+  std::string png(session::read_file(folder_ / "other.png"));
+  std::ofstream(folder_ / "set.png", std::ios::binary) << png.substr(0, png.size() / 2);
+  EXPECT_THAT(refusal(), HasSubstr("set.png\": is cut short"));
+  png[18] = 0x7f;  // the third byte of the width
+  std::ofstream(folder_ / "set.png", std::ios::binary) << png;
+  EXPECT_THAT(refusal(), HasSubstr("; a side is at most 16384"));
+}
+
+TEST_F(ScanTags, AreFoundWhereAnotherComputerHadTheTexture) {
+  write();
+  std::ofstream(folder_ / "set.mtl") << "newmtl atlas\nmap_Kd C:\\scans\\set.png\n";
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
+}
+
+TEST_F(ScanTags, OfWhichThereIsOneAreWarnedOf) {
+  faces_[0].tags.pop_back();
+  faces_[1].tags.clear();
+  write();
+  // As far from the tag as the table ends, the scan is off by more than at its corners.
+  EXPECT_LT(worst_of(placed(), textured_scan(faces_, texel_m)), 5 * texel_m);
+  EXPECT_THAT(report_, HasSubstr("placed by tag 3 (4 corners)"));
+  EXPECT_THAT(report_, HasSubstr("warning: scan set: tag 3 is its only tag; 1 m from it"));
+}
+
+TEST_F(ScanTags, ThatAreThereTwiceAreIgnored) {
+  faces_[5].tags = {tag_on(faces_[5], 5, 0.08, {0.1, 0.07})};
+  write();
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3 and 7 (8 corners)"));
+  EXPECT_THAT(report_, HasSubstr("warning: scan set: tag 5 is on the scan at 2 places; ignored"));
+  tracking_.tags = {tracking_.tags[1]};
+  EXPECT_THAT(refusal(), HasSubstr("no tag on it can be used: tag 5 is on the scan at 2 places"));
+}
+
+TEST_F(ScanTags, OfOtherSetsAreIgnored) {
+  write();
+  const std::vector<set::Tag> all = tracking_.tags;
+  tracking_.tags = {all[0], all[2]};
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3 and 7"));
+  EXPECT_THAT(report_, HasSubstr("shows tag 5, which the set does not have fixed in the world"));
+  tracking_.tags = {flat_tag(11, 0.08, {0, 0, 0})};
+  EXPECT_THAT(refusal(), HasSubstr("shows tags 3, 5 and 7 and no tag that the set has"));
+}
+
+TEST_F(ScanTags, OfAnotherSizeAreIgnored) {
+  write();
+  tracking_.tags[1].size_m = 0.1;
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3 and 7"));
+  EXPECT_THAT(report_, HasSubstr("tag 5 is 0.80 times as large as the set's other tags make it"));
+}
+
+TEST_F(ScanTags, ThatWereMovedAreNamed) {
+  write();
+  tracking_.tags[1].world_from_tag[3].x += 0.05;
+  EXPECT_THAT(refusal(), testing::ContainsRegex("tag 5 is (49|50)\\.[0-9] mm from where the other "
+                                                "tags put it; if one was moved"));
+}
+
+TEST_F(ScanTags, TooSmallForTheTextureAreCounted) {
+  TaggedScan scan = textured_scan(faces_, 16e-3);
+  scan.move(in_mm);
+  write_textured_obj(folder_ / "set.obj", scan);
+  EXPECT_THAT(refusal(), HasSubstr("its colours show a tag of 80 mm with 5 pixels, and 16 are"));
+}
+
+}  // namespace
+}  // namespace previz::test
