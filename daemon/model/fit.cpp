@@ -347,6 +347,11 @@ double redundancy_of(const cv::Mat1d& jacobian, const cv::Mat1d& covariance, int
 Fit adjust(const Parts& parts, const Views& views, const Start& start,
            const std::vector<EdgePiece>& edges) {
   const Problem problem(parts, views, start, edges);
+  if (problem.unknowns().empty()) {  // scans only, which their tags place
+    Fit fit;
+    fit.shape = start.shape;
+    return fit;
+  }
   const auto found = tracking::least_squares(problem, start.shape, {200, 1e-3, 1e-12});
   if (found.why == tracking::Stopped::outside)
     throw Error(parts.file.string() +

@@ -256,6 +256,13 @@ TEST_F(ModelCommand, PlacesAScanByItsPoints) {
   EXPECT_TRUE(fs::exists(folder_ / "demo/real.glb"));
 }
 
+TEST_F(ModelCommand, LooksForTagsOnAScanWithoutPoints) {
+  std::ofstream(folder_ / "demo/cube.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+  write_parts("[[scan]]\nname = \"cube\"\nfile = \"cube.obj\"\n");
+  EXPECT_THAT(refusal(), HasSubstr("scan \"cube\", cube.obj: has no points, and neither a texture "
+                                   "nor colours that could show the set's tags"));
+}
+
 TEST_F(ModelCommand, TakesANameThatTheSetDoesNotHave) {
   std::ofstream(*options_.set_file, std::ios::app)
       << "\n[[object]]\nname = \"real\"\nfile = \"phantom.glb\"\npresence = \"phantom\"\n";
