@@ -48,6 +48,7 @@ std::vector<Candidate> candidates_of(const std::filesystem::path& footage,
   std::size_t index = 0;
   for (auto picture = source->next(); picture; picture = source->next()) {
     if (index++ % every) continue;
+    insist_on_size(*picture->frame, camera.intrinsics, picture->name);
     const auto pose =
         pose_by_tags(detector.detect(*picture->frame, 1), camera.intrinsics, tracking);
     if (!pose) continue;

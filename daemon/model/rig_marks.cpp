@@ -85,6 +85,7 @@ class PictureRays {
   // Adds a picture's marks to the boxes; returns why they cannot be used, if so.
   std::optional<std::string> add(const Frame& frame, const MarkedPicture& picture,
                                  std::map<std::size_t, RigMarks::Rays>& boxes) {
+    insist_on_size(frame, lens_, picture.name);
     const auto pose = pose_by_tags(detector_.detect(frame, 1), lens_, tracking_);
     if (!pose)
       return fmt::format("{}: shows no tags of the set that fit together; its marks are not used",

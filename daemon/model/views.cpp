@@ -29,13 +29,15 @@ std::string short_name(const std::string& name) {
   return std::filesystem::path(name).filename().string();
 }
 
+void insist_on_size(const Frame& frame, const PinholeIntrinsics& lens, const std::string& picture) {
+  if (frame.width != lens.width || frame.height != lens.height)
+    throw Error(fmt::format("{}: has {}x{} pixels, but the lens is calibrated for {}x{}", picture,
+                            frame.width, frame.height, lens.width, lens.height));
+}
+
 namespace {
 
-void insist_on_size(const Frame& frame, const PinholeIntrinsics& lens,
-                    const MarkedPicture& picture) {
-  if (frame.width != lens.width || frame.height != lens.height)
-    throw Error(fmt::format("{}: has {}x{} pixels, but the lens is calibrated for {}x{}",
-                            picture.name, frame.width, frame.height, lens.width, lens.height));
+void insist_on_marks(const MarkedPicture& picture, const PinholeIntrinsics& lens) {
   for (const Mark& mark : picture.marks)
     if (!(mark.px.x >= -0.5 && mark.px.y >= -0.5 && mark.px.x <= lens.width - 0.5 &&
           mark.px.y <= lens.height - 0.5))
@@ -78,7 +80,8 @@ Views find_views(calibrate::PictureSource& source, const ObserverCalibration& ca
                         "[[picture]]",
                         parts.file.string(), first_of_it->name, marked.name));
       first_of_it = &marked;
-      insist_on_size(*picture->frame, camera.intrinsics, marked);
+      insist_on_size(*picture->frame, camera.intrinsics, marked.name);
+      insist_on_marks(marked, camera.intrinsics);
       views.views[i] = {
           marked.name, marked.marks,
           pose_of(detector.detect(*picture->frame, 1), camera.intrinsics, tracking, marked.name),

@@ -37,6 +37,9 @@ using tracking::Ray;
 // 7", "0012.png" of "walk/0012.png".
 std::string short_name(const std::string& name);
 
+// Throws previz::Error naming the picture if it is not of the lens's size.
+void insist_on_size(const Frame& frame, const PinholeIntrinsics& lens, const std::string& picture);
+
 // Looks for the marked pictures, and for the set's tags in each of them. A picture is named as the
 // source names it, or by the end of that name: "0000.png" of a folder, "frame 7" or
 // "frame_7.png" of a session.

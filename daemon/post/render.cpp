@@ -265,6 +265,9 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
                           : render::open_device(render::options_for(
                                 options.device, take.set.quality.hardware_rays));
   check_memory(options, take, *device);
+  if (!options.set_file)
+    out << take.session.info.name << ": uses the set recorded with it; --set FILE uses another"
+        << std::endl;
   out << take.session.info.name << ": " << to_do.size() << " frames of "
       << size_words(pipeline::scaled(take.observer, options.scale).intrinsics) << ", "
       << quality_words(take.set.quality)

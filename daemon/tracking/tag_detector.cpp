@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "daemon/tracking/tag_family.hpp"
+#include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 
 namespace previz::tracking {
@@ -120,7 +121,18 @@ double TagDetector::printed_width() const {
   return 1.0 * library_->family->total_width / library_->family->width_at_border;
 }
 
+// Pixels are looked up within the lens's picture.
+void TagDetector::insist_on_size(const Frame& frame) const {
+  if (frame.width == lens_.width && frame.height == lens_.height) return;
+  const auto words_of = [](int width, int height) {
+    return std::to_string(width) + 'x' + std::to_string(height);
+  };
+  throw Error("a picture has " + words_of(frame.width, frame.height) +
+              " pixels, but its lens is calibrated for " + words_of(lens_.width, lens_.height));
+}
+
 std::vector<TagDetection> TagDetector::detect(const Frame& frame, double decimate) {
+  insist_on_size(frame);
   if (frame.bayer != BayerPattern::none)
     return detect(*demosaiced(std::make_shared<Frame>(frame)), decimate);
   std::vector<TagDetection> tags;
@@ -131,6 +143,7 @@ std::vector<TagDetection> TagDetector::detect(const Frame& frame, double decimat
 }
 
 std::vector<TagDetection> TagDetector::detect(const Frame& frame, const SearchStep& parts) {
+  insist_on_size(frame);
   if (frame.bayer != BayerPattern::none)
     return detect(*demosaiced(std::make_shared<Frame>(frame)), parts);
   std::vector<TagDetection> tags;

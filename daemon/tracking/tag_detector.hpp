@@ -45,7 +45,7 @@ class TagDetector {
 
   // Returns every tag that passes the gates, by id, then from left to right. `decimate` >= 1
   // shrinks the picture that is searched; corners are always measured at full resolution. Frames
-  // below 16 px a side show no tag.
+  // below 16 px a side show no tag. Throws previz::Error if the frame is not of the lens's size.
   std::vector<TagDetection> detect(const Frame& frame, double decimate);
   // Returns the tags in parts of the picture: what the whole picture shows there at full
   // resolution, without the tags that a part's border cuts. Parts may meet.
@@ -56,6 +56,7 @@ class TagDetector {
 
  private:
   struct Library;
+  void insist_on_size(const Frame& frame) const;
   void find(const Frame& frame, const Region& part, double decimate,
             std::vector<TagDetection>& tags);
   void measure(const Frame& frame, double decimate, TagDetection& tag) const;

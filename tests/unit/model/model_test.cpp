@@ -379,6 +379,21 @@ TEST_F(ModelCommand, WritesPicturesToMarkPointsIn) {
   EXPECT_THAT(refusal(), HasSubstr("model.toml: already exists and may hold marks"));
 }
 
+TEST_F(ModelCommand, NamesAPictureThatIsNotOfTheLensesSize) {
+  options_.parts_file.clear();
+  options_.pictures = folder_ / "marks";
+  options_.footage = folder_ / "walk";
+  fs::create_directories(options_.footage);
+  std::ofstream(*options_.set_file, std::ios::app)
+      << "[observer.intrinsics]\nwidth = 640\nheight = 480\nfx = 600\nfy = 600\ncx = 319.5\ncy = "
+         "239.5\n";
+  const Plate grey{320, 240, 8, std::vector<std::uint16_t>(std::size_t{320} * 240 * 3, 128)};
+  output::write_png(options_.footage / "0000.png", grey);
+  EXPECT_THAT(refusal(),
+              HasSubstr("0000.png: has 320x240 pixels, but the lens is calibrated for 640x480"));
+  EXPECT_FALSE(fs::exists(folder_ / "marks"));
+}
+
 TEST_F(ModelCommand, NothingIsWrittenWhereSomethingIsWrong) {
   const auto refused = [&](const std::string& text, const std::string& words) {
     write_parts(text);

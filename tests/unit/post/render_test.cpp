@@ -99,6 +99,7 @@ TEST_F(RenderSession, EveryFrameHasItsFilesAndItsRecord) {
   EXPECT_FALSE(report.interrupted);
   EXPECT_GT(std::filesystem::file_size(report.video), 0u);
   EXPECT_THAT(out_.str(), HasSubstr(std::to_string(small_take_frames) + " pictures"));
+  EXPECT_THAT(out_.str(), HasSubstr(": uses the set recorded with it; --set FILE uses another\n"));
   for (int i = 0; i < small_take_frames; ++i) {
     const FinishedFrame& record = report.frames[i];
     const std::string number = "000" + std::to_string(i);
@@ -366,6 +367,7 @@ TEST_F(RenderSession, AnotherSetFileTakesTheSessionsAssetsWhereItHasNoOwn) {
   options.set_file = directory_ / "elsewhere/tweaked.toml";
   options.frames = FrameRange{1, 1};
   EXPECT_EQ(render(options).frames.size(), 1u);
+  EXPECT_THAT(out_.str(), Not(HasSubstr("the set recorded with it")));
 }
 
 // The set of a take from elsewhere does not choose a folder to write into; the crew does.

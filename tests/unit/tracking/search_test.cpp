@@ -98,6 +98,19 @@ TagScene seen_from(TagScene scene, double swing) {
   return scene;
 }
 
+TEST(TagDetector, RefusesAPictureThatIsNotOfTheLensesSize) {
+  std::mt19937 random(5);
+  const TagScene scene = seen_from(full_table(), 0);
+  PinholeIntrinsics other = scene.lens;
+  other.width /= 2;
+  TagDetector detector({}, other, {});
+  const Frame frame = picture(scene, random);
+  const std::string size = "x" + std::to_string(scene.lens.height);
+  EXPECT_EQ(test::error_of([&] { detector.detect(frame, 1); }),
+            "a picture has " + std::to_string(scene.lens.width) + size +
+                " pixels, but its lens is calibrated for " + std::to_string(other.width) + size);
+}
+
 // The part is thresholded as the whole is, so the same border points are found; libapriltag fits
 // its lines in single precision about another origin, and the refinement of the corners, which
 // starts there, stops within 1e-3 px.
