@@ -222,9 +222,9 @@ void add_model(CLI::App& app, model::ModelOptions& options) {
   command.add_option("--set", options.set_file,
                      "Set file with the tags and the film camera's lens (default: the session's)");
   command
-      .add_option(
-          "--out", options.out,
-          "File of the model, .glb (default: as the file of parts, or the session, is named)")
+      .add_option("--out", options.out,
+                  "File of the model, .glb (default: as the file of parts is named; without "
+                  "one, as the session, beside the set file)")
       ->excludes(pictures);
   command
       .add_option("--overlay", options.overlay,

@@ -1,6 +1,7 @@
 #include "daemon/model/model.hpp"
 
 #include <fmt/ostream.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <functional>
@@ -52,9 +53,11 @@ std::filesystem::path file_of(const ModelOptions& options) {
   if (options.out) return *options.out;
   if (!options.parts_file.empty())
     return std::filesystem::path(options.parts_file).replace_extension(".glb");
-  // Marks of the rig: the model is named as the take is, which it does not go into.
+  // Without a file of parts the model is named as the take is, and goes beside the set file, or
+  // into the current folder; never into the take.
   const std::filesystem::path take = std::filesystem::absolute(options.footage / "");
-  return take.lexically_normal().parent_path().filename().string() + ".glb";
+  const std::string name = take.lexically_normal().parent_path().filename().string() + ".glb";
+  return options.set_file ? options.set_file->parent_path() / name : std::filesystem::path(name);
 }
 
 // The three marks that are farthest off: where to look again.
@@ -103,10 +106,10 @@ void print_fit(const Parts& parts, const Layout& layout, const Fit& fit, std::os
   for (std::size_t i = 0; i < parts.boxes.size(); ++i) {
     glm::dvec3 mm = 1000.0 * fit.shape.boxes[i].size;
     if (layout.is_clockwise[i]) std::swap(mm.x, mm.y);  // length and width as they are marked
-    fmt::print(out, "box {}: {:.1f} x {:.1f} x {:.1f} mm\n", parts.boxes[i].name, mm.x, mm.y, mm.z);
+    fmt::print(out, "{}: {:.1f} x {:.1f} x {:.1f} mm\n", parts.boxes[i].name, mm.x, mm.y, mm.z);
   }
   for (std::size_t i = 0; i < parts.cylinders.size(); ++i)
-    fmt::print(out, "cylinder {}: diameter {:.1f} mm, height {:.1f} mm\n", parts.cylinders[i].name,
+    fmt::print(out, "{}: diameter {:.1f} mm, height {:.1f} mm\n", parts.cylinders[i].name,
                2000 * fit.shape.cylinders[i].radius, 1000 * fit.shape.cylinders[i].height);
 }
 
@@ -188,15 +191,19 @@ bool is_same(const std::filesystem::path& a, const std::filesystem::path& b) {
 }
 
 // Refuses to replace what the model is made of.
-void insist_on_outputs(const ModelOptions& options, const Parts& parts) {
+void insist_on_outputs(const ModelOptions& options) {
   const std::filesystem::path file = file_of(options);
   if (file.extension() != ".glb")
     throw Error(file.string() + ": the model is a .glb file; name one with --out");
+  if (is_same(file, options.footage))
+    throw Error(file.string() + ": is the footage; name another file with --out");
+}
+
+void insist_on_scans(const ModelOptions& options, const Parts& parts) {
+  const std::filesystem::path file = file_of(options);
   for (const ScanPart& scan : parts.scans)
     if (is_same(file, scan.file))
       throw Error(file.string() + ": is a scan of the model; name another file with --out");
-  if (is_same(file, options.footage))
-    throw Error(file.string() + ": is the footage; name another file with --out");
 }
 
 bool is_taken(const set::FileEdit& edit, const std::string& name) {
@@ -331,20 +338,57 @@ std::string coloured_model(const ModelOptions& options, const set::Set& set, con
   return glb_of(meshes, albedos);
 }
 
-// Returns the parts that the file lists; without one, those that were marked on the rig.
+// Only a session has marks of the rig.
+void insist_on_parts(const ModelOptions& options) {
+  if (options.parts_file.empty() && !options.tags_only && !calibrate::is_session(options.footage))
+    throw Error(options.footage.string() +
+                ": is no session, and only those have marks that were made on the rig; give "
+                "--parts, the file that lists the scene's parts, which --pictures FOLDER writes");
+}
+
+// Returns the parts that were marked on the rig: boxes, and the planes that they stand on.
+Parts marked_parts(const ModelOptions& options, const ObserverCalibration& camera,
+                   const set::Tracking& tracking, std::ostream& out) {
+  const std::string footage = options.footage.string();
+  const RigMarks marks = rig_marks(options.footage, camera, tracking);
+  for (const std::string& what : marks.missing) fmt::print(out, "warning: {}\n", what);
+  if (marks.pictures.empty())
+    throw Error(footage +
+                (marks.missing.empty()
+                     ? ": nothing was marked on the rig while it was recorded; give "
+                     : ": none of its marks can be used; give ") +
+                "--parts, the file that lists the scene's parts, which --pictures FOLDER writes to "
+                "be filled in");
+  const MarkedBoxes marked = boxes_of(marks, tracking.tags, options.footage);
+  for (const std::string& remark : marked.remarks) fmt::print(out, "{}\n", remark);
+  if (marked.boxes.empty())
+    throw Error(footage +
+                ": none of the boxes that were marked can be made; mark the rest in another take, "
+                "or go on with --pictures FOLDER, which writes the marks into a file of parts");
+  std::vector<TagPlane> planes = tag_planes(tracking.tags);
+  std::erase_if(planes, [&](const TagPlane& plane) {
+    const bool carries =
+        std::ranges::find(marked.boxes, plane.name, &BoxPart::on) != marked.boxes.end();
+    if (!carries)
+      fmt::print(out, "{} (tags {}) carries no box and is not in the model\n", plane.name,
+                 fmt::join(plane.tags, ", "));
+    return !carries;
+  });
+  // The model follows the edges of further pictures, too.
+  const std::vector<MarkedPicture> pictures =
+      only_of(marked.boxes, with_marks(pictures_apart(options.footage, camera, tracking), marks));
+  return parse_parts(parts_text(pictures, planes, marked.boxes), options.footage);
+}
+
+// Returns the parts that the file lists; without one, the planes of the tags if these are all that
+// is wanted, else what was marked on the rig.
 Parts parts_of(const ModelOptions& options, const ObserverCalibration& camera,
                const set::Tracking& tracking, std::ostream& out) {
   if (!options.parts_file.empty())
     return parse_parts(session::read_file(options.parts_file), options.parts_file);
-  const RigMarks marks = rig_marks(options.footage, camera, tracking);
-  if (marks.pictures.empty())
-    throw Error(options.footage.string() +
-                ": nothing was marked on the rig while it was recorded; give --parts, the file "
-                "that lists the scene's parts, which --pictures FOLDER writes to be filled in");
-  // The model follows the edges of further pictures, too.
-  const auto pictures = with_marks(pictures_apart(options.footage, camera, tracking), marks);
-  const auto boxes = boxes_of(marks, tracking.tags, out);
-  return parse_parts(parts_text(pictures, tracking.tags, boxes), options.footage / "events.jsonl");
+  if (!options.tags_only) return marked_parts(options, camera, tracking, out);
+  const auto pictures = with_marks(pictures_apart(options.footage, camera, tracking), {});
+  return parse_parts(parts_text(pictures, tag_planes(tracking.tags), {}), options.footage);
 }
 
 }  // namespace
@@ -356,10 +400,12 @@ void make_model(const ModelOptions& options, std::ostream& out) {
                           set_of(options).tracking, *options.pictures, out);
   if (options.write && !options.set_file)
     throw Error("--write needs --set: it changes that set file");
+  insist_on_parts(options);
   const set::Set set = set_of(options);
   const ObserverCalibration camera = calibrate::known_observer(options.set_file, options.footage);
+  insist_on_outputs(options);
   const Parts parts = parts_of(options, camera, set.tracking, out);
-  insist_on_outputs(options, parts);
+  insist_on_scans(options, parts);
   const std::vector<ScanFile> scan_files = read_scans(parts);
   const auto edited = options.write ? with_model(*options.set_file, set, options) : std::nullopt;
   const auto source = calibrate::open_source(options.footage, "observer");

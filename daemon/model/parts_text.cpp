@@ -6,16 +6,16 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <set>
+#include <utility>
 
 #include "drivers/keys/value.hpp"
+#include "drivers/session/marks.hpp"
 
 namespace previz::model {
 namespace {
 
 // Tags lie in one plane within so much.
 constexpr double flat_m = 4e-3, flat_cos = 0.998;
-// Who aims a camera at a corner does so within about this.
-constexpr double aimed_px = 2;
 
 std::string text_of(const MarkedPicture& picture) {
   std::string text = fmt::format("\n[[picture]]\nfile = {}  # {}\n[picture.points]\n",
@@ -35,28 +35,24 @@ std::string text_of(const BoxPart& box) {
 
 }  // namespace
 
-std::vector<std::vector<int>> flat_groups(const std::vector<set::Tag>& tags) {
-  std::vector<std::vector<int>> groups;
+std::vector<TagPlane> tag_planes(const std::vector<set::Tag>& tags) {
+  std::vector<TagPlane> planes;
   std::set<int> used;
   for (const set::Tag& first : tags) {
     if (used.contains(first.id)) continue;
-    std::vector<int>& group = groups.emplace_back();
+    TagPlane plane{fmt::format("plane {}", planes.size() + 1), {}};
     const glm::dvec3 normal(first.world_from_tag[2]), at(first.world_from_tag[3]);
     for (const set::Tag& tag : tags) {
       const glm::dvec3 its(tag.world_from_tag[2]), off = glm::dvec3(tag.world_from_tag[3]) - at;
       const bool is_flat =
           glm::dot(its, normal) > flat_cos && std::abs(glm::dot(off, normal)) < flat_m;
-      if (!used.contains(tag.id) && is_flat) {
-        group.push_back(tag.id);
-        used.insert(tag.id);
-      }
+      if (used.contains(tag.id) || !is_flat) continue;
+      plane.tags.push_back(tag.id);
+      used.insert(tag.id);
     }
+    planes.push_back(std::move(plane));
   }
-  return groups;
-}
-
-std::string plane_name(std::size_t group) {
-  return fmt::format("plane {}", group + 1);
+  return planes;
 }
 
 std::string picture_file(const std::string& picture) {
@@ -66,7 +62,7 @@ std::string picture_file(const std::string& picture) {
 }
 
 std::string parts_text(const std::vector<MarkedPicture>& pictures,
-                       const std::vector<set::Tag>& tags, const std::vector<BoxPart>& boxes) {
+                       const std::vector<TagPlane>& planes, const std::vector<BoxPart>& boxes) {
   std::string text =
       "# The parts of the real scene, for previzd model; previzd(8), \"The model\", says what can "
       "be listed.\n"
@@ -75,12 +71,12 @@ std::string parts_text(const std::vector<MarkedPicture>& pictures,
   const bool is_aimed = std::ranges::any_of(
       pictures, [](const MarkedPicture& picture) { return !picture.marks.empty(); });
   if (is_aimed)
-    text += fmt::format("\n[marks]\naccuracy_px = {}  # of the marks made on the rig\n", aimed_px);
+    text += fmt::format("\n[marks]\naccuracy_px = {}  # as they were made by aiming the camera\n",
+                        session::aimed_px);
   for (const MarkedPicture& picture : pictures) text += text_of(picture);
-  std::size_t group = 0;
-  for (const std::vector<int>& ids : flat_groups(tags))
-    text += fmt::format("\n[[plane]]\nname = {}\ntags = [{}]\n", codec::quote(plane_name(group++)),
-                        fmt::join(ids, ", "));
+  for (const TagPlane& plane : planes)
+    text += fmt::format("\n[[plane]]\nname = {}\ntags = [{}]\n", codec::quote(plane.name),
+                        fmt::join(plane.tags, ", "));
   for (const BoxPart& box : boxes) text += text_of(box);
   if (boxes.empty())
     text +=

@@ -109,7 +109,9 @@ void write_pictures(const std::filesystem::path& footage, const ObserverCalibrat
   const RigMarks marks = rig_marks(footage, camera, tracking);
   const std::vector<MarkedPicture> pictures =
       with_marks(pictures_apart(footage, camera, tracking), marks);
-  const std::vector<BoxPart> boxes = boxes_of(marks, tracking.tags, out);
+  const MarkedBoxes marked = boxes_of(marks, tracking.tags, footage);
+  for (const auto* remarks : {&marks.missing, &marked.remarks})
+    for (const std::string& remark : *remarks) fmt::print(out, "{}\n", remark);
   session::make_folders(folder);
   const auto source = calibrate::open_source(footage, "observer");
   for (auto picture = source->next(); picture; picture = source->next()) {
@@ -117,7 +119,7 @@ void write_pictures(const std::filesystem::path& footage, const ObserverCalibrat
     if (std::ranges::find(pictures, name, &MarkedPicture::name) != pictures.end())
       output::write_png(folder / picture_file(name), to_plate(*picture->frame));
   }
-  session::replace_file(parts, parts_text(pictures, tracking.tags, boxes));
+  session::replace_file(parts, parts_text(pictures, tag_planes(tracking.tags), marked.boxes));
   fmt::print(out, "{} pictures to mark points in, and {} to list them\n", pictures.size(),
              parts.string());
 }

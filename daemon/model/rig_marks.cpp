@@ -1,18 +1,23 @@
 #include "daemon/model/rig_marks.hpp"
 
-#include <fmt/ostream.h>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <map>
 #include <optional>
 #include <utility>
 
 #include "daemon/calibrate/lens/source.hpp"
+#include "daemon/model/fit.hpp"
 #include "daemon/model/parts_text.hpp"
-#include "daemon/model/views.hpp"
+#include "daemon/model/start.hpp"
 #include "daemon/set/check.hpp"
+#include "daemon/tracking/tag_detector.hpp"
+#include "drivers/error.hpp"
 #include "drivers/session/marks.hpp"
 #include "drivers/session/session.hpp"
 
@@ -22,80 +27,125 @@ namespace {
 // The upper side of a box is parallel to the plane that it stands on, within what marks of small
 // boxes leave uncertain (20 degrees).
 constexpr double parallel_cos = 0.94;
+// A plane that is no farther below is the upper side itself, with a tag on it.
+constexpr double least_height_m = 0.01;
 
-// A plane of flat tags.
-struct TagPlane {
-  std::string name;
-  glm::dvec3 at{0}, normal{0, 0, 1};
+using CornerRays = std::array<std::vector<Ray>, session::corners_of_a_box>;
+using Top = std::array<glm::dvec3, session::corners_of_a_box>;
+
+std::map<std::size_t, CornerRays> rays_of(const Views& views) {
+  std::map<std::size_t, CornerRays> boxes;
+  for (const MarkedView& view : views.views)
+    for (const Mark& mark : view.marks)
+      if (const auto at = session::box_corner_of(mark.point))
+        boxes[at->box].at(at->corner).push_back(ray_of(views, view, mark));
+  return boxes;
+}
+
+// A plane of tags that a box may stand on.
+struct Stand {
+  TagPlane plane;
+  glm::dvec3 middle{0}, normal{0, 0, 1};
+  double reach_m = 0;  // from the middle, as far as the plane is in the model
 };
 
-std::vector<TagPlane> tag_planes(const std::vector<set::Tag>& tags) {
-  std::vector<TagPlane> planes;
-  for (const std::vector<int>& group : flat_groups(tags)) {
-    const glm::dmat4& first = std::ranges::find(tags, group.front(), &set::Tag::id)->world_from_tag;
-    planes.push_back({plane_name(planes.size()), first[3], glm::normalize(glm::dvec3(first[2]))});
+Stand stand_of(const TagPlane& plane, const std::vector<set::Tag>& tags) {
+  Stand stand{plane};
+  std::vector<glm::dvec3> places;
+  for (const int id : plane.tags) {
+    const glm::dmat4& tag = std::ranges::find(tags, id, &set::Tag::id)->world_from_tag;
+    places.emplace_back(tag[3]);
+    stand.normal = glm::normalize(glm::dvec3(tag[2]));
   }
-  return planes;
+  for (const glm::dvec3& place : places) stand.middle += place / double(places.size());
+  for (const glm::dvec3& place : places)
+    stand.reach_m = std::max(stand.reach_m, glm::distance(place, stand.middle));
+  stand.reach_m += PlanePart{}.margin_m;
+  return stand;
 }
 
-// Returns the name of the plane that a box stands on; empty: none is below it.
-std::string plane_below(const std::array<glm::dvec3, session::corners_of_a_box>& top,
-                        const std::vector<TagPlane>& planes) {
+// Returns what a box stands on; null: nothing is below it.
+const Stand* stand_below(const Top& top, const std::vector<Stand>& stands) {
   const glm::dvec3 across = glm::normalize(glm::cross(top[1] - top[0], top[2] - top[0]));
   const glm::dvec3 middle = 0.5 * (top[0] + top[2]);
-  std::string name;
-  double nearest = 0;
-  for (const TagPlane& ground : planes) {
-    const double height = glm::dot(middle - ground.at, ground.normal);
-    if (!(std::abs(glm::dot(across, ground.normal)) > parallel_cos) || !(height > 0)) continue;
-    if (name.empty() || height < nearest) name = ground.name, nearest = height;
+  const Stand* best = nullptr;
+  std::pair<bool, double> best_rank;
+  for (const Stand& stand : stands) {
+    const glm::dvec3 off = middle - stand.middle;
+    const double height = glm::dot(off, stand.normal);
+    if (!(std::abs(glm::dot(across, stand.normal)) > parallel_cos) || !(height > least_height_m))
+      continue;
+    const bool is_beside = glm::length(off - height * stand.normal) > stand.reach_m;
+    const std::pair rank(is_beside, height);
+    if (!best || rank < best_rank) best = &stand, best_rank = rank;
   }
-  return name;
+  return best;
 }
 
-// Returns why a box cannot be used; nothing if it can, which then is in `part`.
-std::optional<std::string> box_of(std::size_t box, const RigMarks::Rays& corners,
-                                  const std::vector<TagPlane>& planes, BoxPart& part) {
-  std::array<glm::dvec3, session::corners_of_a_box> top{};
+// Returns why the marks of a box do not show where its corners are; nothing if they do.
+std::optional<std::string> find_top(std::size_t box, const CornerRays& rays, Top& top) {
   for (std::size_t corner = 0; corner < top.size(); ++corner) {
     const std::string name = session::name_of({box, corner});
-    if (corners[corner].size() < 2)
+    if (rays[corner].size() < 2)
       return fmt::format("{} is marked in {} and needs two, from different sides", name,
-                         set::plural(corners[corner].size(), "picture"));
-    top[corner] = tracking::meeting_of(corners[corner]).at;
-    part.top.push_back(name);
+                         set::plural(rays[corner].size(), "picture"));
+    const tracking::Meeting met = tracking::meeting_of(rays[corner]);
+    if (met.parallax_rad < session::least_parallax_rad)
+      return name + " is marked from one place only; mark it from another side as well";
+    if (met.off_rad > 0.1) return name + " was another corner in one of its pictures";
+    top[corner] = met.at;
   }
-  part.top.emplace_back();
-  part.name = fmt::format("box {}", box + 1);
-  part.on = plane_below(top, planes);
-  if (!part.on.empty()) return std::nullopt;
-  return "no tag of the set lies flat on what it stands on; write a file of parts with --pictures, "
-         "and give its height_m or mark a corner of its lower side there";
+  if (!tracking::are_around_a_rectangle(top))
+    return "its corners were not marked in order around its upper side";
+  return std::nullopt;
 }
 
-// Finds the rays of marks in pictures, by the tags that these show.
-class PictureRays {
+BoxPart part_of(std::size_t box, const std::string& plane) {
+  BoxPart part;
+  part.name = fmt::format("box {}", box + 1);
+  part.on = plane;
+  for (std::size_t corner = 0; corner < session::corners_of_a_box; ++corner)
+    part.top.push_back(session::name_of({box, corner}));
+  part.top.emplace_back();
+  return part;
+}
+
+// Returns why no model can be made of a box alone; nothing if one can.
+std::optional<std::string> try_model(const BoxPart& box, const Stand& stand, const RigMarks& marks,
+                                     const std::vector<set::Tag>& tags,
+                                     const std::filesystem::path& footage) {
+  Views views = marks.views;
+  const std::vector<MarkedPicture> pictures = only_of({box}, marks.pictures);
+  for (std::size_t i = 0; i < pictures.size(); ++i) views.views[i].marks = pictures[i].marks;
+  try {
+    const Parts parts = parse_parts(parts_text(pictures, {stand.plane}, {box}), footage);
+    adjust(parts, views, first_guess(parts, views, tags));
+    return std::nullopt;
+  } catch (const Error& error) {
+    return error.what();
+  }
+}
+
+// Finds what pictures show of their cameras.
+class PictureViews {
  public:
-  PictureRays(const ObserverCalibration& camera, const set::Tracking& tracking)
+  PictureViews(const ObserverCalibration& camera, const set::Tracking& tracking)
       : lens_(camera.intrinsics),
         tracking_(tracking),
         detector_({tracking.family, tracking.min_margin, tracking.max_hamming}, camera.intrinsics,
                   camera.response) {}
 
-  // Adds a picture's marks to the boxes; returns why they cannot be used, if so.
-  std::optional<std::string> add(const Frame& frame, const MarkedPicture& picture,
-                                 std::map<std::size_t, RigMarks::Rays>& boxes) {
-    insist_on_size(frame, lens_, picture.name);
-    const auto pose = pose_by_tags(detector_.detect(frame, 1), lens_, tracking_);
-    if (!pose)
-      return fmt::format("{}: shows no tags of the set that fit together; its marks are not used",
-                         picture.name);
-    const Views views{lens_, tracking_.family, {}};
-    const MarkedView view{picture.name, picture.marks, *pose};
-    for (const Mark& mark : picture.marks)
-      if (const auto at = session::box_corner_of(mark.point))
-        boxes[at->box].at(at->corner).push_back(ray_of(views, view, mark));
-    return std::nullopt;
+  // Adds a picture with its marks to the result, or says why they are not used.
+  void add(const FramePtr& frame, const MarkedPicture& picture, RigMarks& result) {
+    insist_on_size(*frame, lens_, picture.name);
+    if (const auto pose = pose_by_tags(detector_.detect(*frame, 1), lens_, tracking_)) {
+      result.pictures.push_back(picture);
+      result.views.views.push_back({picture.name, picture.marks, *pose, frame});
+    } else {
+      result.missing.push_back(picture.name +
+                               ": shows no tags of the set that fit together; its marks are not "
+                               "used");
+    }
   }
 
  private:
@@ -115,35 +165,54 @@ RigMarks rig_marks(const std::filesystem::path& footage, const ObserverCalibrati
   if (!observer) return result;
   session::Marks marks = session::read_marks(footage, observer->records());
   result.missing = std::move(marks.missing);
-  PictureRays rays(camera, tracking);
+  result.views = {camera.intrinsics, tracking.family, {}};
+  PictureViews views(camera, tracking);
   for (auto mark = marks.marks.begin(); mark != marks.marks.end();) {
-    const auto next = std::find_if(mark, marks.marks.end(), [&](const session::Marks::Mark& other) {
-      return other.picture != mark->picture;
-    });
-    MarkedPicture picture{fmt::format("frame {}", mark->picture), {}};
-    const FramePtr frame = observer->read(mark->picture);
-    for (; mark != next; ++mark) picture.marks.push_back({mark->point, mark->px});
-    if (auto why_not = rays.add(*frame, picture, result.boxes))
-      result.missing.push_back(*std::move(why_not));
-    else
-      result.pictures.push_back(std::move(picture));
+    const std::size_t index = mark->picture;
+    MarkedPicture picture{fmt::format("frame {}", index), {}};
+    for (; mark != marks.marks.end() && mark->picture == index; ++mark)
+      picture.marks.push_back({mark->point, mark->px});
+    views.add(observer->read(index), picture, result);
   }
   return result;
 }
 
-std::vector<BoxPart> boxes_of(const RigMarks& marks, const std::vector<set::Tag>& tags,
-                              std::ostream& out) {
-  for (const std::string& what : marks.missing) fmt::print(out, "warning: {}\n", what);
-  const std::vector<TagPlane> planes = tag_planes(tags);
-  std::vector<BoxPart> boxes;
-  for (const auto& [box, corners] : marks.boxes) {
-    BoxPart part;
-    if (const auto why_not = box_of(box, corners, planes, part))
-      fmt::print(out, "warning: box {} is not in the model: {}\n", box + 1, *why_not);
-    else
-      boxes.push_back(std::move(part));
+MarkedBoxes boxes_of(const RigMarks& marks, const std::vector<set::Tag>& tags,
+                     const std::filesystem::path& footage) {
+  std::vector<Stand> stands;
+  for (const TagPlane& plane : tag_planes(tags)) stands.push_back(stand_of(plane, tags));
+  MarkedBoxes result;
+  for (const auto& [box, rays] : rays_of(marks.views)) {
+    Top top{};
+    std::optional<std::string> why_not = find_top(box, rays, top);
+    const Stand* const stand = why_not ? nullptr : stand_below(top, stands);
+    if (!why_not && !stand)
+      why_not =
+          "no tag of the set lies flat on what it stands on; write a file of parts with "
+          "--pictures, and give its height_m or mark a corner of its lower side there";
+    const BoxPart part = part_of(box, stand ? stand->plane.name : "");
+    if (!why_not) why_not = try_model(part, *stand, marks, tags, footage);
+    if (why_not) {
+      result.remarks.push_back(
+          fmt::format("warning: {} is not in the model: {}", part.name, *why_not));
+    } else {
+      result.remarks.push_back(fmt::format("{} stands on {} (tags {})", part.name,
+                                           stand->plane.name, fmt::join(stand->plane.tags, ", ")));
+      result.boxes.push_back(part);
+    }
   }
-  return boxes;
+  return result;
+}
+
+std::vector<MarkedPicture> only_of(const std::vector<BoxPart>& boxes,
+                                   std::vector<MarkedPicture> pictures) {
+  for (MarkedPicture& picture : pictures)
+    std::erase_if(picture.marks, [&](const Mark& mark) {
+      return std::ranges::none_of(boxes, [&](const BoxPart& box) {
+        return std::ranges::find(box.top, mark.point) != box.top.end();
+      });
+    });
+  return pictures;
 }
 
 std::vector<MarkedPicture> with_marks(const std::vector<std::string>& names,

@@ -103,8 +103,8 @@ class Starter {
   std::optional<glm::dvec3> place_of(const std::string& point) const {
     const auto found = rays_.find(point);
     if (point.empty() || found == rays_.end() || found->second.size() < 2) return {};
-    const auto [place, parallax] = tracking::meeting_of(found->second);
-    return parallax > least_parallax ? std::optional(place) : std::nullopt;
+    const tracking::Meeting met = tracking::meeting_of(found->second);
+    return met.parallax_rad > least_parallax ? std::optional(met.at) : std::nullopt;
   }
 
   glm::dvec3 needed_place_of(const std::string& point) const {

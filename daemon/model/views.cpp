@@ -98,13 +98,13 @@ Views find_views(calibrate::PictureSource& source, const ObserverCalibration& ca
 }
 
 Ray ray_of(const Views& views, const MarkedView& view, const Mark& mark) {
-  const auto at = undistort(views.lens, mark.px);
-  if (!at)
+  const auto ray =
+      tracking::ray_through(views.lens, tracking::world_from_camera(view.pose.pose), mark.px);
+  if (!ray)
     throw Error(
         fmt::format("{}: the lens shows nothing at point \"{}\"; check the lens's distortion",
                     view.name, mark.point));
-  const glm::dmat4 camera = tracking::world_from_camera(view.pose.pose);
-  return {glm::dvec3(camera[3]), glm::normalize(glm::dmat3(camera) * glm::dvec3(*at, 1))};
+  return *ray;
 }
 
 std::optional<tracking::FittedPose> pose_by_tags(

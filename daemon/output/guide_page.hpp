@@ -32,6 +32,7 @@ struct GuidePage {
   int width = 0, height = 0;  // of the picture, whatever size it is shown or rendered in
   std::vector<GuideLine> lines;
   std::vector<GuideWord> words;
+  bool is_whole = true;  // false: some are not known yet
 
   friend bool operator==(const GuidePage&, const GuidePage&) = default;
 };

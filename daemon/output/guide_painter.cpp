@@ -30,7 +30,7 @@ Rgb colour_of(GuideKind kind) {
                                                   {70, 110, 255},
                                                   {255, 140, 230},
                                                   {255, 255, 255},
-                                                  {255, 60, 50}}};
+                                                  {255, 150, 30}}};
   return colours[static_cast<std::size_t>(kind)];
 }
 

@@ -129,8 +129,9 @@ void Recorder::offer_shown(const FramePtr& frame) {
 void Recorder::offer(const session::TrackRecord& record) {
   const std::lock_guard lock(mutex_);
   if (status_.recording || (late_tracks_ && record.timestamp_ns <= queue_.last_frame_ns()))
-    return offer_record(record);
-  queue_.keep(record);
+    offer_record(record);
+  else
+    queue_.keep(record);
 }
 
 void Recorder::offer(const ButtonEvent& event) {
@@ -140,9 +141,7 @@ void Recorder::offer(const ButtonEvent& event) {
 
 bool Recorder::offer(const session::MarkEvent& mark) {
   const std::lock_guard lock(mutex_);
-  if (!status_.recording) return false;
-  offer_record(mark);
-  return true;
+  return status_.recording && offer_record(mark);
 }
 
 void Recorder::offer_event(std::int64_t timestamp_ns, const std::string& what) {
@@ -150,9 +149,11 @@ void Recorder::offer_event(std::int64_t timestamp_ns, const std::string& what) {
   if (status_.recording) offer_record(RecordQueue::Event{timestamp_ns, what});
 }
 
-void Recorder::offer_record(Entry entry) {
-  count_as_lost(queue_.push_record(std::move(entry)));
+bool Recorder::offer_record(Entry entry) {
+  const LeftOut lost = queue_.push_record(std::move(entry));
+  count_as_lost(lost);
   filled_.notify_one();
+  return lost.of_newest == session::Losses{};
 }
 
 void Recorder::count_as_lost(const session::Losses& loss, const char* cause, bool of_newest) {

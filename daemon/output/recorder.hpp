@@ -98,7 +98,7 @@ class Recorder {
   // Takes the tracking of an observer frame, in order; the recorder fills in `frame`.
   void offer(const session::TrackRecord& record);
   void offer(const ButtonEvent& event);
-  bool offer(const session::MarkEvent& mark);  // returns whether a take is recorded that has it
+  bool offer(const session::MarkEvent& mark);  // returns whether a take is recorded and gets it
   void offer_event(std::int64_t timestamp_ns, const std::string& what);
 
   void start();  // begins with what the ring holds
@@ -136,7 +136,7 @@ class Recorder {
   static constexpr const char* disk_failed = "disk failed";  // why something is not kept
 
   // Call these with the lock held.
-  void offer_record(Entry entry);  // or counts it as lost
+  bool offer_record(Entry entry);  // false: it is counted as lost
   void count_as_lost(const session::Losses& loss, const char* cause, bool of_newest);
   void count_as_lost(const LeftOut& left_out);
   void count_failure(const std::string& why);

@@ -28,6 +28,10 @@ std::size_t around(std::size_t index, int next, std::size_t size) {
   return (index + size + static_cast<std::size_t>(next + static_cast<int>(size))) % size;
 }
 
+Outcome only_live() {
+  return {"only the live picture can be marked", true, {}};
+}
+
 Outcome none_of(const char* what) {
   return {std::string("this set has no ") + what, true, {}};
 }
@@ -134,6 +138,7 @@ pipeline::LightEdit& Controls::light_edit() {
 Outcome Controls::perform(const set::Action& action, bool ended_refinement) {
   if (ended_refinement && std::holds_alternative<set::Snapshot>(action.effect))
     return snapshot(&Look::refined_snapshots);
+  if (ended_refinement) aim_.reset();  // it is of the picture before the refinement
   return std::visit([this](const auto& effect) { return apply(effect); }, action.effect);
 }
 
@@ -288,6 +293,7 @@ Outcome Controls::apply(const set::ToggleGuides&) {
 
 Outcome Controls::apply(const set::ToggleMarking&) {
   Marking& marking = look_.marking;
+  if (!marking.is_on && look_.state.mode != Mode::live) return only_live();
   marking.is_on = !marking.is_on;
   return {marking.is_on ? "aim the cross at " + marking.selected() : "marking off", false, {}};
 }
@@ -296,23 +302,31 @@ Outcome Controls::apply(const set::ToggleMarking&) {
 Outcome Controls::apply(const set::MarkCorner&) {
   Marking& marking = look_.marking;
   if (!marking.is_on) return apply(set::ToggleMarking{});
-  if (look_.state.mode != Mode::live) return {"only the live picture can be marked", true, {}};
+  if (look_.state.mode != Mode::live) return only_live();
   if (!look_.state.recording)
     return {"marks are kept in a take; start one with record, then mark", true, {}};
-  if (!aim_ || !aim_->ray)
-    return {"not marked: no tag in the picture shows where the camera is", true, {}};
+  if (!aim_) return {"not marked: the picture was not live; aim and mark again", true, {}};
+  if (!aim_->ray) return {"not marked: no tag in the picture shows where the camera is", true, {}};
+  std::string before;
+  if (!marking.take.empty() && marking.take != take_) {
+    before = "marks so far are in " + marking.take + "; mark its boxes again; ";
+    marking.begin();
+  }
+  marking.take = take_;
   Outcome outcome{"", false, {}, marking.mark(*aim_)};
-  outcome.said = outcome.mark->point + ": " + Marking::words_of(*marking.last());
+  outcome.said = before + outcome.mark->point + ": " + Marking::words_of(*marking.last());
+  if (const std::string box = marking.words_of_box(); !box.empty()) outcome.said += "; " + box;
   return outcome;
 }
 
 Outcome Controls::apply(const set::Unmark&) {
-  if (!look_.state.recording && look_.marking.last())
+  Marking& marking = look_.marking;
+  if (marking.last() && (!look_.state.recording || marking.take != take_))
     return {"the take with these marks has ended", true, {}};
-  std::optional<session::MarkEvent> withdrawn = look_.marking.withdraw();
+  std::optional<session::MarkEvent> withdrawn = marking.withdraw();
   if (!withdrawn) return {"no corner is marked", true, {}};
   const std::string said =
-      withdrawn->point + ": mark withdrawn, " + Marking::words_of(look_.marking.selected_corner());
+      withdrawn->point + ": mark withdrawn, " + Marking::words_of(marking.selected_corner());
   return {said, false, {}, std::move(withdrawn)};
 }
 
@@ -322,8 +336,10 @@ Outcome Controls::apply(const set::NextCorner&) {
 }
 
 Outcome Controls::apply(const set::NextBox&) {
+  const std::size_t before = look_.marking.boxes().size();
   look_.marking.next_box();
-  return {"mark " + look_.marking.selected(), false, {}};
+  const bool is_new = look_.marking.boxes().size() > before;
+  return {"mark " + look_.marking.selected() + (is_new ? ", of a new box" : ""), false, {}};
 }
 
 Outcome Controls::apply(const set::SelectObject& effect) {

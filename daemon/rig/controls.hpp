@@ -86,6 +86,9 @@ class Controls {
   // Takes what the cross of the shown picture is on; nothing: no picture was shown yet.
   void use_aim(std::optional<Aim> aim) { aim_ = std::move(aim); }
 
+  // Takes the name of the take that is recorded, or was last.
+  void use_take(std::string take) { take_ = std::move(take); }
+
   // Forgets the marks, because another take begins.
   void begin_marks() { look_.marking.begin(); }
   // Withdraws the last mark, which no take has.
@@ -167,6 +170,7 @@ class Controls {
   std::map<std::string, Looks> looks_;
   pipeline::RecordedLook recorded_;
   std::optional<Aim> aim_;
+  std::string take_;
   std::vector<std::string> set_lights_;
   std::vector<pipeline::FoundLamp> found_;
   const bool is_animated_;

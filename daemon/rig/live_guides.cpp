@@ -26,11 +26,12 @@ std::shared_ptr<const output::GuidePage> lines_over(const UnderLines& picture, c
   std::optional<output::GuidePage> page;
   const auto model = *picture.model->get();
   if (look.guides && model && picture.view) page = model->guides_of(*picture.view);
+  const bool is_whole = !look.guides || model;
   if (look.marking.is_on && look.state.mode == Mode::live) {
     const output::GuidePage marks =
         marking_lines(look.marking, picture.lens,
                       picture.view ? std::optional(picture.view->world_from_camera) : std::nullopt);
-    if (!page) page = output::GuidePage{marks.width, marks.height, {}, {}};
+    if (!page) page = output::GuidePage{marks.width, marks.height, {}, {}, is_whole};
     page->lines.insert(page->lines.end(), marks.lines.begin(), marks.lines.end());
     page->words.insert(page->words.end(), marks.words.begin(), marks.words.end());
   }

@@ -23,7 +23,7 @@ namespace previz::rig {
 // has gone.
 using GuidesOf = std::function<std::shared_ptr<const output::GuidePage>(const Look&)>;
 
-// Nothing is computed or kept while Look::guides is false, but for the model that was made before.
+// Nothing is measured or kept while Look::guides is false, but for the model that was made before.
 class LiveGuides {
  public:
   struct Parts {  // outlive the guides

@@ -4,48 +4,35 @@
 
 #include <algorithm>
 #include <cmath>
-#include <glm/geometric.hpp>
-#include <glm/mat3x3.hpp>
 #include <numbers>
-
-#include "drivers/calibration/pinhole.hpp"
+#include <tuple>
 
 namespace previz::rig {
 namespace {
 
-// A mark is right to about 2 px by aiming (`previzd model` counts it so). Rays that meet at less
-// than this angle leave a corner 2 px / (focal length * angle) of its distance uncertain: 4 % at a
-// focal length of 600 px.
-constexpr double least_parallax_rad = 5 * std::numbers::pi / 180;
-// Four times that accuracy: one of the marks is of another spot.
-constexpr double most_off_px = 8;
-
-double angle_between(const glm::dvec3& a, const glm::dvec3& b) {
-  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
-}
+// Four times what aiming leaves uncertain: one of the marks is of another spot.
+constexpr double most_off_px = 4 * session::aimed_px;
 
 }  // namespace
 
 Aim aim_of(const pipeline::Shot& shot, const PinholeIntrinsics& lens) {
   Aim aim{shot.frame->timestamp_ns, {0.5 * (lens.width - 1), 0.5 * (lens.height - 1)}, lens.fx, {}};
-  const auto at = undistort(lens, aim.px);
-  if (!at || !shot.track.pose || shot.track.pose->tags.empty()) return aim;
-  const glm::dmat4& camera = shot.track.pose->world_from_camera;
-  aim.ray = {glm::dvec3(camera[3]), glm::normalize(glm::dmat3(camera) * glm::dvec3(*at, 1))};
+  if (shot.track.pose && !shot.track.pose->tags.empty())
+    aim.ray = tracking::ray_through(lens, shot.track.pose->world_from_camera, aim.px);
   return aim;
 }
 
-std::optional<MarkedCorner::Place> MarkedCorner::place() const {
+tracking::Meeting MarkedCorner::meeting() const {
   std::vector<tracking::Ray> rays;
   for (const Mark& mark : marks) rays.push_back(mark.ray);
-  const tracking::Meeting meeting = tracking::meeting_of(rays);
-  if (!(meeting.parallax_rad > 0)) return std::nullopt;
-  Place place{meeting.at, meeting.parallax_rad, 0};
-  for (const Mark& mark : marks) {
-    const double off_rad = angle_between(mark.ray.direction, place.at - mark.ray.origin);
-    place.off_px = std::max(place.off_px, mark.px_per_rad * std::tan(off_rad));
-  }
-  return place;
+  return tracking::meeting_of(rays);
+}
+
+std::optional<glm::dvec3> MarkedCorner::place() const {
+  const tracking::Meeting met = meeting();
+  if (met.parallax_rad < session::least_parallax_rad || met.off_rad > 0.25 * std::numbers::pi)
+    return std::nullopt;
+  return met.at;
 }
 
 void Marking::begin() {
@@ -69,6 +56,7 @@ std::optional<session::MarkEvent> Marking::withdraw() {
   std::vector<MarkedCorner::Mark>& marks = boxes_[box_][corner_].marks;
   const session::MarkEvent event{marks.back().timestamp_ns, selected(), {}, true};
   marks.pop_back();
+  if (order_.empty()) take.clear();
   return event;
 }
 
@@ -89,13 +77,30 @@ std::string Marking::words_of(const MarkedCorner& corner) {
   if (count == 0) return "not marked";
   if (count == 1) return "marked once";
   const std::string times = count == 2 ? "twice" : fmt::format("{} times", count);
-  const auto place = corner.place();
-  if (!place || place->parallax_rad < least_parallax_rad)
+  const tracking::Meeting met = corner.meeting();
+  if (met.parallax_rad < session::least_parallax_rad)
     return "marked " + times + " from one place; go aside and mark it again";
-  if (place->off_px > most_off_px)
-    return fmt::format("its marks are {:.0f} px apart; unmark, and aim at the same spot",
-                       place->off_px);
-  return fmt::format("marked {}, {:.1f} px apart", times, place->off_px);
+  if (!corner.place()) return "its marks are of different corners; unmark, and mark one of them";
+  const double off_px = corner.marks.front().px_per_rad * std::tan(met.off_rad);
+  if (off_px > most_off_px)
+    return fmt::format("its marks miss each other by {:.0f} px; unmark, and aim at the same spot",
+                       off_px);
+  return fmt::format("marked {}, within {:.1f} px", times, off_px);
+}
+
+std::string Marking::words_of_box() const {
+  if (order_.empty()) return {};
+  const Box& box = boxes_[order_.back().first];
+  std::array<glm::dvec3, session::corners_of_a_box> places{};
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto place = box[i].place();
+    if (!place) return {};
+    places[i] = *place;
+  }
+  const std::string name = fmt::format("box {}", order_.back().first + 1);
+  return tracking::are_around_a_rectangle(places)
+             ? name + " is complete"
+             : name + ": its corners are not in order around; unmark, and mark them in order";
 }
 
 const MarkedCorner* Marking::last() const {

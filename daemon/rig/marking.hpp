@@ -39,14 +39,9 @@ struct MarkedCorner {
   };
   std::vector<Mark> marks;
 
-  // Where the rays meet, and how well.
-  struct Place {
-    glm::dvec3 at{0};
-    double parallax_rad = 0;  // the largest angle between two of the rays
-    double off_px = 0;        // of the ray that is farthest off, in its picture
-  };
-  // Returns nothing of fewer than two marks, or if their rays are parallel.
-  std::optional<Place> place() const;
+  tracking::Meeting meeting() const;
+  // Returns where the corner is; nothing if its marks do not show that.
+  std::optional<glm::dvec3> place() const;
 
   friend bool operator==(const MarkedCorner&, const MarkedCorner&) = default;
 };
@@ -54,6 +49,9 @@ struct MarkedCorner {
 class Marking {
  public:
   bool is_on = false;  // the cross is shown
+
+  // The take that has the marks; empty: there are none.
+  std::string take;
 
   // Forgets all marks: those of a take belong to it.
   void begin();
@@ -69,8 +67,10 @@ class Marking {
   // Returns the name of the selected corner, as the take and the model have it: "box 1 corner 2".
   std::string selected() const { return session::name_of({box_, corner_}); }
   const MarkedCorner& selected_corner() const { return boxes_[box_][corner_]; }
-  // Returns in words what the marks of a corner are worth: "marked twice, 0.8 px apart".
+  // Returns in words what the marks of a corner are worth: "marked twice, within 0.8 px".
   static std::string words_of(const MarkedCorner& corner);
+  // Returns in words what the corner that was marked last makes of its box; empty: nothing yet.
+  std::string words_of_box() const;
 
   using Box = std::array<MarkedCorner, session::corners_of_a_box>;
   const std::vector<Box>& boxes() const { return boxes_; }

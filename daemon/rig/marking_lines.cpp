@@ -4,6 +4,7 @@
 
 #include <glm/geometric.hpp>
 #include <iterator>
+#include <utility>
 
 #include "daemon/rig/guide_drawing.hpp"
 
@@ -12,8 +13,8 @@ namespace {
 
 using output::GuideKind;
 
-// Of the picture's width: what is free in the middle, how far the cross reaches, and how large a
-// corner's own cross is.
+// These are shares of the picture's width: what is free in the middle, how far the cross reaches,
+// and how large a corner's own cross is.
 constexpr double free_share = 0.008, arm_share = 0.04, corner_share = 0.008;
 // A ray is drawn between these distances from where the camera was.
 constexpr double nearest_m = 0.1, farthest_m = 20;
@@ -50,7 +51,7 @@ output::GuidePage marking_lines(const Marking& marking, const PinholeIntrinsics&
     for (std::size_t box = 0; box < marking.boxes().size(); ++box)
       for (std::size_t corner = 0; corner < session::corners_of_a_box; ++corner)
         if (const auto place = marking.boxes()[box][corner].place())
-          drawing.word(place->at, fmt::format("{}.{}", box + 1, corner + 1), GuideKind::mark);
+          drawing.word(*place, fmt::format("{}.{}", box + 1, corner + 1), GuideKind::mark);
     const output::GuidePage found = std::move(drawing).page();
     page.lines = found.lines;
     for (const output::GuideWord& corner : found.words) add_corner(page, corner);

@@ -166,12 +166,14 @@ ButtonDesk::Asks Rig::asks_of_buttons() {
   };
   asks.edge = [this](const ButtonEvent& event) {
     recorder_.offer(event);
+    if (event.pressed) pressed_aims_[event.button] = *aim_.get();
     if (!event.pressed || !controls_.pushed()) return false;
     apply({"live", false, {}}, "button " + event.button);
     return true;
   };
   asks.act = [this](const set::Action& action, const std::string& button, bool ended_refinement) {
     know_picture();
+    controls_.use_aim(pressed_aims_[button]);
     apply(controls_.perform(action, ended_refinement), "button " + button);
   };
   return asks;
@@ -218,6 +220,7 @@ void Rig::know_picture() {
   controls_.use_found(pipeline_.found_lamps());
   controls_.use_recorded(pipeline_.recorded_look());
   controls_.use_aim(*aim_.get());
+  controls_.use_take(recorder_.status().directory.filename().string());
   controls_.use_governed(pipeline_.governed().samples);
 }
 
@@ -245,7 +248,7 @@ Outcome Rig::apply(Outcome outcome, const std::string& by, Severity severity) {
   }
   if (outcome.mark && !recorder_.offer(*outcome.mark)) {
     if (!outcome.mark->is_withdrawn) controls_.drop_mark();
-    outcome = {"no take is recorded that could keep the mark", true, {}};
+    outcome = {"not marked: the take ends or has no room for it", true, {}};
   }
   publish_look();  // after the request, so that a take exists before its first shown picture
   if (outcome.refused) severity = Severity::warning;

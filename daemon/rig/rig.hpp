@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <stop_token>
@@ -124,6 +125,8 @@ class Rig {
   std::optional<std::uint64_t> free_bytes_;
   const PinholeIntrinsics lens_;
   pipeline::Newest<std::optional<Aim>> aim_{std::nullopt};  // of the picture that was shown last
+  // When each button went down: whether a press is short, long or double is known only later.
+  std::map<std::string, std::optional<Aim>> pressed_aims_;
   LiveGuides guides_;
   LivePipeline pipeline_;  // last: its threads use all of the above
 };

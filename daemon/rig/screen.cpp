@@ -97,7 +97,7 @@ struct Screen::Impl {
   void run();
   void look_after(std::optional<Picture>& newest);
   void begin_anew();
-  bool renew_guides(const Look& look);
+  bool renew_guides(bool fresh, const Look& look);
   void put(const output::OsdPage& next, bool fresh);
   Screenful compose(const DisplayMode& mode, const output::OsdPage& next);
   void was_shown(const Shown& shown, bool fresh);
@@ -118,6 +118,16 @@ struct Screen::Impl {
   std::vector<Overlay> overlays;  // `painted`, for `painted_for`
   std::optional<Picture> picture;
   std::shared_ptr<const output::GuidePage> guides;  // over `picture`; null: none
+  // What of a look says which lines are wanted.
+  struct Asked {
+    bool guides = false;
+    Marking marking;
+    Mode mode = Mode::standby;
+
+    bool any() const { return guides || marking.is_on; }
+    friend bool operator==(const Asked&, const Asked&) = default;
+  };
+  Asked asked_for;  // when `guides` were made
   PaceMeter pace;
   output::OsdPage page;
   bool up_to_date = false;  // the screen shows `picture` and `page`
@@ -173,19 +183,22 @@ void Screen::Impl::look_after(std::optional<Picture>& newest) {
   dark = false;
   output::OsdPage next;
   if (facts->look.osd) next = osd_page(*facts, picture ? &picture->facts : nullptr, pace.read());
-  const bool other_guides = renew_guides(facts->look);
+  const bool other_guides = renew_guides(fresh, facts->look);
   if (fresh || !up_to_date || other_guides || next != page) put(next, fresh);
 }
 
 // Returns whether the screen has other lines to show. Those of a picture that stands may come late:
 // when they are asked for, or once the model is there.
-bool Screen::Impl::renew_guides(const Look& look) {
-  const bool wanted = look.guides || look.marking.is_on;
+bool Screen::Impl::renew_guides(bool fresh, const Look& look) {
+  Asked asked{look.guides, look.marking, look.state.mode};
+  const bool is_same = asked == asked_for;
+  if (!fresh && is_same && (!asked.any() || (guides && guides->is_whole))) return false;
+  asked_for = std::move(asked);
   std::shared_ptr<const output::GuidePage> next =
-      wanted && picture && picture->guides ? picture->guides(look) : nullptr;
-  const bool same = next && guides ? *next == *guides : next == guides;
+      asked_for.any() && picture && picture->guides ? picture->guides(look) : nullptr;
+  const bool shows_same = next && guides ? *next == *guides : next == guides;
   guides = std::move(next);
-  return !same;
+  return !shows_same;
 }
 
 void Screen::Impl::put(const output::OsdPage& next, bool fresh) {

@@ -121,8 +121,8 @@ class Reader {
   Problems& problems_;
 };
 
-// Returns where a header is first, "[tag]" for example; the file's beginning if it is nowhere.
-Position first_header(const std::string& text, const std::string& header) {
+// Returns where a header is first, "[tag]" for example; `otherwise` if it is nowhere.
+Position first_header(const std::string& text, const std::string& header, Position otherwise) {
   Position at;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line); ++at.line) {
@@ -131,22 +131,22 @@ Position first_header(const std::string& text, const std::string& header) {
     at.column = static_cast<std::uint32_t>(begin + 1);
     return at;
   }
-  return {};
+  return otherwise;
 }
 
 // The parser takes what comes first for right, and reports the second: [tag] after a [[tag]], or
 // the other way round. Adds the problem where the brackets are not those of the section, if that is
 // what the parser means.
-bool add_other_brackets(const std::string& what, const std::string& text,
+bool add_other_brackets(const std::string& what, Position at, const std::string& text,
                         const std::vector<Section>& sections, Problems& problems) {
   const std::size_t begin = what.find('\''), end = what.rfind('\'');
   if (what.find("cannot redefine existing") == std::string::npos || begin >= end) return false;
   const std::string path = what.substr(begin + 1, end - begin - 1);
   const auto section = std::ranges::find(sections, path, &Section::path);
-  if (section == sections.end() || what.find("array") == std::string::npos) return false;
+  if (section == sections.end() || what.find("' as ") == std::string::npos) return false;
   const std::string one = '[' + path + ']', many = '[' + one + ']';
   if (section->kind != Section::Kind::repeated) {
-    problems.add(first_header(text, many), path,
+    problems.add(first_header(text, many, at), path,
                  "is one table; allowed: all its keys under one " + one);
     return true;
   }
@@ -154,7 +154,7 @@ bool add_other_brackets(const std::string& what, const std::string& text,
   for (const Section& other : sections)
     if (other.kind != Section::Kind::repeated) single.push_back(other.path);
   const std::string meant = nearest(path, single);
-  problems.add(first_header(text, one), path,
+  problems.add(first_header(text, one, at), path,
                "is a list of tables; allowed: " + many +
                    (meant.empty() ? "" : "; did you mean [" + meant + "]?"));
   return true;
@@ -177,7 +177,7 @@ toml::table parse_toml(const std::string& text, const std::string& file,
     return toml::parse(text, file);
   } catch (const toml::parse_error& error) {
     const std::string what(error.description());
-    if (!add_other_brackets(what, text, sections, problems))
+    if (!add_other_brackets(what, position(error.source()), text, sections, problems))
       problems.add(position(error.source()), "", "not valid TOML: " + what);
     problems.throw_if_any();
     throw;

@@ -52,6 +52,12 @@ class MarkedTake : public testing::Test {
     return out.str();
   }
 
+  std::string refusal() {
+    const std::string why = test::error_of([&] { made(); });
+    EXPECT_FALSE(fs::exists(folder_ / "demo/marked.glb"));
+    return why;
+  }
+
   test::TemporaryDirectory folder_;
   model::ModelOptions options_;
   std::vector<session::FrameRecord> pictures_;
@@ -67,10 +73,10 @@ TEST_F(MarkedTake, BecomesAModelWithoutAFileOfParts) {
   const std::string said = made();
   EXPECT_THAT(said, HasSubstr("18 marks in 3 pictures"));
   // True: 90 and 80 mm, with faces that are accurate to half a millimetre.
-  EXPECT_THAT(said, testing::ContainsRegex(
-                        "box box 1: (89\\.[4-9]|90\\.[0-6]) x (89\\.[4-9]|90\\.[0-6]) x"));
-  EXPECT_THAT(said, testing::ContainsRegex(
-                        "box box 2: (79\\.[4-9]|80\\.[0-6]) x (79\\.[4-9]|80\\.[0-6]) x"));
+  EXPECT_THAT(said,
+              testing::ContainsRegex("box 1: (89\\.[4-9]|90\\.[0-6]) x (89\\.[4-9]|90\\.[0-6]) x"));
+  EXPECT_THAT(said,
+              testing::ContainsRegex("box 2: (79\\.[4-9]|80\\.[0-6]) x (79\\.[4-9]|80\\.[0-6]) x"));
   EXPECT_TRUE(fs::exists(folder_ / "demo/marked.glb"));
   const set::Set set = set::load_set(*options_.set_file);
   EXPECT_NE(std::ranges::find(set.objects, "marked", &set::Object::name), set.objects.end());
@@ -84,7 +90,10 @@ TEST_F(MarkedTake, SaysWhatABoxLacks) {
   const std::string said = made();
   EXPECT_THAT(said, HasSubstr("warning: box 2 is not in the model: box 2 corner 2 is marked in 1 "
                               "picture and needs two, from different sides"));
-  EXPECT_THAT(said, HasSubstr("box box 1: "));
+  EXPECT_THAT(said, HasSubstr("box 1: 9"));
+  EXPECT_THAT(said, HasSubstr("9 marks in 3 pictures"));
+  EXPECT_THAT(said, testing::Not(HasSubstr("belongs to no part")));
+  EXPECT_THAT(said, HasSubstr("box 1 stands on plane 1 (tags 0, 1, 2)"));
 }
 
 TEST_F(MarkedTake, GivesAFileOfPartsToGoOnWith) {
@@ -111,13 +120,80 @@ TEST_F(MarkedTake, GivesAFileOfPartsToGoOnWith) {
   options_.pictures.reset();
   const std::string direct = made();
   options_.parts_file = file;
-  EXPECT_EQ(made(), direct);
+  EXPECT_EQ("box 1 stands on plane 1 (tags 0, 1, 2)\n" + made(), direct);
 }
 
 TEST_F(MarkedTake, WithoutMarksNeedsAFileOfParts) {
-  const std::string said = test::error_of([&] { made(); });
-  EXPECT_THAT(said, HasSubstr("nothing was marked on the rig while it was recorded; give --parts"));
-  EXPECT_FALSE(fs::exists(folder_ / "demo/marked.glb"));
+  EXPECT_THAT(refusal(),
+              HasSubstr("nothing was marked on the rig while it was recorded; give --parts"));
+  options_.footage = folder_ / "demo";
+  EXPECT_THAT(refusal(), HasSubstr("demo: is no session, and only those have marks"));
+}
+
+// Each is a mistake that a crew can make; nothing is written, and the words say what to do.
+TEST_F(MarkedTake, IsNoModelWithoutABox) {
+  mark("r1", {0, 0});
+  EXPECT_THAT(refusal(), HasSubstr("none of the boxes that were marked can be made"));
+  std::ofstream(options_.footage / "events.jsonl")
+      << "{\"timestamp_ns\": 1, \"mark\": \"box 1 corner 1\", \"px\": [1, 2]}\n";
+  EXPECT_THAT(refusal(), HasSubstr("session: none of its marks can be used; give --parts"));
+}
+
+TEST_F(MarkedTake, LeavesABoxWithCornersInAnotherOrderOut) {
+  for (const auto& [point, corner] : {std::pair("r1", 0), {"r3", 1}, {"r2", 2}})
+    mark(point, {0, std::size_t(corner)});
+  for (std::size_t i = 0; i < 3; ++i) mark("y" + std::to_string(i + 1), {1, i});
+  const std::string said = made();
+  EXPECT_THAT(said, HasSubstr("warning: box 1 is not in the model: its corners were not marked in "
+                              "order around its upper side"));
+  EXPECT_THAT(said, HasSubstr("box 2: "));
+}
+
+// The pictures of a camera that hardly moves, as frame 0 and itself.
+TEST_F(MarkedTake, LeavesABoxWithACornerFromOneSideOut) {
+  for (std::size_t i = 0; i < 3; ++i) mark("y" + std::to_string(i + 1), {1, i});
+  mark("r1", {0, 0});
+  mark("r2", {0, 1});
+  const auto at = [&](std::size_t picture, glm::dvec2 px) {
+    std::ofstream(options_.footage / "events.jsonl", std::ios::app)
+        << session::to_line(
+               session::MarkEvent{pictures_.at(picture).timestamp_ns, "box 1 corner 3", px})
+        << '\n';
+  };
+  // A spot that both pictures show in nearly one direction, by their poses: the horizon.
+  at(0, {320, -200 + 200});
+  at(1, {320, 0});
+  const std::string said = made();
+  EXPECT_THAT(said, HasSubstr("warning: box 1 is not in the model: box 1 corner 3 "));
+  EXPECT_THAT(said, HasSubstr("box 2: "));
+}
+
+// Another corner of the cube in one picture: no model can be made of that box, and the other is.
+TEST_F(MarkedTake, LeavesABoxWhoseMarksDisagreeOut) {
+  for (std::size_t i = 0; i < 3; ++i) mark("y" + std::to_string(i + 1), {1, i});
+  for (std::size_t i = 0; i < 3; ++i) mark("r" + std::to_string(i + 1), {0, i}, 2);
+  std::ofstream(options_.footage / "events.jsonl", std::ios::app)
+      << session::to_line(
+             session::MarkEvent{pictures_.at(5).timestamp_ns, "box 1 corner 1", {110, 290}})
+      << '\n';
+  const std::string said = made();
+  EXPECT_THAT(said, HasSubstr("warning: box 1 is not in the model: "));
+  EXPECT_THAT(said, HasSubstr("box 2: "));
+}
+
+TEST_F(MarkedTake, GivesTheTagsAloneWithoutAMark) {
+  options_.tags_only = true;
+  options_.write = true;
+  made();
+  EXPECT_TRUE(fs::exists(*options_.out));
+}
+
+TEST_F(MarkedTake, IsNamedAsTheTakeBesideTheSet) {
+  for (std::size_t i = 0; i < 3; ++i) mark("r" + std::to_string(i + 1), {0, i});
+  options_.out.reset();
+  options_.footage /= "";
+  made();
+  EXPECT_TRUE(fs::exists(folder_ / "demo/session.glb"));
 }
 
 TEST_F(MarkedTake, DoesWithoutPicturesWhoseTagsDoNotShowTheCamera) {
@@ -127,7 +203,7 @@ TEST_F(MarkedTake, DoesWithoutPicturesWhoseTagsDoNotShowTheCamera) {
   const ObserverCalibration camera = *session::open_session(options_.footage).info.observer;
   const RigMarks marks = rig_marks(options_.footage, camera, tracking);
   EXPECT_TRUE(marks.pictures.empty());
-  EXPECT_TRUE(marks.boxes.empty());
+  EXPECT_TRUE(marks.views.views.empty());
   EXPECT_THAT(marks.missing,
               testing::ElementsAre(
                   "frame 0: shows no tags of the set that fit together; its marks are not used",
@@ -135,28 +211,38 @@ TEST_F(MarkedTake, DoesWithoutPicturesWhoseTagsDoNotShowTheCamera) {
                   "frame 5: shows no tags of the set that fit together; its marks are not used"));
 }
 
-// Boxes without a plane of tags below them, and those on the lid of another box.
+// Boxes stand on the nearest plane of tags that is under them.
 TEST_F(MarkedTake, StandsOnTheNearestPlaneOfTagsBelow) {
   set::Tracking tracking = set::load_set(*options_.set_file).tracking;
   for (std::size_t i = 0; i < 3; ++i) mark("r" + std::to_string(i + 1), {0, i});
   const ObserverCalibration camera = *session::open_session(options_.footage).info.observer;
+  const RigMarks marks = rig_marks(options_.footage, camera, tracking);
   const auto on = [&] {
-    std::ostringstream out;
-    const auto boxes = boxes_of(rig_marks(options_.footage, camera, tracking), tracking.tags, out);
-    return boxes.empty() ? out.str() : boxes[0].on;
+    const MarkedBoxes marked = boxes_of(marks, tracking.tags, options_.footage);
+    return marked.boxes.empty() ? marked.remarks.at(0) : marked.boxes[0].on;
   };
   EXPECT_EQ(on(), "plane 1");
-  set::Tag lid = tracking.tags.front();
-  lid.id = 100;
-  lid.world_from_tag[3].z += 0.05;  // under the cube's upper side, at 0.09 m
-  tracking.tags.push_back(lid);
+  // A tag at the left of the first one, where the cube is, under its upper side at 0.09 m.
+  set::Tag tag = tracking.tags.front();
+  const auto put = [&](double x, double z) {
+    tracking.tags.resize(3);
+    tag.id = 100;
+    tag.world_from_tag[3] = {x, 0, z, 1};
+    tracking.tags.push_back(tag);
+  };
+  put(-0.2, 0.05);
   EXPECT_EQ(on(), "plane 2");
-  tracking.tags.back().world_from_tag[3].z += 0.05;
+  for (const double z : {0.083, 0.09, 0.097, 0.2}) {  // on its lid, as well as marks know that
+    put(-0.2, z);
+    EXPECT_EQ(on(), "plane 1") << z;
+  }
+  put(5, 0.05);  // a table far away
   EXPECT_EQ(on(), "plane 1");
-  // A wall is no ground.
-  tracking.tags.back().world_from_tag =
-      glm::dmat4({1, 0, 0, 0}, {0, 0, 1, 0}, {0, -1, 0, 0}, {0, 5, 0, 1});
+  tag.world_from_tag = glm::dmat4({1, 0, 0, 0}, {0, 0, 1, 0}, {0, -1, 0, 0}, {0, 0, 0, 1});
+  put(-0.2, 0.05);  // a wall
   EXPECT_EQ(on(), "plane 1");
+  tracking.tags.erase(tracking.tags.begin(), tracking.tags.begin() + 3);
+  EXPECT_THAT(on(), HasSubstr("no tag of the set lies flat on what it stands on"));
 }
 
 }  // namespace previz::model::rig_marks_test

@@ -1,5 +1,7 @@
 // A crew that marks corners while it records: what the display shows, and what the take has.
-#include "daemon/output/guide_page.hpp"
+#include <atomic>
+
+#include "drivers/plate.hpp"
 #include "drivers/session/marks.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/pages.hpp"
@@ -15,7 +17,10 @@ constexpr int width = 320, height = 240;
 class RigMarking : public test::RigLive {
  protected:
   RigMarking() {
-    options_.on_screen = [this](const Plate&, const OsdPage& page) { pages_.show(page); };
+    options_.on_screen = [this](const Plate& screen, const OsdPage& page) {
+      orange_ = orange_pixels(screen);
+      pages_.show(page);
+    };
   }
 
   // A take whose pictures show tags, from two places.
@@ -57,11 +62,30 @@ class RigMarking : public test::RigLive {
     return session::read_marks(take_folder(), stream->records());
   }
 
+  // Returns how many pixels of the screen have the colour of the cross.
+  static int orange_pixels(const Plate& screen) {
+    int count = 0;
+    for (std::size_t i = 0; i + 2 < screen.samples.size(); i += 3)
+      count += screen.samples[i] > 240 && screen.samples[i + 1] > 130 &&
+               screen.samples[i + 1] < 170 && screen.samples[i + 2] < 60;
+    return count;
+  }
+
+  // Presses `mark` and returns the times between which the marked picture was shown.
+  std::pair<std::int64_t, std::int64_t> mark(const std::string& answer) {
+    const std::int64_t before = shown_now().shot.frame->timestamp_ns;
+    press("mark");
+    until_said(answer);
+    return {before, shown_now().shot.frame->timestamp_ns};
+  }
+
+  std::atomic<int> orange_ = 0;  // on the screen now
   test::Pages pages_;
 };
 
 TEST_F(RigMarking, KeepsMarksInTheTakeAtTheMiddleOfTheShownPicture) {
   write_take({0});
+  std::vector<std::pair<std::int64_t, std::int64_t>> times;
   run([&] {
     press("mark");
     until_said("aim the cross at box 1 corner 1");
@@ -69,15 +93,12 @@ TEST_F(RigMarking, KeepsMarksInTheTakeAtTheMiddleOfTheShownPicture) {
     until_said("marks are kept in a take");
     begin_take();
     until_more(2);
-    press("mark");
-    until_said("box 1 corner 1: marked once");
-    press("mark");
-    until_said("box 1 corner 2: marked once");
+    times.push_back(mark("box 1 corner 1: marked once"));
+    mark("box 1 corner 2: marked once");
     press("unmark");
     until_said("box 1 corner 2: mark withdrawn, not marked");
     press("next_box");
-    press("mark");
-    until_said("box 2 corner 1: marked once");
+    times.push_back(mark("box 2 corner 1: marked once"));
     until_more(2);
     end_take();
   });
@@ -86,8 +107,34 @@ TEST_F(RigMarking, KeepsMarksInTheTakeAtTheMiddleOfTheShownPicture) {
   ASSERT_EQ(marks.marks.size(), 2u);
   EXPECT_EQ(marks.marks[0].point, "box 1 corner 1");
   EXPECT_EQ(marks.marks[1].point, "box 2 corner 1");
-  for (const session::Marks::Mark& mark : marks.marks) EXPECT_EQ(mark.px, glm::dvec2(159.5, 119.5));
-  EXPECT_LE(marks.marks[0].picture, marks.marks[1].picture);
+  const std::vector<session::FrameRecord> pictures = test::unbroken(take_folder());
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(marks.marks[i].px, glm::dvec2(159.5, 119.5));
+    const std::int64_t time = pictures.at(marks.marks[i].picture).timestamp_ns;
+    EXPECT_GE(time, times[i].first);
+    EXPECT_LE(time, times[i].second);
+  }
+}
+
+TEST_F(RigMarking, ShowsTheCrossOverTheLivePictureAlone) {
+  write_take({0});
+  run([&] {
+    until_more(2);
+    EXPECT_EQ(orange_, 0);
+    press("marking");
+    test::must_come("the cross is there", [&] { return orange_ > 20; });
+    press("guides");  // both
+    pages_.until([](const OsdPage& page) { return says(page.notices, "guides on"); });
+    test::must_come("the cross is there", [&] { return orange_ > 20; });
+    press("guides");
+    press("refine");
+    until_mode(Mode::refine);
+    test::must_come("the cross is gone", [&] { return orange_ == 0; });
+    press("live");
+    test::must_come("the cross is there", [&] { return orange_ > 20; });
+    press("marking");
+    test::must_come("the cross is gone", [&] { return orange_ == 0; });
+  });
 }
 
 TEST_F(RigMarking, NeedsATagInThePicture) {

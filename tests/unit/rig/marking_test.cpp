@@ -35,9 +35,38 @@ TEST(Marking, FindsACornerWhereItsRaysMeet) {
   marking.mark(aim(right, corner));
   const auto place = marking.boxes()[0][0].place();
   ASSERT_TRUE(place);
-  EXPECT_LT(glm::distance(place->at, corner), 1e-12);
-  EXPECT_LT(place->off_px, 1e-6);
-  EXPECT_EQ(Marking::words_of(*marking.last()), "marked twice, 0.0 px apart");
+  EXPECT_LT(glm::distance(*place, corner), 1e-12);
+  EXPECT_EQ(Marking::words_of(*marking.last()), "marked twice, within 0.0 px");
+}
+
+// Two sides of a table; corners of a box on it are marked from each.
+Marking marked_from_two_sides(const std::vector<glm::dvec3>& corners) {
+  Marking marking;
+  for (const glm::dvec3& eye : {left, right})
+    for (const glm::dvec3& at : corners) marking.mark(aim(eye, at));
+  return marking;
+}
+
+TEST(Marking, SaysWhenABoxIsCompleteAndWhetherItsCornersAreInOrder) {
+  const glm::dvec3 x(0.1, 0, 0), y(0, 0.1, 0);
+  EXPECT_EQ(marked_from_two_sides({corner, corner + x, corner + x + y}).words_of_box(),
+            "box 1 is complete");
+  EXPECT_EQ(marked_from_two_sides({corner, corner + x + y, corner + x}).words_of_box(),
+            "box 1: its corners are not in order around; unmark, and mark them in order");
+  EXPECT_EQ(marked_from_two_sides({corner, corner + x}).words_of_box(), "");
+  EXPECT_EQ(Marking().words_of_box(), "");
+}
+
+// From the left the left corner, from the right the right one: rays that part meet behind the
+// cameras.
+TEST(Marking, TakesNoTwoCornersForOne) {
+  MarkedCorner two;
+  for (const Aim& a :
+       {aim(left, left + glm::dvec3(-0.3, 1, 0)), aim(right, right + glm::dvec3(0.3, 1, 0))})
+    two.marks.push_back({1, *a.ray, a.px_per_rad});
+  EXPECT_FALSE(two.place());
+  EXPECT_EQ(Marking::words_of(two),
+            "its marks are of different corners; unmark, and mark one of them");
 }
 
 TEST(Marking, GoesAroundTheCornersAndOnToOtherBoxes) {
@@ -77,8 +106,9 @@ TEST(Marking, SaysWhatIsWrongWithACorner) {
   MarkedCorner apart;
   for (const Aim& a : {aim(left, corner, -20), aim(right, corner), aim(above, corner)})
     apart.marks.push_back({1, *a.ray, a.px_per_rad});
-  EXPECT_GT(apart.place()->off_px, 8);
-  EXPECT_THAT(Marking::words_of(apart), HasSubstr("px apart; unmark, and aim at the same spot"));
+  EXPECT_THAT(Marking::words_of(apart),
+              testing::MatchesRegex(
+                  "its marks miss each other by [0-9]+ px; unmark, and aim at the same spot"));
   MarkedCorner near;
   for (const glm::dvec3& eye : {left, left + glm::dvec3(0.05, 0, 0)})
     near.marks.push_back({1, *aim(eye, corner).ray, focal_px});
@@ -162,15 +192,16 @@ TEST(MarkingControls, MarkOnlyWhereAMarkIsKeptAndMeansSomething) {
   EXPECT_TRUE(desk.controls.look().marking.is_on);
   EXPECT_EQ(desk("mark").said, "marks are kept in a take; start one with record, then mark");
   desk("record");
-  EXPECT_EQ(desk("mark").said, "not marked: no tag in the picture shows where the camera is");
+  EXPECT_EQ(desk("mark").said, "not marked: the picture was not live; aim and mark again");
   desk.controls.use_aim(Aim{});
-  EXPECT_TRUE(desk("mark").refused);
+  EXPECT_EQ(desk("mark").said, "not marked: no tag in the picture shows where the camera is");
   desk.controls.use_aim(aim(left, corner, 0, 5));
+  desk.controls.use_take("12A_take001");
   const Outcome marked = desk("mark");
   EXPECT_EQ(marked.said, "box 1 corner 1: marked once");
   EXPECT_EQ(marked.mark, (session::MarkEvent{5, "box 1 corner 1", {319.5, 239.5}}));
   EXPECT_EQ(desk("next_corner").said, "mark box 1 corner 3");
-  EXPECT_EQ(desk("next_box").said, "mark box 2 corner 1");
+  EXPECT_EQ(desk("next_box").said, "mark box 2 corner 1, of a new box");
   const Outcome withdrawn = desk("unmark");
   EXPECT_EQ(withdrawn.said, "box 1 corner 1: mark withdrawn, not marked");
   EXPECT_EQ(withdrawn.mark, (session::MarkEvent{5, "box 1 corner 1", {}, true}));
@@ -183,10 +214,37 @@ TEST(MarkingControls, MarkOnlyWhereAMarkIsKeptAndMeansSomething) {
   desk("record");
   EXPECT_EQ(desk("unmark").said, "the take with these marks has ended");
   EXPECT_EQ(desk("marking").said, "marking off");
+  desk("refine");
+  EXPECT_EQ(desk("marking").said, "only the live picture can be marked");
+  desk("live");
   EXPECT_EQ(desk("marking").said, "aim the cross at box 1 corner 2");
   desk.controls.begin_marks();
   EXPECT_EQ(desk("unmark").said, "no corner is marked");
   EXPECT_TRUE(desk.controls.look().marking.is_on);
+}
+
+// A recording goes on in another take if a disk is full, without a press.
+TEST(MarkingControls, BeginAgainInATakeThatDoesNotHaveTheMarks) {
+  Desk desk;
+  desk("marking");
+  desk("record");
+  desk.controls.use_take("12A_take001");
+  desk.controls.use_aim(aim(left, corner));
+  desk("mark");
+  desk.controls.use_take("12A_take002");
+  EXPECT_EQ(desk("unmark").said, "the take with these marks has ended");
+  EXPECT_EQ(desk("mark").said,
+            "marks so far are in 12A_take001; mark its boxes again; box 1 corner 1: marked once");
+  EXPECT_EQ(desk("unmark").said, "box 1 corner 1: mark withdrawn, not marked");
+}
+
+// The press that ends a refinement was aimed at the picture before it.
+TEST(MarkingControls, DoNotMarkWithThePressThatEndsARefinement) {
+  Desk desk;
+  desk("marking");
+  desk("record");
+  desk.controls.use_aim(aim(left, corner));
+  EXPECT_TRUE(desk.controls.perform(*set::find_action("mark"), true).refused);
 }
 
 }  // namespace previz::rig::marking_test

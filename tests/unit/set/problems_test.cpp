@@ -62,6 +62,7 @@ const Mistake syntax[] = {
     {"[quality]\nsamples = 1\n[[quality]]\n", "3:1: quality: is one table",
      "all its keys under one [quality]"},
     {"[[quality]]\n[quality]\n", "1:1: quality: is one table", ""},
+    {"[set]\n[[ quality ]]\n[quality]\n", "3:1: quality: is one table", ""},
 };
 INSTANTIATE_TEST_SUITE_P(Syntax, SetMistake, testing::ValuesIn(syntax));
 
