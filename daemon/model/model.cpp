@@ -342,7 +342,7 @@ std::string coloured_model(const ModelOptions& options, const set::Set& set, con
 void insist_on_parts(const ModelOptions& options) {
   if (options.parts_file.empty() && !options.tags_only && !calibrate::is_session(options.footage))
     throw Error(options.footage.string() +
-                ": is no session, and only those have marks that were made on the rig; give "
+                ": is not a session, and only those have marks that were made on the rig; give "
                 "--parts, the file that lists the scene's parts, which --pictures FOLDER writes");
 }
 

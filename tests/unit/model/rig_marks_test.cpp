@@ -127,7 +127,7 @@ TEST_F(MarkedTake, WithoutMarksNeedsAFileOfParts) {
   EXPECT_THAT(refusal(),
               HasSubstr("nothing was marked on the rig while it was recorded; give --parts"));
   options_.footage = folder_ / "demo";
-  EXPECT_THAT(refusal(), HasSubstr("demo: is no session, and only those have marks"));
+  EXPECT_THAT(refusal(), HasSubstr("demo: is not a session, and only those have marks"));
 }
 
 // Each is a mistake that a crew can make; nothing is written, and the words say what to do.
