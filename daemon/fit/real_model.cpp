@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <glm/geometric.hpp>
 #include <map>
+#include <string>
 #include <utility>
 
 namespace previz::fit {
@@ -47,28 +48,56 @@ bool is_touched(const lighting::Room& surface, const FeatureEdge& edge) {
   return false;
 }
 
+// Puts something before or behind names that are not the only ones of their kind.
+template <typename Rename>
+void rename_alike(std::vector<std::string>& names, Rename rename) {
+  std::map<std::string, std::vector<std::size_t>> alike;
+  for (std::size_t number = 0; number < names.size(); ++number)
+    alike[names[number]].push_back(number);
+  for (const auto& [name, numbers] : alike)
+    for (std::size_t i = 0; i < numbers.size() && numbers.size() > 1; ++i)
+      rename(numbers[i], i + 1, numbers.size());
+}
+
 // Gives the things of a scene numbers.
 class Naming {
  public:
   std::size_t number_of(const scene::Instance& instance) {
     if (instance.tag != scene::TagPart::none) return no_thing;
-    auto& named = objects_[instance.object];
-    const auto [at, is_new] = named.try_emplace(instance.name, count_);
-    if (is_new) ++count_;
+    const auto [at, is_new] =
+        numbers_.try_emplace({instance.object, instance.placed}, things_.size());
+    if (is_new) things_.push_back({instance.object, instance.node}), ++of_object_[instance.object];
     return at->second;
   }
 
   std::vector<std::string> names(const set::Set& set) const {
-    std::vector<std::string> names(count_);
-    for (const auto& [object, nodes] : objects_)
-      for (const auto& [name, number] : nodes)
-        names[number] = nodes.size() == 1 || name.empty() ? set.objects[object].name : name;
+    std::vector<std::string> names;
+    for (const Thing& thing : things_)
+      names.push_back(is_object(thing) ? set.objects[thing.object].name : thing.node);
+    rename_alike(names, [&](std::size_t number, std::size_t, std::size_t) {
+      const Thing& thing = things_[number];
+      if (!is_object(thing)) names[number] = set.objects[thing.object].name + ": " + thing.node;
+    });
+    rename_alike(names, [&](std::size_t number, std::size_t which, std::size_t of) {
+      names[number] += " (" + std::to_string(which) + " of " + std::to_string(of) + ')';
+    });
     return names;
   }
 
  private:
-  std::size_t count_ = 0;
-  std::map<std::uint32_t, std::map<std::string, std::size_t>> objects_;
+  struct Thing {
+    std::uint32_t object = 0;
+    std::string node;
+  };
+
+  // Returns whether a thing has the name of its object.
+  bool is_object(const Thing& thing) const {
+    return thing.node.empty() || of_object_.at(thing.object) == 1;
+  }
+
+  std::vector<Thing> things_;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> numbers_;  // by object, placed
+  std::map<std::uint32_t, std::size_t> of_object_;                          // things
 };
 
 }  // namespace

@@ -41,8 +41,9 @@ class RealModel {
   const std::vector<ModelEdge>& edges() const { return edges_; }
 
   // Returns the names of the things that the model consists of: the nodes of the files, or the
-  // object itself where its file has one node, or where a node has no name. Printed tags, and what
-  // is under them, are no things.
+  // object itself where its file has one node, or where a node has no name. Every copy of a node is
+  // a thing. Names that would be alike begin with the object's, as "crates: lid", or end with a
+  // number, as "chair (2 of 5)". Printed tags, and what is under them, are no things.
   const std::vector<std::string>& things() const { return things_; }
 
   // Returns whether the model does not hide a point of an edge from an eye, to one part in a

@@ -108,10 +108,11 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
   std::optional<GltfAnimation> played;
   if (!object.animation.empty()) played.emplace(model, object.animation, file, notes);
   Animation animation;
+  std::uint32_t count_placed = 0;
   for (const PlacedNode& placed : place_nodes(model, object.nodes, file, notes)) {
     const tinygltf::Node& node = model.nodes[static_cast<std::size_t>(placed.node)];
     Instance instance;
-    instance.name = node.name;
+    instance.name = instance.node = node.name;
     instance.presence = presence_bits(object.presence);
     instance.object = object_index;
     if (object.presence == set::Presence::phantom) {
@@ -132,9 +133,11 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
       if (deforms.is_skinned && copies.size() > 1)
         notes.add(node_name(model, placed.node) + ": a skin places its mesh; only one of its " +
                   std::to_string(copies.size()) + " copies is kept");
-      for (std::size_t i = 0; i < copies.size(); ++i)
+      for (std::size_t i = 0; i < copies.size(); ++i) {
+        instance.placed = count_placed++;
         add_mesh(placed,
                  {instance, copies[i], i == 0, object.world_from_file * z_up_from_y_up, deforms});
+      }
     }
     add_light(placed, instance.world_from_object, instance.presence);
     if (!played) continue;

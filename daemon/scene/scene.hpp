@@ -73,6 +73,11 @@ struct Instance {
   glm::dmat4 world_from_object{1.0};
   TagPart tag = TagPart::none;
   int tag_id = -1;  // of a part of a tag
+  // The name of the node in the object's file. A node of several primitives has an instance for
+  // each, the names of which end with numbers.
+  std::string node{};
+  // The primitives of one node, or of one of its copies, have a number of their own in an object.
+  std::uint32_t placed = 0;
 };
 
 // Puts printed tags, and what is under them, into the worlds that they are in when tags are shown
