@@ -133,8 +133,11 @@ std::string to_json(const MetricsSnapshot& snapshot) {
   json["model_fit_px"] = nullptr;
   if (const std::optional<ModelFit>& fit = snapshot.model_fit) {
     auto& of_model = json["model_fit_px"];
-    of_model = {
-        {"median", fit->median_px}, {"of_90_percent", fit->most_px}, {"shift", fit->shift_px}};
+    of_model = {{"median", nullptr}, {"of_90_percent", nullptr}, {"shift", nullptr}};
+    if (fit->all)
+      of_model = {{"median", fit->all->median_px},
+                  {"of_90_percent", fit->all->most_px},
+                  {"shift", fit->all->shift_px}};
     of_model["things_off"] = nlohmann::ordered_json::array();
     for (const auto& [name, shift_px] : fit->things_off)
       of_model["things_off"].push_back({{"name", name}, {"shift", shift_px}});

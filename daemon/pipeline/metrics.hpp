@@ -34,9 +34,12 @@ struct PassMetrics {
 
 // How far the model of what is real is from the edges of the camera's picture, as fit::Figure says.
 struct ModelFit {
-  double median_px = 0;  // >= 0
-  double most_px = 0;    // 90 % of the edges are nearer
-  double shift_px = 0;   // of the whole model
+  struct All {
+    double median_px = 0;  // >= 0
+    double most_px = 0;    // 90 % of the edges are nearer
+    double shift_px = 0;   // of the whole model
+  };
+  std::optional<All> all;  // absent: the last picture shows too few edges
   // Things that are off while the rest fits, by name, and by how much, px; the worst first.
   std::vector<std::pair<std::string, double>> things_off;
 };
@@ -159,7 +162,8 @@ class DeviceCounts {
 //  "devices": {"observer": {"lost": ..., "stream missing packets": ...}},
 //  "passes": {"extend": {"runs": ..., "busy_s": ...}}, "latency_s": {"p50": ..., "p99": ...},
 //  "model_fit_px": {"median": ..., "of_90_percent": ..., "shift": ...,
-//                   "things_off": [{"name": ..., "shift": ...}]}}; the last is null if absent
+//                   "things_off": [{"name": ..., "shift": ...}]}}; the last is null if absent, and
+// its three numbers are if the last picture gives none
 std::string to_json(const MetricsSnapshot& snapshot);
 
 // Returns the smallest value that at least `fraction` (0..1) of the values do not exceed; 0 if

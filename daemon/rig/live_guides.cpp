@@ -106,8 +106,10 @@ void LiveGuides::measure(const Seen& seen) {
 void LiveGuides::publish(const std::optional<fit::Figure>& figure) {
   figure_.set(figure);
   std::optional<pipeline::ModelFit> fit;
-  if (figure && figure->off) {
-    fit = {figure->off->median_px, figure->off->most_px, figure->off->shift_px, {}};
+  if (figure && (figure->off || !figure->things_off.empty())) {
+    fit.emplace();
+    if (figure->off)
+      fit->all = {figure->off->median_px, figure->off->most_px, figure->off->shift_px};
     for (const fit::ThingOff& thing : figure->things_off)
       fit->things_off.emplace_back(thing.name, thing.shift_px);
   }

@@ -201,8 +201,8 @@ PictureFacts facts_of(const pipeline::Shot& shot) {
 }
 
 std::string words_of(const fit::Figure& figure) {
-  if (!figure.off) return "model: no figure: " + figure.why;
   if (!figure.things_off.empty()) return words_of(figure.things_off);
+  if (!figure.off) return "model: no figure: " + figure.why;
   const double off_px = fit::off_px(figure);
   if (off_px > fit::most_off_px)
     return fmt::format("model off by {}: check phantom or tags", pixels(off_px));

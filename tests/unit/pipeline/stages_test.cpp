@@ -211,11 +211,14 @@ TEST(Metrics, JsonHasTheFitOfTheModelWhileItIsMeasured) {
     return nlohmann::json::parse(to_json(metrics.snapshot(1)))["model_fit_px"];
   };
   EXPECT_TRUE(fit().is_null());
-  metrics.model_fit(ModelFit{0.3, 0.8, 0.5, {{"red cube", 4}}});
+  metrics.model_fit(ModelFit{ModelFit::All{0.3, 0.8, 0.5}, {{"red cube", 4}}});
   EXPECT_EQ(fit()["median"], 0.3);
   EXPECT_EQ(fit()["of_90_percent"], 0.8);
   EXPECT_EQ(fit()["shift"], 0.5);
   EXPECT_EQ(fit()["things_off"], nlohmann::json::array({{{"name", "red cube"}, {"shift", 4}}}));
+  metrics.model_fit(ModelFit{{}, {{"red cube", 4}}});
+  EXPECT_TRUE(fit()["median"].is_null());
+  EXPECT_EQ(fit()["things_off"].size(), 1u);
   metrics.model_fit(std::nullopt);
   EXPECT_TRUE(fit().is_null());
 }

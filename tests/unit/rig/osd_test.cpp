@@ -209,6 +209,11 @@ TEST(OsdWords, AThingThatIsOffIsNamedAndAlarming) {
   rig.fit->things_off.push_back({"b\n", 2.5, 20});
   EXPECT_EQ(words_of(*rig.fit),
             "\"red cube\" off by 4.1 px: moved, or misplaced in the model; 2 other things off");
+  // The last picture alone may show too few edges for a figure.
+  rig.fit->things_off.resize(1);
+  rig.fit->off.reset();
+  rig.fit->why = "too few edges";
+  EXPECT_EQ(osd_page(rig, &picture, pace).notices, page.notices);
 }
 
 TEST(OsdWords, SayWhyThereIsNoFigureOfTheModel) {
