@@ -1,5 +1,7 @@
 #include "daemon/fit/figure.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -59,22 +61,28 @@ double off_px(const Figure& figure) {
 }
 
 void Measurement::look(const Frame& frame, const glm::dmat4& world_from_camera) {
+  const PinholeIntrinsics& lens = camera_.intrinsics;
+  if (frame.width != lens.width || frame.height != lens.height) {
+    refused_ = fmt::format("the pictures have {}x{} pixels, and the lens is calibrated for {}x{}",
+                           frame.width, frame.height, lens.width, lens.height);
+    return;
+  }
   const tracking::Photometry photometry(camera_.response);
   const auto luminance = [&](int x, int y) { return photometry.luminance(frame, x, y); };
   ++frames_;
   std::vector<Looked> found;
   std::map<std::size_t, ThingVotes> things;
-  for (const Segment& piece : measurable_pieces(model_, camera_.intrinsics, world_from_camera)) {
+  for (const Segment& piece : measurable_pieces(model_, lens, world_from_camera)) {
     ++looked_at_;
     ThingVotes& thing = things[piece.thing];
     ++thing.looked_at;
     const glm::dvec2 along = glm::normalize(piece.b - piece.a), normal(-along.y, along.x);
     Looked looked{normal,
-                  look_near(luminance, camera_.intrinsics, piece, normal),
+                  look_near(luminance, lens, piece, normal),
                   0.5 * (piece.a + piece.b),
                   piece.thing,
                   {}};
-    looked.px_per_m = px_per_m(camera_.intrinsics, world_from_camera, looked.at, piece.depth_m);
+    looked.px_per_m = px_per_m(lens, world_from_camera, looked.at, piece.depth_m);
     if (looked.lights.empty()) continue;
     thing.votes.add(looked);
     found.push_back(std::move(looked));
@@ -88,7 +96,10 @@ void Measurement::look(const Frame& frame, const glm::dmat4& world_from_camera) 
 }
 
 Figure Measurement::figure() const {
-  Figure figure{frames_, looked_at_, off_px_.size(), {}, {}, things_.off(model_.things())};
+  Figure figure{frames_, looked_at_, off_px_.size(), {}, refused_, {}, {}};
+  if (!refused_.empty()) return figure;
+  figure.things_off = things_.off(model_.things());
+  figure.not_judged = things_.not_judged(model_.things());
   if (frames_ == 0)
     figure.why = "none of the pictures looked at has a pose";
   else if (looked_at_ < least_pieces)

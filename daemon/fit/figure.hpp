@@ -30,6 +30,8 @@ struct Figure {
   std::optional<Off> off;            // absent: too few were found
   std::string why;                   // the reason then, in plain words
   std::vector<ThingOff> things_off;  // while the rest fits; the worst first
+  // Things of which the last pictures show too few edges to say whether they are off.
+  std::vector<std::string> not_judged;
 };
 
 // Returns how far off the model is, to compare with most_off_px: the median of its edges or the
@@ -43,7 +45,8 @@ class Measurement {
   Measurement(const RealModel& model, const ObserverCalibration& camera, Things things = {})
       : model_(model), camera_(camera), things_(std::move(things)) {}
 
-  // The frame is of the size that the camera is calibrated for.
+  // A frame of another size than the camera is calibrated for is not looked at. The figure then
+  // says why it is none.
   void look(const Frame& frame, const glm::dmat4& world_from_camera);
 
   Figure figure() const;
@@ -53,9 +56,10 @@ class Measurement {
   const RealModel& model_;
   const ObserverCalibration& camera_;
   std::size_t frames_ = 0, looked_at_ = 0;
-  std::vector<double> off_px_;    // of the pieces that were found
-  std::vector<double> shift_px_;  // of the frames in which some were
+  std::vector<double> off_px_;    // a number for each piece that was found
+  std::vector<double> shift_px_;  // a number for each frame in which some were found
   Things things_;
+  std::string refused_;  // why a frame was not looked at
 };
 
 }  // namespace previz::fit

@@ -10,9 +10,12 @@
 namespace previz::fit {
 namespace {
 
-constexpr int rounds = 10;          // in which more and more of the rest agrees
-constexpr double unit_px = 100;     // a turn and a growth are in px over this distance
-constexpr double stiffness = 1e-3;  // of them, so that pieces in one place decide on neither
+// More of the rest agrees after each round.
+constexpr int rounds = 10;
+// A turn and a growth are in px over this distance.
+constexpr double unit_px = 100;
+// Turns and growths are held back by this, so that pieces in one place decide on neither.
+constexpr double stiffness = 1e-3;
 
 // A motion is a shift, x and y, a turn and a growth about a middle. Returns how it shifts what is
 // `away` from there.

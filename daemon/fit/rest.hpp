@@ -12,13 +12,14 @@ namespace previz::fit {
 inline constexpr double most_off_px = 2;
 // Fewer pieces of edges than this give no figure.
 inline constexpr std::size_t least_pieces = 8;
-// Of the pieces that should agree on something, so many must.
+// This share of the pieces that should agree on something must do so.
 inline constexpr double most_of = 0.5;
 
 struct RestShift {
-  glm::dvec2 common{0};  // of all of the rest
-  // Where the thing is, if the rest is not only shifted, but also turned and larger or smaller in
-  // the picture, as it is where the camera is thought to be turned.
+  // All of the rest is shifted by this.
+  glm::dvec2 common{0};
+  // The thing is shifted by this if the rest is not only shifted, but also turned and larger or
+  // smaller in the picture, as it is where the camera is thought to be turned.
   glm::dvec2 turned{0};
 };
 

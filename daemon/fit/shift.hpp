@@ -14,8 +14,8 @@ inline constexpr double reach_px = 12;
 
 // An edge of light near a piece of an edge of the model.
 struct Light {
-  double along_normal_px = 0;  // of its middle, from the piece's
-  double off_px = 0;           // of its ends, >= 0, in the mean
+  double along_normal_px = 0;  // from the piece's middle to that of the light
+  double off_px = 0;           // from the piece's ends to the light, >= 0, the mean of both
 };
 
 // A piece of an edge that has edges of light nearby.

@@ -15,17 +15,19 @@ namespace previz::fit {
 
 struct ThingOff {
   std::string name;
-  double shift_px = 0;     // in the pictures, the mean of its pieces
-  std::size_t pieces = 0;  // that were found of it, in the frames in which the rest fits
+  // The thing would have to be moved by this in the pictures; the mean of its pieces.
+  double shift_px = 0;
+  // So many of its pieces were found in the frames in which the rest fits.
+  std::size_t pieces = 0;
 };
 
-// What one frame shows of a thing.
+// One frame says this about a thing.
 struct ThingVotes {
   std::size_t looked_at = 0;
-  Votes votes;  // of the pieces that were found
+  Votes votes;  // only pieces that were found vote
 };
 
-// So many frames, the last ones, decide on a thing: one alone mostly shows too little of it.
+// The last frames, so many of them, decide on a thing: one alone mostly shows too little of it.
 inline constexpr std::size_t frames_judged = 5;
 
 // A thing is off if its pieces of these frames
@@ -43,18 +45,24 @@ class Things {
   // Returns the things that are off, the worst first. `names` is RealModel::things().
   std::vector<ThingOff> off(const std::vector<std::string>& names) const;
 
+  // Returns the things of which these frames show too few edges to say whether they are off.
+  std::vector<std::string> not_judged(const std::vector<std::string>& names) const;
+
  private:
   struct Piece {
     Looked looked;
-    RestShift rest;  // of the frame
+    RestShift rest;  // that of the piece's frame
   };
   struct Judged {
+    std::size_t found = 0;  // pieces, also where the rest does not fit
+    // These are of the frames in which the rest fits.
     std::size_t looked_at = 0;
     std::vector<Piece> pieces;
   };
   using JudgedThings = std::map<std::size_t, Judged>;
 
-  JudgedThings judged() const;  // in all frames
+  // Returns the sums of all frames.
+  JudgedThings judged() const;
 
   std::deque<JudgedThings> frames_;
 };

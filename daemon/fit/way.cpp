@@ -8,7 +8,8 @@
 namespace previz::fit {
 namespace {
 
-constexpr int ways_to_reach = int(reach_px);  // a way for every pixel
+// Ways are tried for every pixel.
+constexpr int ways_to_reach = int(reach_px);
 constexpr int rounds_of_way = 5;
 
 // Returns the metres that are a pixel across the picture, in the mean.
@@ -28,7 +29,12 @@ glm::dvec3 coarse_way(const std::vector<Looked>& pieces, double metres_of_a_px) 
       for (int x = -ways_to_reach; x <= ways_to_reach; ++x) {
         const glm::dvec3 way_px(x, y, z), way_m = metres_of_a_px * way_px;
         double sum = -share_a_px * double(pieces.size()) * glm::length(way_px);
-        for (const Looked& piece : pieces) sum += agreement(piece, shift_by(piece, way_m), 2);
+        std::size_t left = pieces.size();
+        for (const Looked& piece : pieces) {
+          sum += agreement(piece, shift_by(piece, way_m), 2);
+          // A piece agrees by 1 at most, so that those that are left cannot make up for the rest.
+          if (sum + double(--left) < most) break;
+        }
         if (sum > most) most = sum, best = way_m;
       }
   return best;

@@ -13,6 +13,7 @@ namespace previz::post {
 namespace {
 
 constexpr std::size_t frames_looked_at = fit::frames_judged;
+constexpr std::size_t most_names = 12;  // in a line
 
 bool has_real(const set::Set& set) {
   return std::ranges::any_of(set.objects, [](const set::Object& object) {
@@ -22,6 +23,16 @@ bool has_real(const set::Set& set) {
 
 std::string pieces(std::size_t count) {
   return set::plural(count, "piece") + (count == 1 ? " of an edge" : " of edges");
+}
+
+// "a", "b" and 3 others
+std::string quoted(const std::vector<std::string>& names) {
+  const std::size_t shown = names.size() <= most_names ? names.size() : most_names - 1;
+  std::string text;
+  for (std::size_t i = 0; i < shown; ++i)
+    text += fmt::format("{}\"{}\"", i == 0 ? "" : ", ", set::printable(names[i]));
+  if (shown < names.size()) text += fmt::format(" and {} others", names.size() - shown);
+  return text;
 }
 
 constexpr const char* what_to_do =
@@ -80,6 +91,9 @@ void describe_fit(const fit::Figure& figure, const set::Set& set, std::ostream& 
                        figure.why, pieces(figure.found), figure.looked_at,
                        set::plural(figure.frames, "frame"));
   out << '\n';
+  if (figure.off && !figure.not_judged.empty())
+    out << "  not judged, because too few of their edges can be seen: " << quoted(figure.not_judged)
+        << '\n';
 }
 
 void remark_on_fit(const fit::Figure& figure, const set::Set& set, set::Findings& findings) {

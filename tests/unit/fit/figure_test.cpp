@@ -168,8 +168,11 @@ std::string names_of(const Figure& figure) {
 // The shift is found to a step of 0.5 px on either axis, so to 0.36 px; the near and the far end of
 // a box of 0.16 m, seen from 1.1 m, differ by 15 %, the middle and an end by 0.4 px of 5.
 TEST(ModelFigure, NamesTheThingThatWasMovedWhileTheRestFits) {
+  const glm::dvec3 right(1, 0, 0), back(0, 1, 0), aslant(-0.6, 0.8, 0);
+  const std::array<std::vector<glm::dvec3>, 3> directions = {
+      {{right, back, aslant}, {right, back}, {back, aslant}}};
   for (std::size_t moved = 0; moved < 3; ++moved)
-    for (const glm::dvec3& direction : {glm::dvec3(1, 0, 0), {0, 1, 0}, {-0.6, 0.8, 0}}) {
+    for (const glm::dvec3& direction : directions[moved]) {
       auto drawn = boxes();
       Box& box = drawn[moved];
       box.low += way_of(5, box.low + 0.5 * box.size, direction);
@@ -249,39 +252,64 @@ TEST(ModelFigure, NamesNothingForOtherEdgesNearby) {
   EXPECT_EQ(names_of(figure_of(modelled, frame)), "");
 }
 
+Frame picture_with_red_moved() {
+  auto drawn = boxes();
+  drawn[0].low += way_of(5, drawn[0].low, {1, 0, 0});
+  return picture_of(drawn);
+}
+
 // A thing that is off in some frames is hidden there by somebody, or they are blurred.
 TEST(ModelFigure, NamesWhatIsOffInMostFrames) {
   const fit::RealModel model = model_of(boxes()).model();
   const ObserverCalibration camera = test::camera_of_tests();
-  auto moved = boxes();
-  moved[0].low += way_of(5, moved[0].low, {1, 0, 0});
-  for (const int off : {0, 2, 3, 4, 5}) {
+  const Frame still = picture_of(boxes()), moved = picture_with_red_moved();
+  for (const int off : {2, 3, 4}) {
     fit::Measurement measurement(model, camera);
-    for (int i = 0; i < 5; ++i)
-      measurement.look(picture_of(i < off ? moved : boxes()), test::place_of_camera());
+    for (int i = 0; i < 5; ++i) measurement.look(i < off ? moved : still, test::place_of_camera());
     EXPECT_EQ(names_of(measurement.figure()), off >= 4 ? "red;" : "") << off;
   }
+}
+
+// Somebody stands before it in the other frames.
+TEST(ModelFigure, NamesNothingThatMostFramesDoNotShow) {
+  const fit::RealModel model = model_of(boxes()).model();
+  const ObserverCalibration camera = test::camera_of_tests();
+  auto drawn = boxes();
+  drawn.erase(drawn.begin());
+  const Frame hidden = picture_of(drawn);
+  fit::Measurement measurement(model, camera);
+  measurement.look(picture_with_red_moved(), test::place_of_camera());
+  EXPECT_EQ(names_of(measurement.figure()), "red;");
+  for (int i = 0; i < 2; ++i) measurement.look(hidden, test::place_of_camera());
+  EXPECT_EQ(names_of(measurement.figure()), "");
+}
+
+TEST(ModelFigure, NamesTheThingsThatAreNotJudged) {
+  EXPECT_EQ(figure_of(model_of(boxes()), picture_of(boxes())).not_judged,
+            std::vector<std::string>{"table"});
+  auto drawn = boxes();
+  drawn.erase(drawn.begin());
+  auto modelled = boxes();
+  modelled.push_back({"behind", {0.5, -2, 0}, {0.1, 0.1, 0.1}});
+  EXPECT_EQ(figure_of(model_of(modelled), picture_of(drawn)).not_judged,
+            (std::vector<std::string>{"red", "behind", "table"}));
 }
 
 // What was put back is off no more after so many frames.
 TEST(ModelFigure, NamesThingsByTheLastFrames) {
   const fit::RealModel model = model_of(boxes()).model();
   const ObserverCalibration camera = test::camera_of_tests();
-  auto moved = boxes();
-  moved[0].low += way_of(5, moved[0].low, {1, 0, 0});
+  const Frame still = picture_of(boxes()), moved = picture_with_red_moved();
   fit::Things things;
-  const auto names_after = [&](const std::vector<Box>& drawn) {
+  const auto names_after = [&](const Frame& frame, std::size_t times) {
     fit::Measurement measurement(model, camera, things);
-    measurement.look(picture_of(drawn), test::place_of_camera());
+    for (std::size_t i = 0; i < times; ++i) measurement.look(frame, test::place_of_camera());
     things = measurement.things();
     return names_of(measurement.figure());
   };
-  EXPECT_EQ(names_after(moved), "red;");
-  std::string names;
-  for (std::size_t i = 0; i < fit::frames_judged; ++i) names = names_after(boxes());
-  EXPECT_EQ(names, "");
-  for (std::size_t i = 0; i < fit::frames_judged; ++i) names = names_after(moved);
-  EXPECT_EQ(names, "red;");
+  EXPECT_EQ(names_after(moved, 1), "red;");
+  EXPECT_EQ(names_after(still, fit::frames_judged), "");
+  EXPECT_EQ(names_after(moved, fit::frames_judged), "red;");
 }
 
 TEST(ModelFigure, IsOfAllFrames) {
@@ -307,6 +335,19 @@ TEST(ModelFigure, SaysWhyThereIsNone) {
   EXPECT_GT(figure.looked_at, fit::least_pieces);
   EXPECT_EQ(figure.found, 0u);
   EXPECT_EQ(figure.why, "the pictures have edges of light at too few of the model's");
+}
+
+// The pose of a picture may be a recorded one, so that nothing has read the picture before.
+TEST(ModelFigure, IsNoneOfPicturesThatTheLensIsNotCalibratedFor) {
+  Frame frame;
+  frame.width = 320;
+  frame.height = 240;
+  frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
+  const Figure figure = figure_of(model_of(boxes()), frame);
+  EXPECT_FALSE(figure.off);
+  EXPECT_EQ(figure.looked_at, 0u);
+  EXPECT_EQ(figure.why,
+            "the pictures have 320x240 pixels, and the lens is calibrated for 1280x960");
 }
 
 }  // namespace previz::figure_test

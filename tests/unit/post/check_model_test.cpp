@@ -46,7 +46,7 @@ class CheckModel : public testing::Test {
         "file = 'card.gltf'\n" +
         object;
     info.observer.emplace();
-    info.observer->intrinsics = test::plain_lens(640, 480, focal_px);
+    info.observer->intrinsics = lens_;
     session::SessionWriter writer(take_, info);
     writer.add_asset("card.gltf", card);
     if (has_small_) {
@@ -94,6 +94,7 @@ class CheckModel : public testing::Test {
   }
 
   bool has_small_ = false;  // in pictures, and as a file
+  PinholeIntrinsics lens_ = test::plain_lens(640, 480, focal_px);
   test::TemporaryDirectory directory_;
   const std::filesystem::path take_ = directory_ / "take";
 };
@@ -119,6 +120,13 @@ TEST_F(CheckModel, SaysWhatToDoIfItIsOff) {
   EXPECT_THAT(said, HasSubstr("`previzd calibrate tags`"));
 }
 
+TEST_F(CheckModel, SaysThatTheLensIsOfPicturesOfAnotherSize) {
+  lens_ = test::plain_lens(1280, 960, 2 * focal_px);
+  write_take(phantom(0));
+  EXPECT_THAT(checked(), HasSubstr("no figure for how far it is off: the pictures have 640x480 "
+                                   "pixels, and the lens is calibrated for 1280x960"));
+}
+
 // The small card's sides are 120 px long: three pieces each, in five frames.
 TEST_F(CheckModel, NamesTheThingThatIsOffWhileTheRestFits) {
   has_small_ = true;
@@ -130,6 +138,14 @@ TEST_F(CheckModel, NamesTheThingThatIsOffWhileTheRestFits) {
                               "its place in the model is wrong"));
   EXPECT_THAT(said, Not(HasSubstr("the model of what is real is")));
   EXPECT_THAT(said, Not(HasSubstr("\"card\" is")));
+  EXPECT_THAT(said, Not(HasSubstr("not judged")));
+}
+
+TEST_F(CheckModel, NamesTheThingsThatThePicturesDoNotShow) {
+  has_small_ = true;
+  write_take(phantom(0) + small_phantom(-500));
+  EXPECT_THAT(checked(), HasSubstr("\n  not judged, because too few of their edges can be seen: "
+                                   "\"small card\"\n"));
 }
 
 TEST_F(CheckModel, NamesNoThingIfAllFitOrAllAreOff) {
