@@ -119,20 +119,25 @@ void insist_on_spread(const std::string& subject, const Pairs& points) {
   check([](const PointPair& p) { return p.in_world; }, "in the pictures");
 }
 
-// Says that the scan has another size, if that alone makes its points fit.
-void insist_on_size(const std::string& subject, const Pairs& points, double unit_m,
-                    double most_off_m) {
-  const Fitted free = best_fit(points, Size::free, 1, Hand::either);
-  const double larger = free.scale / unit_m;
-  if (std::max(larger, 1 / larger) < most_scale || worst_of(free) > most_off_m) return;
-  std::string advice = are_tags(points)
-                           ? "; check its unit, and the sizes of the tags in the set"
-                           : "; check its unit, and that its points are those that are marked";
+// Returns what may be wrong with a scan whose size is wrong by this factor.
+std::string advice_on_size(const Pairs& points, double factor) {
+  if (!are_tags(points)) return "; check its unit, and that its points are those that are marked";
+  if (factor >= most_scale) return "; check its unit, and the sizes of the tags in the set";
+  return "; correct its size, or, if a tag was moved after the scan or the measurement, measure "
+         "the "
+         "set's tags with previzd calibrate tags";
+}
+
+[[noreturn]] void refuse_size(const std::string& subject, const Pairs& points, double unit_m,
+                              const Fitted& free) {
+  const double larger = free.scale / unit_m, factor = std::max(larger, 1 / larger);
+  std::string advice = advice_on_size(points, factor);
   for (const auto& [name, unit] : names(LengthUnit{}))
-    if (std::abs(std::log(free.scale / metres(unit))) < std::log(most_scale))
+    if (factor >= most_scale &&
+        std::abs(std::log(free.scale / metres(unit))) < std::log(most_scale))
       advice = fmt::format(": is its unit \"{0}\"? Set unit = \"{0}\"", name);
-  throw Error(fmt::format("{}: the scan would have to be {:.4g} times {}{}", subject,
-                          std::max(larger, 1 / larger), larger > 1 ? "larger" : "smaller", advice));
+  throw Error(fmt::format("{}: the scan would have to be {:.4g} times {}{}", subject, factor,
+                          larger > 1 ? "larger" : "smaller", advice));
 }
 
 // Returns the point without which the others fit best, and how far it is from where they put it.
@@ -153,33 +158,67 @@ std::pair<std::string, double> culprit_of(const Pairs& points, const Fitted& all
   return {points[worst].name, off_m};
 }
 
-// Says which tag is off, if one is without which the others fit.
-void refuse_tags(const std::string& subject, const Pairs& points, double unit_m,
-                 double most_off_m) {
-  std::vector<int> all, culprits;
+std::vector<int> tags_of(const Pairs& points) {
+  std::vector<int> tags;
   for (const PointPair& p : points)
-    if (std::ranges::find(all, p.tag) == all.end()) all.push_back(p.tag);
-  double off_m = 0;
-  for (const int tag : all) {
+    if (std::ranges::find(tags, p.tag) == tags.end()) tags.push_back(p.tag);
+  return tags;
+}
+
+// A tag without which the others fit.
+struct MovedTag {
+  int id = 0;
+  double off_m = 0;         // from where the others put it
+  double others_rms_m = 0;  // of the others' distances
+};
+
+std::vector<MovedTag> moved_tags(const Pairs& points, double unit_m, double most_off_m) {
+  std::vector<MovedTag> moved;
+  for (const int tag : tags_of(points)) {
     Pairs others = points;
     std::erase_if(others, [&](const PointPair& p) { return p.tag == tag; });
     if (others.empty()) continue;
     const Fitted fit = best_fit(others, Size::fixed, unit_m, Hand::rotation);
     if (worst_of(fit) > most_off_m) continue;
-    culprits.push_back(tag);
+    double off_m = 0;
     for (const PointPair& p : points)
       if (p.tag == tag)
         off_m = std::max(off_m,
                          glm::distance(fit.scale * (fit.turn * p.in_scan) + fit.shift, p.in_world));
+    moved.push_back({tag, off_m, fit.rms_m});
   }
+  return moved;
+}
+
+[[noreturn]] void refuse_tags(const std::string& subject, const Pairs& points,
+                              const std::vector<MovedTag>& moved) {
   const std::string advice =
       "; if one was moved after the scan or the measurement, measure the set's tags with previzd "
       "calibrate tags, or place the scan by points";
-  if (culprits.size() == 1)
+  if (moved.size() == 1)
     throw Error(fmt::format("{}: {} is {:.1f} mm from where the other tags put it{}", subject,
-                            tracking::tags_in_words(culprits), 1000 * off_m, advice));
+                            tracking::tags_in_words({moved[0].id}), 1000 * moved[0].off_m, advice));
   throw Error(fmt::format("{}: {} are not where the set has them relative to each other{}", subject,
-                          tracking::tags_in_words(all), advice));
+                          tracking::tags_in_words(tags_of(points)), advice));
+}
+
+[[noreturn]] void refuse_points(const std::string& subject, const Pairs& points, double unit_m,
+                                const Fitted& fit) {
+  const auto [name, off_m] = culprit_of(points, fit, unit_m);
+  throw Error(fmt::format(
+      "{}: point \"{}\" is {:.1f} mm from where the other points put it, more than {:g} % of "
+      "their extent of {:.1f} mm; check its coordinates in the scan, its marks, and that both "
+      "mean the same spot",
+      subject, name, 1000 * off_m, 100 * most_off_fraction, 1000 * extent_in_world(points)));
+}
+
+// Corners of tags are measured, so that their extent does not matter: two tags far apart show a
+// small error.
+double most_off_of(const Pairs& points, double grain_m) {
+  const double by_extent = most_off_fraction * extent_in_world(points);
+  if (!are_tags(points)) return by_extent;
+  const double side_m = glm::distance(points[0].in_world, points[1].in_world);
+  return std::min(by_extent, std::max(most_off_side * side_m, 2 * grain_m));
 }
 
 }  // namespace
@@ -199,28 +238,31 @@ double metres(LengthUnit unit) {
 }
 
 Placement place_scan(const std::string& subject, const std::vector<PointPair>& points,
-                     double unit_m) {
-  const double extent = extent_in_world(points), most_off_m = most_off_fraction * extent;
+                     double unit_m, double grain_m) {
+  const double most_off_m = most_off_of(points, grain_m);
   insist_on_spread(subject, points);
-  insist_on_size(subject, points, unit_m, most_off_m);
   const Fitted fit = best_fit(points, Size::fixed, unit_m, Hand::rotation);
   const Fitted either = best_fit(points, Size::fixed, unit_m, Hand::either);
-  if (either.is_mirrored && clearly * either.rms_m < fit.rms_m && fit.rms_m > 0.005 * extent)
+  const Fitted free = best_fit(points, Size::free, 1, Hand::either);
+  const std::vector<MovedTag> moved = are_tags(points) && worst_of(fit) > most_off_m
+                                          ? moved_tags(points, unit_m, most_off_m)
+                                          : std::vector<MovedTag>{};
+  const bool is_one_off = moved.size() == 1 && moved[0].others_rms_m < free.rms_m;
+  if (worst_of(either) > most_off_m && worst_of(free) <= most_off_m && !is_one_off &&
+      (are_tags(points) || std::abs(std::log(free.scale / unit_m)) >= std::log(most_scale)))
+    refuse_size(subject, points, unit_m, free);
+  if (either.is_mirrored && clearly * either.rms_m < fit.rms_m &&
+      fit.rms_m > 0.005 * extent_in_world(points))
     throw Error(fmt::format(
         "{}: its {} fit to {:.1f} mm if the scan is mirrored, but to {:.1f} mm as "
         "it is; export it with right-handed axes, without mirroring any of them",
         subject, are_tags(points) ? "tags" : "points", 1000 * either.rms_m, 1000 * fit.rms_m));
   if (worst_of(fit) > most_off_m) {
-    if (are_tags(points)) refuse_tags(subject, points, unit_m, most_off_m);
-    const auto [name, off_m] = culprit_of(points, fit, unit_m);
-    throw Error(fmt::format(
-        "{}: point \"{}\" is {:.1f} mm from where the other points put it, more than {:g} % of "
-        "their extent of {:.1f} mm; check its coordinates in the scan, its marks, and that both "
-        "mean the same spot",
-        subject, name, 1000 * off_m, 100 * most_off_fraction, 1000 * extent));
+    if (are_tags(points)) refuse_tags(subject, points, moved);
+    refuse_points(subject, points, unit_m, fit);
   }
-  const Fitted free = best_fit(points, Size::free, 1, Hand::rotation);
-  return {fit.turn, fit.shift, fit.rms_m, free.scale / unit_m};
+  return {fit.turn, fit.shift, fit.rms_m,
+          best_fit(points, Size::free, 1, Hand::rotation).scale / unit_m};
 }
 
 LengthUnit likely_unit(const std::vector<PointPair>& points) {

@@ -30,11 +30,13 @@ double metres(LengthUnit unit);
 // Least squares by a rotation and a translation (Kabsch 1976; Umeyama 1991, eq. 34-43). Throws
 // previz::Error, "SUBJECT: ...", naming the points at fault: they lie on one line, the scan has
 // another size (with the likely unit), a mirrored scan would fit, or a point is off by more than
-// most_off_fraction of the largest distance between two of them. At least three points, all of them
-// marked or all of them corners of tags.
+// most_off_fraction of the largest distance between two of them. A corner of a tag must not be off
+// by more than most_off_side of the tag's side, either, or by two pixels of the colours, whose size
+// on the surface is `grain_m`, if that is more. At least three points, all of them marked or all of
+// them corners of tags, four of each.
 Placement place_scan(const std::string& subject, const std::vector<PointPair>& points,
-                     double unit_m);
-inline constexpr double most_off_fraction = 0.03;
+                     double unit_m, double grain_m = 0);
+inline constexpr double most_off_fraction = 0.03, most_off_side = 0.1;
 
 // Returns the unit in which the points fit best.
 LengthUnit likely_unit(const std::vector<PointPair>& points);
