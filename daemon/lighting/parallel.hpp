@@ -10,13 +10,17 @@ namespace previz::lighting {
 
 inline constexpr int max_threads = 2;
 
+// Returns how many threads a command may use that runs alone.
+inline int all_threads() {
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
 // Calls body(begin, end) on contiguous blocks that together are [0, count), concurrently. The
 // result must not depend on where the blocks are split. An exception thrown in a block is
 // rethrown.
 template <typename Body>
-void parallel_blocks(int count, const Body& body) {
-  const int threads =
-      std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, max_threads);
+void parallel_blocks(int count, const Body& body, int most_threads = max_threads) {
+  const int threads = std::min(all_threads(), most_threads);
   std::vector<std::future<void>> others;
   for (int t = 1; t < threads; ++t)
     others.push_back(std::async(std::launch::async, [&body, count, threads, t] {

@@ -85,8 +85,9 @@ void print_unused(const Parts& parts, const Layout& layout, std::ostream& out) {
 void print_fit(const Parts& parts, const Layout& layout, const Fit& fit, std::ostream& out) {
   std::set<std::string> pictures;
   for (const MarkResidual& mark : fit.marks) pictures.insert(mark.picture);
-  fmt::print(out, "{} marks in {} pictures, rms {:.2f} px\n", fit.marks.size(), pictures.size(),
-             fit.rms_px);
+  if (!fit.marks.empty())
+    fmt::print(out, "{} marks in {} pictures, rms {:.2f} px\n", fit.marks.size(), pictures.size(),
+               fit.rms_px);
   print_worst_marks(fit.marks, out);
   if (!fit.edges_off_px.empty()) {
     std::vector<double> off = fit.edges_off_px;
@@ -406,7 +407,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   insist_on_outputs(options);
   const Parts parts = parts_of(options, camera, set.tracking, out);
   insist_on_scans(options, parts);
-  const std::vector<ScanFile> scan_files = read_scans(parts);
+  const std::vector<ReadScan> read = read_scans(parts, set.tracking, out);
   const auto edited = options.write ? with_model(*options.set_file, set, options) : std::nullopt;
   const auto source = calibrate::open_source(options.footage, "observer");
   const Views views = find_views(*source, camera, set.tracking, parts);
@@ -417,8 +418,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   const Fit fit = adjust_to_edges(parts, views, start, camera.response);
   print_fit(parts, start.layout, fit, out);
   print_faces(fit, out);
-  const std::vector<NamedMesh> scans =
-      place_scans(parts, start.layout, fit.shape, scan_files, set.tracking, out);
+  const std::vector<NamedMesh> scans = place_scans(parts, start.layout, fit.shape, read, out);
   const std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
   const std::string model = coloured_model(options, set, {parts, views, start.layout, fit.shape},
                                            solids, scans, camera.response, out);

@@ -42,15 +42,19 @@ std::string without_escapes(const std::string& path) {
   return plain;
 }
 
-// Returns where a texture may be: as written, and beside the scan, if the path is another
-// computer's.
+bool leads_out(const std::filesystem::path& path) {
+  return path.is_absolute() || std::ranges::find(path, "..") != path.end();
+}
+
+// Returns where a texture may be: as written, if that is within the scan's folder, and beside the
+// scan, if the path is another computer's.
 std::vector<std::filesystem::path> candidates_for(const std::filesystem::path& scan,
                                                   std::string path) {
   std::ranges::replace(path, '\\', '/');
   std::vector<std::filesystem::path> candidates;
   for (const std::string& written : {path, without_escapes(path)}) {
     const std::filesystem::path texture(written);
-    candidates.push_back(scan.parent_path() / texture);
+    if (!leads_out(texture)) candidates.push_back(scan.parent_path() / texture);
     candidates.push_back(scan.parent_path() / texture.filename());
   }
   return candidates;
@@ -64,13 +68,31 @@ std::uint8_t luma_of(const aiColor4D& colour, bool is_linear) {
   return static_cast<std::uint8_t>(std::lround(255 * std::clamp(luma, 0.0, 1.0)));
 }
 
-std::string texture_of(const aiMaterial& material, unsigned& uv_channel) {
+bool is_moved(const aiMaterial& material, aiTextureType type) {
+  aiUVTransform on_faces;
+  if (material.Get(AI_MATKEY_UVTRANSFORM(type, 0), on_faces) != aiReturn_SUCCESS) return false;
+  const std::array off{on_faces.mTranslation.x, on_faces.mTranslation.y, on_faces.mScaling.x - 1,
+                       on_faces.mScaling.y - 1, on_faces.mRotation};
+  return std::ranges::any_of(off, [](float value) { return !(std::abs(value) < 1e-6f); });
+}
+
+struct TextureUse {
+  std::string path;  // empty: the material has none
+  unsigned uv_channel = 0;
+  bool is_moved = false;  // by a transform of the texture coordinates
+};
+
+TextureUse texture_of(const aiMaterial& material) {
   for (const aiTextureType type :
        {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE, aiTextureType_EMISSIVE}) {
     aiString path;
-    if (material.GetTexture(type, 0, &path, nullptr, &uv_channel) == aiReturn_SUCCESS &&
-        path.length > 0)
-      return path.C_Str();
+    TextureUse use;
+    if (material.GetTexture(type, 0, &path, nullptr, &use.uv_channel) != aiReturn_SUCCESS ||
+        path.length == 0)
+      continue;
+    use.path = path.C_Str();
+    use.is_moved = is_moved(material, type);
+    return use;
   }
   return {};
 }
@@ -101,9 +123,15 @@ void ColourReader::append(const aiMesh& mesh, std::size_t triangles) {
 ColourReader::Material ColourReader::material_of(const aiMesh& mesh) {
   Material found;
   if (mesh.mMaterialIndex >= scene_.mNumMaterials) return found;
-  const std::string path = texture_of(*scene_.mMaterials[mesh.mMaterialIndex], found.uv_channel);
-  if (found.uv_channel >= AI_MAX_NUMBER_OF_TEXTURECOORDS) found.uv_channel = 0;
-  if (!path.empty()) found.source = picture(path);
+  const TextureUse use = texture_of(*scene_.mMaterials[mesh.mMaterialIndex]);
+  if (use.path.empty()) return found;
+  if (use.is_moved)
+    throw Error(
+        fmt::format("{}: its texture \"{}\" is moved, turned or scaled on its faces "
+                    "(KHR_texture_transform); export the scan without that",
+                    file_.string(), printable(use.path)));
+  if (use.uv_channel < AI_MAX_NUMBER_OF_TEXTURECOORDS) found.uv_channel = use.uv_channel;
+  found.source = picture(use.path);
   return found;
 }
 
@@ -117,14 +145,15 @@ int ColourReader::picture(const std::string& path) {
 // Adds the picture and returns its index.
 int ColourReader::decoded(const std::vector<unsigned char>& bytes, const std::string& name) {
   const std::string where = fmt::format("{}: its texture \"{}\"", file_.string(), printable(name));
-  const auto [width, height] = scene::checked_picture_size(bytes, where);
-  texels_ += static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const scene::PictureSize size = scene::checked_picture_size(bytes, where);
+  texels_ += static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
   if (texels_ > most_texels)
     throw Error(
         fmt::format("{}: its textures have more than {} pixels together; export the scan "
                     "with smaller ones",
                     file_.string(), most_texels));
-  colours_.pictures.push_back({name, width, height, scene::decoded_luma(bytes, where)});
+  colours_.pictures.push_back(
+      {name, size.width, size.height, scene::decoded_luma(bytes, size, where)});
   return static_cast<int>(colours_.pictures.size() - 1);
 }
 

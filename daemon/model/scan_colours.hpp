@@ -19,7 +19,7 @@ struct ScanPicture {
   std::vector<std::uint8_t> luma;  // sRGB-encoded, row-major from the top
 };
 
-// Where a triangle has its colour from, beside the index of a picture.
+// The source of a triangle's colour is the index of a picture, or one of these.
 inline constexpr int from_vertices = -1, colourless = -2;
 
 struct ScanColours {
@@ -32,11 +32,12 @@ struct ScanColours {
 // Collects the colours of meshes while they are appended to one another.
 class ColourReader {
  public:
-  // `file` is the scan's; textures are beside it, or in it.
+  // `file` is the scan's; textures are in it, or in its folder. No path leads out of that folder.
   ColourReader(const aiScene& scene, std::filesystem::path file);
 
   // Appends the vertices of a mesh, and the sources of so many triangles. Throws previz::Error
-  // naming the scan and its texture: it is missing, is no PNG or JPEG, is damaged, or is too large.
+  // naming the scan and its texture: it is missing, is no PNG or JPEG, is damaged, is too large,
+  // or is moved, turned or scaled on its faces.
   void append(const aiMesh& mesh, std::size_t triangles);
   ScanColours take() { return std::move(colours_); }
 

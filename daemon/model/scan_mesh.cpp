@@ -162,6 +162,10 @@ void turn_what_disagrees(TriangleMesh& mesh, const std::vector<Neighbour>& neigh
   }
 }
 
+bool has_three_corners(const unsigned* triangle) {
+  return triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0];
+}
+
 // Six times the volume inside a closed mesh; below 0 if it faces inwards.
 double volume_6(const TriangleMesh& mesh) {
   double sum = 0;
@@ -191,9 +195,8 @@ MeshFaults mend(TriangleMesh& mesh) {
   MeshFaults faults;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
-    const unsigned a = mesh.indices[i], b = mesh.indices[i + 1], c = mesh.indices[i + 2];
-    if (a == b || b == c || c == a) continue;
-    mesh.indices[kept++] = a, mesh.indices[kept++] = b, mesh.indices[kept++] = c;
+    if (!has_three_corners(&mesh.indices[i])) continue;
+    for (std::size_t k = i; k < i + 3; ++k) mesh.indices[kept++] = mesh.indices[k];
   }
   faults.without_area = (mesh.indices.size() - kept) / 3;
   mesh.indices.resize(kept);
@@ -204,6 +207,20 @@ MeshFaults mend(TriangleMesh& mesh) {
   faults.was_inside_out = is_closed && volume_6(mesh) < 0;
   for (std::size_t t = 0; faults.was_inside_out && t < mesh.triangles(); ++t) turn(mesh, t);
   return faults;
+}
+
+TriangleMesh with_faces_turned(TriangleMesh mesh) {
+  TriangleMesh welded = mesh;
+  weld(welded);
+  const std::vector<unsigned> before = welded.indices;
+  mend(welded);
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < before.size(); i += 3) {
+    if (!has_three_corners(&before[i])) continue;
+    if (welded.indices[kept + 1] != before[i + 1]) turn(mesh, i / 3);
+    kept += 3;
+  }
+  return mesh;
 }
 
 ShadedMesh shaded(const TriangleMesh& mesh) {

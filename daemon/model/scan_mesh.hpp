@@ -36,6 +36,10 @@ void weld(TriangleMesh& mesh);
 // that faces inwards. The mesh must be welded.
 MeshFaults mend(TriangleMesh& mesh);
 
+// Returns the mesh with those triangles turned that `mend` would turn. It need not be welded; its
+// vertices and the order of its triangles stay.
+TriangleMesh with_faces_turned(TriangleMesh mesh);
+
 struct ShadedMesh {
   std::vector<glm::vec3> positions, normals;  // of a vertex
   std::vector<unsigned> indices;

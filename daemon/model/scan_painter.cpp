@@ -55,6 +55,21 @@ std::array<Value, 3> corners_of_triangle(const std::vector<Value>& values,
   return {values[indices[3 * t]], values[indices[3 * t + 1]], values[indices[3 * t + 2]]};
 }
 
+// The size of a pixel on a face, and the face's area.
+struct FaceGrain {
+  float grain = 0, area = 0;
+};
+
+// Returns the median over the area; 0 if there is none.
+double median_of(std::vector<FaceGrain>& faces) {
+  std::ranges::sort(faces, {}, &FaceGrain::grain);
+  double total = 0, below = 0;
+  for (const FaceGrain& face : faces) total += double{face.area};
+  for (const FaceGrain& face : faces)
+    if ((below += double{face.area}) >= total / 2) return double{face.grain};
+  return 0;
+}
+
 }  // namespace
 
 ScanPainter::ScanPainter(const ScanFile& scan)
@@ -71,35 +86,34 @@ ScanPainter::ScanPainter(const ScanFile& scan)
   measure_grain();
 }
 
+// Faces of filled holes may have one point of the texture, damaged ones more than all of it.
+double ScanPainter::texels_on(std::size_t triangle, const ScanPicture& picture) const {
+  const auto [p, q, r] = corners_of_triangle(scan_.colours.uvs, scan_.mesh.indices, triangle);
+  const glm::dvec2 e = glm::dvec2(q) - glm::dvec2(p), f = glm::dvec2(r) - glm::dvec2(p);
+  const double fraction = std::abs(e.x * f.y - e.y * f.x) / 2;
+  return fraction <= 1 ? fraction * picture.width * picture.height : 0;
+}
+
 void ScanPainter::measure_grain() {
-  std::vector<double> areas(pictures_.size()), texels(pictures_.size());
-  double area = 0, samples = 0;
+  std::vector<std::vector<FaceGrain>> of_pictures(pictures_.size());
+  std::vector<FaceGrain> all;
   for (std::size_t t = 0; t < scan_.mesh.triangles(); ++t) {
     const int source = scan_.colours.sources[t];
     if (source == colourless) continue;
     const auto [a, b, c] = corners_of_triangle(scan_.mesh.positions, scan_.mesh.indices, t);
-    const double size =
+    const double area =
         glm::length(glm::cross(glm::dvec3(b) - glm::dvec3(a), glm::dvec3(c) - glm::dvec3(a))) / 2;
-    if (source == from_vertices) {
-      area += size;
-      samples += 0.5;  // a mesh has half as many vertices as triangles
-      continue;
-    }
-    const auto index = static_cast<std::size_t>(source);
-    const ScanPicture& picture = *pictures_[index].whole;
-    const auto [p, q, r] = corners_of_triangle(scan_.colours.uvs, scan_.mesh.indices, t);
-    const glm::dvec2 e = glm::dvec2(q) - glm::dvec2(p), f = glm::dvec2(r) - glm::dvec2(p);
-    const double covered = std::abs(e.x * f.y - e.y * f.x) / 2 * picture.width * picture.height;
-    if (!std::isfinite(covered)) continue;
-    areas[index] += size;
-    texels[index] += covered;
+    double samples = 0.5;  // a mesh has half as many vertices as triangles
+    if (source != from_vertices)
+      samples = texels_on(t, *pictures_[static_cast<std::size_t>(source)].whole);
+    if (!(samples > 0) || !(area > 0)) continue;
+    const FaceGrain face{static_cast<float>(std::sqrt(area / samples)), static_cast<float>(area)};
+    all.push_back(face);
+    if (source != from_vertices) of_pictures[static_cast<std::size_t>(source)].push_back(face);
   }
-  for (std::size_t i = 0; i < pictures_.size(); ++i) {
-    if (texels[i] > 0 && areas[i] > 0) pictures_[i].grain = std::sqrt(areas[i] / texels[i]);
-    area += areas[i];
-    samples += texels[i];
-  }
-  grain_ = samples > 0 ? std::sqrt(area / samples) : 0;
+  for (std::size_t i = 0; i < pictures_.size(); ++i)
+    if (const double grain = median_of(of_pictures[i]); grain > 0) pictures_[i].grain = grain;
+  grain_ = median_of(all);
 }
 
 std::optional<ScanPainter::Hit> ScanPainter::hit(const ScanView& view, glm::dvec2 px) const {
@@ -151,7 +165,7 @@ Frame ScanPainter::draw(const ScanView& view) const {
   frame.height = view.height;
   frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
   const std::vector<const ScanPicture*> pictures = pictures_for(view.pixel);
-  lighting::parallel_blocks(view.height, [&](int begin, int end) {
+  const auto draw_rows = [&](int begin, int end) {
     for (int y = begin; y < end; ++y)
       for (int x = 0; x < view.width; ++x) {
         const auto found = hit(view, {x, y});
@@ -160,7 +174,8 @@ Frame ScanPainter::draw(const ScanView& view) const {
                     static_cast<std::size_t>(x)] =
             static_cast<std::uint8_t>(std::lround(std::clamp(grey, 0.0, 255.0)));
       }
-  });
+  };
+  lighting::parallel_blocks(view.height, draw_rows, lighting::all_threads());
   return frame;
 }
 

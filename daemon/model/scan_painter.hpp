@@ -32,8 +32,8 @@ class ScanPainter {
   // The scan must have colours, and must outlive this.
   explicit ScanPainter(const ScanFile& scan);
 
-  // Returns the size of the colours' pixels on the surface, the mean over its area: of a texture,
-  // or of the triangles between coloured vertices.
+  // Returns the size of the colours' pixels on the surface, the median over its area: of a texture,
+  // or of the triangles between coloured vertices. Zero: no face has coordinates on a texture.
   double grain() const { return grain_; }
 
   // Draws the front sides of faces, sRGB-encoded; where nothing is, it is grey.
@@ -53,6 +53,8 @@ class ScanPainter {
     std::size_t triangle = 0;
   };
   void measure_grain();
+  // Returns how many pixels of its texture a triangle covers; 0 where that makes no sense.
+  double texels_on(std::size_t triangle, const ScanPicture& picture) const;
   std::optional<Hit> hit(const ScanView& view, glm::dvec2 px) const;
   // Returns each picture halved until its pixels are about as large as these.
   std::vector<const ScanPicture*> pictures_for(double pixel) const;

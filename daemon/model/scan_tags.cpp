@@ -20,10 +20,11 @@ namespace {
 
 // A cell of a tag is drawn with so many pixels, if the scan's colours have as many.
 constexpr double pixels_a_cell = 5;
-constexpr double least_pixels_a_cell = 2;  // that a detector needs
+// A tag can be read if its colours have at least so many pixels for a cell.
+constexpr int least_pixels_a_cell = 3;
 // A tag is measured in five pictures; some of them may have something in the way.
 constexpr std::size_t least_views = 2;
-// What a tag on a scan may deviate by, as fractions of its side.
+// A tag is ignored if it deviates by more than these fractions of its side.
 constexpr double most_spread = 0.03, most_uneven = 0.02, most_off_square = 0.05,
                  most_off_size = 0.1;
 
@@ -107,7 +108,7 @@ class Measurement {
     tags_.push_back({&*tag, mean});
   }
 
-  // Tags whose size does not go with that of the others are ignored.
+  // Ignores tags that have another size on the scan than the other tags imply.
   void compare_sizes() {
     std::vector<double> scales;
     for (const MeasuredTag& tag : tags_) scales.push_back(scale_of(tag));
@@ -128,7 +129,7 @@ class Measurement {
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:
-  // Metres for 1 of the scan.
+  // Returns the metres for 1 of the scan.
   static double scale_of(const MeasuredTag& tag) { return tag.tag->size_m / side_of(tag.on_scan); }
 
   void note(int id, const std::string& what) {
@@ -138,8 +139,9 @@ class Measurement {
   std::string fault_of(const TagSighting& tag, double spread) const {
     const double side = side_of(tag);
     if (spread > std::max(most_spread * side, 2 * sightings_.grain()))
-      return fmt::format("has other corners in every picture, by {:.0f} % of its size",
-                         100 * spread / side);
+      return fmt::format(
+          "is not usable: its corners differ between the pictures by up to {:.0f} % of its size",
+          100 * spread / side);
     if (tag.uneven > most_uneven * side)
       return fmt::format("is not flat on the scan, by {:.1f} % of its size (rms)",
                          100 * tag.uneven / side);
@@ -155,10 +157,9 @@ class Measurement {
   std::vector<std::string> notes_;
 };
 
-// Sightings by their tags.
 struct Found {
   std::map<int, Sightings> of_set;
-  std::set<int> strangers;  // that the set lacks
+  std::set<int> strangers;  // tags that the set lacks
 };
 
 Found sorted(const Sightings& seen, const set::Tracking& tracking) {
@@ -172,8 +173,8 @@ Found sorted(const Sightings& seen, const set::Tracking& tracking) {
   return found;
 }
 
-// The sizes of pixels to look with: by the size of the tags first, if the scan's unit is known,
-// then as fine as the colours are.
+// Returns the sizes of pixels to look with: first by the size of the tags, if the scan's unit is
+// known, then as fine as the colours are.
 std::vector<double> pixels_to_try(double grain, const set::Tracking& tracking,
                                   std::optional<double> unit_m) {
   const double finest = grain / 1.5;
@@ -188,7 +189,11 @@ std::vector<double> pixels_to_try(double grain, const set::Tracking& tracking,
 Found look_for_tags(TagSightings& sightings, const set::Tracking& tracking,
                     const std::vector<double>& pixels, Mirroring mirroring) {
   Found found;
-  for (const double pixel : pixels) {
+  double last = 0;
+  for (const double wanted : pixels) {
+    const double pixel = sightings.possible_pixel(wanted);
+    if (pixel == last) continue;
+    last = pixel;
     found = sorted(sightings.from_all_sides(pixel, mirroring), tracking);
     if (!found.of_set.empty()) break;
   }
@@ -199,25 +204,35 @@ std::string in_words(const std::set<int>& tags) {
   return tracking::tags_in_words({tags.begin(), tags.end()});
 }
 
-[[noreturn]] void refuse_without_tags(const std::string& subject, double grain,
-                                      const set::Tracking& tracking, std::optional<double> unit_m,
-                                      const std::set<int>& strangers) {
-  if (!strangers.empty())
-    throw Error(
-        fmt::format("{}: shows {} and no tag that the set has fixed in the world; measure "
-                    "the set's tags with previzd calibrate tags, or {}",
-                    subject, in_words(strangers), by_points));
+// Returns why no tag is found, and what to do. `looked` is the size of the pixels of the pictures.
+std::string without_tags_in_words(double grain, double looked, const set::Tracking& tracking,
+                                  std::optional<double> unit_m) {
   const double largest_m = std::ranges::max(tracking.tags, {}, &set::Tag::size_m).size_m;
-  const int cells = tracking::tag_cells(tracking.family, tracking.tags.front().id).border;
-  std::string size = fmt::format("a pixel of its colours is {:.4g} units wide", grain);
-  if (unit_m)
-    size =
-        fmt::format("its colours show a tag of {:.0f} mm with {:.0f} pixels, and {:.0f} are needed",
-                    1000 * largest_m, largest_m / *unit_m / grain, least_pixels_a_cell * cells);
-  throw Error(
-      fmt::format("{}: its colours show no tag of the family {}; {}; export it with larger "
-                  "textures, or {}",
-                  subject, tracking.family, size, by_points));
+  const int needed =
+      least_pixels_a_cell * tracking::tag_cells(tracking.family, tracking.tags.front().id).border;
+  const std::string none = "its colours show no tag of the family " + tracking.family;
+  if (!unit_m)
+    return fmt::format(
+        "{}; a pixel of its colours is {:.4g} units wide, and a tag needs {} of them along a side; "
+        "export it with larger textures if a tag has fewer",
+        none, grain, needed);
+  const std::string tag = fmt::format("a tag of {:.0f} mm", 1000 * largest_m);
+  const double pixels = largest_m / *unit_m / grain, looked_pixels = largest_m / *unit_m / looked;
+  if (pixels < needed)
+    return fmt::format(
+        "{}: {} has {:.0f} pixels along a side, and {} are needed; export it with "
+        "larger textures",
+        none, tag, pixels, needed);
+  if (looked_pixels < needed)
+    return fmt::format(
+        "{}: {} has {:.0f} pixels along a side, but so large a scan is searched with "
+        "{:.0f}, and {} are needed; export less of it",
+        none, tag, pixels, looked_pixels, needed);
+  return fmt::format(
+      "{} that can be read, although {} has {:.0f} pixels along a side; check that "
+      "tags were in view while it was scanned, that nothing covers them, and that "
+      "its faces are outwards",
+      none, tag, pixels);
 }
 
 void insist_on_colours(const std::string& subject, const ScanFile& scan,
@@ -249,14 +264,22 @@ ScanTags find_scan_tags(const std::string& subject, const ScanFile& scan,
   const std::vector<double> pixels = pixels_to_try(sightings.grain(), tracking, unit_m);
   const Found found = look_for_tags(sightings, tracking, pixels, Mirroring::off);
   if (found.of_set.empty()) {
-    const Found mirrored = look_for_tags(sightings, tracking, {pixels.back()}, Mirroring::on);
+    const double finest = sightings.possible_pixel(pixels.back());
+    const Found mirrored = look_for_tags(sightings, tracking, {finest}, Mirroring::on);
     if (!mirrored.of_set.empty())
       throw Error(
           fmt::format("{}: is mirrored, or its faces are inside out: tags can be read in its "
                       "mirror image only; "
                       "export it with right-handed axes and its faces outwards, or {}",
                       subject, by_points));
-    refuse_without_tags(subject, sightings.grain(), tracking, unit_m, found.strangers);
+    if (!found.strangers.empty())
+      throw Error(
+          fmt::format("{}: shows {} and no tag that the set has fixed in the world; measure "
+                      "the set's tags with previzd calibrate tags, or {}",
+                      subject, in_words(found.strangers), by_points));
+    throw Error(fmt::format("{}: {}, or {}", subject,
+                            without_tags_in_words(sightings.grain(), finest, tracking, unit_m),
+                            by_points));
   }
   Measurement measurement(sightings, tracking);
   for (const auto& [id, seen] : found.of_set) measurement.add(id, seen);

@@ -14,7 +14,6 @@
 #include "daemon/model/scan_distance.hpp"
 #include "daemon/model/scan_place.hpp"
 #include "daemon/model/scan_simplify.hpp"
-#include "daemon/model/scan_tags.hpp"
 #include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
 
@@ -84,14 +83,13 @@ void print_placement(const ScanPart& part, const std::string& placed_by, const S
                                    : "no two of its points are swapped");
 }
 
-// What is known to half a pixel at the corners of one tag is less certain farther away.
-void print_tags(const ScanPart& part, const ScanTags& tags, double unit_m, std::ostream& out) {
-  for (const std::string& note : tags.notes)
-    fmt::print(out, "warning: scan {}: {}\n", part.name, note);
+// A corner is known to half a pixel, so that one tag alone shows little about what is far from it.
+void warn_of_one_tag(const ScanPart& part, const ScanTags& tags, double unit_m, std::ostream& out) {
   if (tags.ids.size() != 1) return;
   const double side_m = glm::distance(tags.corners[0].in_world, tags.corners[1].in_world);
   fmt::print(out,
-             "warning: scan {}: {} is its only tag; 1 m from it the scan is accurate to about "
+             "warning: scan {}: {} is the only tag that can be used; 1 m from it the scan is "
+             "accurate to about "
              "{:.0f} mm; scan it with two or more tags, far apart\n",
              part.name, tracking::tags_in_words(tags.ids),
              std::ceil(1000 * 0.5 * tags.grain * unit_m / side_m));
@@ -167,41 +165,60 @@ NamedMesh placed_scan(const ScanPart& part, const ScanFile& file, const ScanUnit
   return scan;
 }
 
+// Takes the colours out of the file: they are not needed afterwards, and may be large.
+ScanTags tags_on(const std::string& subject, const ScanPart& part, ScanFile& file,
+                 const set::Tracking& tracking, std::ostream& out) {
+  fmt::print(out, "looking for tags on scan {}\n", part.name);
+  out.flush();
+  const ScanFile seen{with_faces_turned(file.mesh), file.unit_m, file.up,
+                      std::exchange(file.colours, {})};
+  const ScanTags tags =
+      find_scan_tags(fmt::format("{}, {}", subject, part.file.filename().string()), seen, tracking,
+                     part.unit ? metres(*part.unit) : seen.unit_m);
+  for (const std::string& note : tags.notes)
+    fmt::print(out, "warning: scan {}: {}\n", part.name, note);
+  return tags;
+}
+
 }  // namespace
 
-std::vector<ScanFile> read_scans(const Parts& parts) {
-  std::vector<ScanFile> files;
+std::vector<ReadScan> read_scans(const Parts& parts, const set::Tracking& tracking,
+                                 std::ostream& out) {
+  std::vector<ReadScan> scans;
   for (const ScanPart& part : parts.scans) {
     const bool is_by_tags = part.points.empty();
-    files.push_back(read_scan(part.file, is_by_tags ? Colouring::read : Colouring::ignored));
-    if (!is_by_tags) insist_on_surface(subject_of(parts, part), part, files.back());
+    const std::string subject = subject_of(parts, part);
+    ScanFile file = read_scan(part.file, is_by_tags ? Colouring::read : Colouring::ignored);
+    std::optional<ScanTags> tags;
+    if (is_by_tags)
+      tags = tags_on(subject, part, file, tracking, out);
+    else
+      insist_on_surface(subject, part, file);
+    scans.push_back({std::move(file), std::move(tags)});
   }
-  return files;
+  return scans;
 }
 
 std::vector<NamedMesh> place_scans(const Parts& parts, const Layout& layout, const Shape& shape,
-                                   const std::vector<ScanFile>& files,
-                                   const set::Tracking& tracking, std::ostream& out) {
-  std::vector<NamedMesh> scans;
+                                   const std::vector<ReadScan>& scans, std::ostream& out) {
+  std::vector<NamedMesh> meshes;
   for (std::size_t i = 0; i < parts.scans.size(); ++i) {
     const ScanPart& part = parts.scans[i];
+    const auto& [file, tags] = scans[i];
     const std::string subject = subject_of(parts, part);
-    std::optional<ScanTags> tags;
-    if (part.points.empty())
-      tags = find_scan_tags(fmt::format("{}, {}", subject, part.file.filename().string()), files[i],
-                            tracking, part.unit ? metres(*part.unit) : files[i].unit_m);
     const std::vector<PointPair> points = tags ? tags->corners : marked_pairs(part, layout, shape);
-    const ScanUnits units = units_of(subject, part, files[i], points);
-    const Placement placed = place_scan(subject, points, units.unit_m);
+    const ScanUnits units = units_of(subject, part, file, points);
+    const Placement placed =
+        place_scan(subject, points, units.unit_m, tags ? tags->grain * units.unit_m : 0);
     print_placement(part,
                     tags ? fmt::format("placed by {} ({} corners)",
                                        tracking::tags_in_words(tags->ids), points.size())
                          : fmt::format("{} points", points.size()),
                     units, placed, out);
-    if (tags) print_tags(part, *tags, units.unit_m, out);
-    scans.push_back(placed_scan(part, files[i], units, placed, out));
+    if (tags) warn_of_one_tag(part, *tags, units.unit_m, out);
+    meshes.push_back(placed_scan(part, file, units, placed, out));
   }
-  return scans;
+  return meshes;
 }
 
 }  // namespace previz::model

@@ -56,7 +56,7 @@ std::string picture_failure() {
 PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std::string& where) {
   const bool is_png = begins_with(bytes, png_signature);
   if (!is_png && !begins_with(bytes, jpeg_signature))
-    throw Error(where + ": is neither PNG nor JPEG");
+    throw Error(where + ": is neither PNG nor JPEG; export it as PNG or JPEG");
   if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
     throw Error(where + ": is larger than 2 GiB");
   if (is_png) require_chunks(bytes, where);
@@ -73,7 +73,7 @@ PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std
   return {width, height};
 }
 
-std::vector<std::uint8_t> decoded_luma(std::span<const unsigned char> bytes,
+std::vector<std::uint8_t> decoded_luma(std::span<const unsigned char> bytes, PictureSize size,
                                        const std::string& where) {
   int width = 0, height = 0, channels = 0;
   const auto free = [](void* samples) { stbi_image_free(samples); };
@@ -81,7 +81,8 @@ std::vector<std::uint8_t> decoded_luma(std::span<const unsigned char> bytes,
       stbi_load_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height,
                             &channels, 1),
       free);
-  if (!samples) throw Error(where + ": cannot be decoded: " + picture_failure());
+  if (!samples || width != size.width || height != size.height)
+    throw Error(where + ": cannot be decoded: " + picture_failure());
   const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   return {samples.get(), samples.get() + texels};
 }

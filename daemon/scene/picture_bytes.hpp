@@ -20,8 +20,8 @@ PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std
 std::string picture_failure();
 
 // Returns the luma of each pixel as encoded in the picture (sRGB), row-major from the top.
-// `bytes` must have passed checked_picture_size. Throws previz::Error, "WHERE: ...".
-std::vector<std::uint8_t> decoded_luma(std::span<const unsigned char> bytes,
+// `size` is what checked_picture_size returned for these bytes. Throws previz::Error, "WHERE: ...".
+std::vector<std::uint8_t> decoded_luma(std::span<const unsigned char> bytes, PictureSize size,
                                        const std::string& where);
 
 }  // namespace previz::scene

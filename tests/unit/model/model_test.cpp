@@ -12,6 +12,7 @@
 #include "drivers/session/files.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
+#include "tests/unit/model/tagged_scan.hpp"
 
 namespace previz::test {
 namespace {
@@ -261,6 +262,26 @@ TEST_F(ModelCommand, LooksForTagsOnAScanWithoutPoints) {
   write_parts("[[scan]]\nname = \"cube\"\nfile = \"cube.obj\"\n");
   EXPECT_THAT(refusal(), HasSubstr("scan \"cube\", cube.obj: has no points, and neither a texture "
                                    "nor colours that could show the set's tags"));
+}
+
+// There is nothing to mark in the pictures, and nothing to draw over them.
+TEST_F(ModelCommand, PlacesAScanAloneByItsTags) {
+  TaggedFace table{{-0.5, -0.25, 0}, {1, 0, 0}, {0, 1, 0}, 0.9, 0.6};
+  table.tags = set::load_set(*options_.set_file).tracking.tags;
+  TaggedScan scan = textured_scan({table}, 2e-3);
+  scan.move([](const glm::dvec3& p) { return glm::dvec3(p.x, p.z, -p.y); });
+  write_textured_glb(folder_ / "demo/table.glb", scan);
+  write_parts("[[scan]]\nname = \"table\"\nfile = \"table.glb\"\n");
+  options_.overlay = folder_ / "over";
+  std::ostringstream out;
+  model::make_model(options_, out);
+  EXPECT_THAT(out.str(), HasSubstr("looking for tags on scan table\n"));
+  EXPECT_THAT(out.str(), HasSubstr("scan table: placed by tags 0, 1 and 2 (12 corners), rms 0."));
+  EXPECT_THAT(out.str(), Not(HasSubstr("marks in")));
+  EXPECT_THAT(out.str(), HasSubstr("scans are not drawn over the pictures"));
+  set::Set made = set::load_set(*options_.set_file);
+  std::erase_if(made.objects, [](const set::Object& o) { return o.name != "real"; });
+  EXPECT_EQ(scene::load_scene(made).instances.size(), 1u);
 }
 
 TEST_F(ModelCommand, TakesANameThatTheSetDoesNotHave) {

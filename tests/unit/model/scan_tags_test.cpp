@@ -1,6 +1,9 @@
 // Scans that are placed by the tags of the set that their own colours show.
 #include "daemon/model/scans.hpp"
 
+#include <limits>
+
+#include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
@@ -39,7 +42,7 @@ class ScanTags : public testing::Test {
 
   std::vector<model::NamedMesh> placed() {
     std::ostringstream out;
-    auto scans = model::place_scans(parts_, {}, {}, model::read_scans(parts_), tracking_, out);
+    auto scans = model::place_scans(parts_, {}, {}, model::read_scans(parts_, tracking_, out), out);
     report_ = out.str();
     return scans;
   }
@@ -167,7 +170,8 @@ TEST_F(ScanTags, OfWhichThereIsOneAreWarnedOf) {
   // As far from the tag as the table ends, the scan is off by more than at its corners.
   EXPECT_LT(worst_of(placed(), textured_scan(faces_, texel_m)), 5 * texel_m);
   EXPECT_THAT(report_, HasSubstr("placed by tag 3 (4 corners)"));
-  EXPECT_THAT(report_, HasSubstr("warning: scan set: tag 3 is its only tag; 1 m from it"));
+  EXPECT_THAT(report_,
+              HasSubstr("warning: scan set: tag 3 is the only tag that can be used; 1 m from it"));
 }
 
 TEST_F(ScanTags, ThatAreThereTwiceAreIgnored) {
@@ -210,7 +214,128 @@ TEST_F(ScanTags, TooSmallForTheTextureAreCounted) {
   TaggedScan scan = textured_scan(faces_, 16e-3);
   scan.move(in_mm);
   write_textured_obj(folder_ / "set.obj", scan);
-  EXPECT_THAT(refusal(), HasSubstr("its colours show a tag of 80 mm with 5 pixels, and 16 are"));
+  EXPECT_THAT(refusal(), HasSubstr("a tag of 80 mm has 5 pixels along a side, and 24 are needed"));
+}
+
+// One tag that cannot be read among the many pixels of a fine texture is not the texture's fault.
+TEST_F(ScanTags, ThatAreFineEnoughButMissingAreNotTheTexturesFault) {
+  for (TaggedFace& face : faces_) face.tags.clear();
+  write();
+  const std::string none = refusal();
+  EXPECT_THAT(none, HasSubstr("that can be read, although a tag of 80 mm has 80 pixels along a "
+                              "side; check that tags were in view"));
+  EXPECT_THAT(none, Not(HasSubstr("larger textures")));
+}
+
+// A cell of 10 mm has 3.03 pixels.
+TEST_F(ScanTags, OfAsManyPixelsAsAreNeededAreFound) {
+  constexpr double coarse_m = 3.3e-3;
+  TaggedScan scan = textured_scan(faces_, coarse_m);
+  scan.move(in_mm);
+  write_textured_obj(folder_ / "set.obj", scan);
+  EXPECT_LT(worst_of(placed(), textured_scan(faces_, coarse_m)), coarse_m);
+}
+
+// A hole that was filled has one point of the texture, a damaged face far more than all of it.
+TEST_F(ScanTags, AreFoundBesideFacesWithoutUsefulCoordinates) {
+  TaggedScan scan = textured_scan(faces_, texel_m);
+  for (const float far : {0.0f, 1e6f}) {
+    const auto first = static_cast<unsigned>(scan.positions.size());
+    for (const glm::vec2 corner : {glm::vec2(0, 0), {1, 0}, {0, 1}}) {
+      scan.positions.emplace_back(0.7f + 3 * corner.x, 3 * corner.y, 0);
+      scan.uvs.push_back(far * corner);
+    }
+    scan.indices.insert(scan.indices.end(), {first, first + 1, first + 2});
+  }
+  scan.move(in_mm);
+  write_textured_obj(folder_ / "set.obj", scan);
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
+}
+
+// The strip of tag 3 has two triangles; one faces away from its neighbours.
+TEST_F(ScanTags, AreFoundOnFacesThatAreTurned) {
+  TaggedScan scan = textured_scan(faces_, texel_m);
+  std::swap(scan.indices[9], scan.indices[10]);
+  scan.move(in_mm);
+  write_textured_obj(folder_ / "set.obj", scan);
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
+  EXPECT_THAT(report_, HasSubstr("1 faces turned"));
+}
+
+TEST_F(ScanTags, OfTexturesOutsideOfTheScansFolderAreNotLookedAt) {
+  write();
+  const auto inside = folder_ / "inside";
+  std::filesystem::create_directory(inside);
+  std::filesystem::rename(folder_ / "set.obj", inside / "set.obj");
+  parts_.scans[0].file = inside / "set.obj";
+  const std::string outside = std::filesystem::absolute(folder_ / "set.png").string();
+  for (const std::string& path :
+       {std::string("../set.png"), std::string("x/../../set.png"), outside}) {
+    std::ofstream(inside / "set.mtl") << "newmtl atlas\nmap_Kd " << path << '\n';
+    EXPECT_THAT(refusal(), HasSubstr("set.png\" is missing; put it beside the scan")) << path;
+  }
+  std::filesystem::rename(folder_ / "set.png", inside / "set.png");
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
+}
+
+class GltfScanTags : public ScanTags {
+ protected:
+  GltfScanTags() {
+    scan_.move([](const glm::dvec3& p) { return 1e-3 * in_mm(p); });
+    parts_.scans[0].file = file_;
+    parts_.scans[0].unit.reset();
+    parts_.scans[0].up.reset();
+  }
+
+  // Writes the scan with its description changed.
+  void write_changed(const std::function<void(GltfWriter::Json&)>& change) {
+    write_textured_glb(file_, scan_);
+    GltfWriter::Json json = GltfWriter::Json::parse(session::read_file(file_));
+    change(json);
+    std::ofstream(file_) << json;
+  }
+
+  const std::filesystem::path file_ = folder_ / "set.gltf";
+  TaggedScan scan_ = textured_scan(faces_, texel_m);
+};
+
+TEST_F(GltfScanTags, AreFoundInAPictureBesideIt) {
+  write_changed([](GltfWriter::Json& json) { json["images"][0] = {{"uri", "the%20atlas.png"}}; });
+  EXPECT_THAT(refusal(), HasSubstr("is missing; put it beside the scan"));
+  const std::vector<unsigned char> png = png_of(scan_);
+  std::ofstream(folder_ / "the atlas.png", std::ios::binary)
+      .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
+}
+
+TEST_F(GltfScanTags, OfTransformedTexturesAreRefused) {
+  write_changed([](GltfWriter::Json& json) {
+    json["extensionsUsed"] = GltfWriter::Json::array({"KHR_texture_transform"});
+    json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = {
+        {"KHR_texture_transform", {{"offset", {0.25, 0}}}}};
+  });
+  EXPECT_THAT(refusal(), HasSubstr("is moved, turned or scaled on its faces"));
+}
+
+// The last face has no tag; a picture repeats itself beyond its borders.
+TEST_F(GltfScanTags, AreFoundByCoordinatesBeyondTheTexture) {
+  for (glm::vec2& uv : scan_.uvs) uv += glm::vec2(2, -3);
+  scan_.uvs.back() = glm::vec2(std::numeric_limits<float>::quiet_NaN());
+  write_textured_glb(file_, scan_);
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
+}
+
+TEST_F(GltfScanTags, AreFoundInTheColoursOfVertices) {
+  scan_ = vertex_coloured_scan(faces_, 2e-3);
+  scan_.move([](const glm::dvec3& p) { return 1e-3 * in_mm(p); });
+  write_coloured_glb(file_, scan_);
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
 }
 
 }  // namespace

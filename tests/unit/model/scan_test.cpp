@@ -161,8 +161,8 @@ class Scans : public testing::Test {
     EXPECT_THAT(start.layout.unused_points, testing::IsEmpty());
     const model::Fit fit = model::adjust(parts_, views, start);
     std::ostringstream out;
-    auto scans =
-        model::place_scans(parts_, start.layout, fit.shape, model::read_scans(parts_), {}, out);
+    auto scans = model::place_scans(parts_, start.layout, fit.shape,
+                                    model::read_scans(parts_, {}, out), out);
     report_ = out.str();
     return scans;
   }
@@ -266,6 +266,28 @@ TEST(ScanPlace, PointsOnOneLineAreRefused) {
               HasSubstr("lie on one line in the pictures"));
   for (model::PointPair& pair : points) pair.in_scan = pair.in_world = {1, 1, 1};
   EXPECT_THAT(error_of([&] { model::place_scan("statue", points, 1); }), HasSubstr("on one line"));
+}
+
+// Two tags of 80 mm that are 3 m apart.
+std::vector<model::PointPair> corners_of_two_tags() {
+  std::vector<model::PointPair> points;
+  for (const int tag : {1, 2})
+    for (const glm::dvec2 corner : {glm::dvec2(0, 0), {0.08, 0}, {0.08, 0.08}, {0, 0.08}}) {
+      const glm::dvec3 at(corner.x + 3 * (tag - 1), corner.y, 0);
+      points.push_back({"corner", at, at, tag});
+    }
+  return points;
+}
+
+TEST(ScanPlace, TagsFarApartShowASmallError) {
+  std::vector<model::PointPair> points = corners_of_two_tags();
+  EXPECT_LT(model::place_scan("room", points, 1, 1e-3).rms_m, 1e-9);
+  EXPECT_THAT(error_of([&] { model::place_scan("room", points, 1.06, 1e-3); }),
+              HasSubstr("room: the scan would have to be 1.06 times smaller; correct its size"));
+  for (std::size_t i = 4; i < 8; ++i)
+    points[i].in_world = points[i].in_scan + glm::dvec3(0.08, 0, 0);
+  EXPECT_THAT(error_of([&] { model::place_scan("room", points, 1, 1e-3); }),
+              HasSubstr("or, if a tag was moved after the scan"));
 }
 
 // With noise of 1 mm in each coordinate, 4 points leave 12 - 6 of 12 degrees of freedom, so the

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <glm/geometric.hpp>
 
+#include "drivers/calibration.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 
@@ -210,6 +211,18 @@ void write_textured_glb(const std::filesystem::path& file, const TaggedScan& sca
   gltf.root("scan", gltf.mesh({{"attributes", {{"POSITION", positions}, {"TEXCOORD_0", uvs}}},
                                {"indices", indices},
                                {"material", material}}));
+  gltf.save(file);
+}
+
+void write_coloured_glb(const std::filesystem::path& file, const TaggedScan& scan) {
+  GltfWriter gltf;
+  std::vector<glm::vec3> linear;  // glTF 2.0, 3.7.2
+  for (const std::uint8_t luma : scan.luma)
+    linear.emplace_back(static_cast<float>(srgb_signal(luma / 255.0)));
+  const int positions = gltf.positions(scan.positions), colours = gltf.positions(linear);
+  const int indices = gltf.indices({scan.indices.begin(), scan.indices.end()});
+  gltf.root("scan", gltf.mesh({{"attributes", {{"POSITION", positions}, {"COLOR_0", colours}}},
+                               {"indices", indices}}));
   gltf.save(file);
 }
 

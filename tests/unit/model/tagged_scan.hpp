@@ -45,8 +45,9 @@ TaggedScan vertex_coloured_scan(const std::vector<TaggedFace>& faces, double ste
 
 // Writes NAME.obj, NAME.mtl and NAME.png.
 void write_textured_obj(const std::filesystem::path& file, const TaggedScan& scan);
-// The texture is in the file.
+// The texture is in the file, binary or text as its name says.
 void write_textured_glb(const std::filesystem::path& file, const TaggedScan& scan);
+void write_coloured_glb(const std::filesystem::path& file, const TaggedScan& scan);
 void write_coloured_ply(const std::filesystem::path& file, const TaggedScan& scan);
 std::vector<unsigned char> png_of(const TaggedScan& scan);
 
