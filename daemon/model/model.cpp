@@ -425,7 +425,8 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   const std::filesystem::path file = file_of(options);
   session::replace_file(file, model);
   fmt::print(out, "model: {}\n", file.string());
-  if (options.overlay) write_overlays(views, fit.shape, solids, *options.overlay);
+  if (options.overlay && !views.views.empty())
+    write_overlays(views, fit.shape, solids, *options.overlay);
   if (options.overlay && !scans.empty()) out << "scans are not drawn over the pictures\n";
   if (!options.tags_only) warn_of_others(set, file, out);
   if (edited) {

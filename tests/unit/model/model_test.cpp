@@ -279,6 +279,7 @@ TEST_F(ModelCommand, PlacesAScanAloneByItsTags) {
   EXPECT_THAT(out.str(), HasSubstr("scan table: placed by tags 0, 1 and 2 (12 corners), rms 0."));
   EXPECT_THAT(out.str(), Not(HasSubstr("marks in")));
   EXPECT_THAT(out.str(), HasSubstr("scans are not drawn over the pictures"));
+  EXPECT_FALSE(fs::exists(folder_ / "over"));
   set::Set made = set::load_set(*options_.set_file);
   std::erase_if(made.objects, [](const set::Object& o) { return o.name != "real"; });
   EXPECT_EQ(scene::load_scene(made).instances.size(), 1u);
