@@ -84,7 +84,7 @@ class Controls {
   void use_recorded(pipeline::RecordedLook recorded) { recorded_ = std::move(recorded); }
 
   // Takes what the cross of the shown picture is on; nothing: no picture was shown yet.
-  void use_aim(std::optional<Aim> aim) { aim_ = std::move(aim); }
+  void use_aim(const std::optional<Aim>& aim) { aim_ = aim; }
 
   // Takes the name of the take that is recorded, or was last.
   void use_take(std::string take) { take_ = std::move(take); }

@@ -53,7 +53,7 @@ class MarkedTake : public testing::Test {
   }
 
   std::string refusal() {
-    const std::string why = test::error_of([&] { made(); });
+    std::string why = test::error_of([&] { made(); });
     EXPECT_FALSE(fs::exists(folder_ / "demo/marked.glb"));
     return why;
   }

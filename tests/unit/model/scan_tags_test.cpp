@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "drivers/session/files.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
