@@ -315,7 +315,7 @@ void add_commands(CLI::App& app, CommandLine& said) {
 
 std::string meant_option(const CLI::App& app) {
   for (const CLI::App* command : app.get_subcommands())
-    if (const std::string meant = meant_option(*command); !meant.empty()) return meant;
+    if (std::string meant = meant_option(*command); !meant.empty()) return meant;
   std::vector<std::string> known;
   for (const CLI::Option* option : app.get_options())
     for (const std::string& name : option->get_lnames()) known.push_back(name);

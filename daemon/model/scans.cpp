@@ -172,9 +172,8 @@ ScanTags tags_on(const std::string& subject, const ScanPart& part, ScanFile& fil
   out.flush();
   const ScanFile seen{with_faces_turned(file.mesh), file.unit_m, file.up,
                       std::exchange(file.colours, {})};
-  const ScanTags tags =
-      find_scan_tags(fmt::format("{}, {}", subject, part.file.filename().string()), seen, tracking,
-                     part.unit ? metres(*part.unit) : seen.unit_m);
+  ScanTags tags = find_scan_tags(fmt::format("{}, {}", subject, part.file.filename().string()),
+                                 seen, tracking, part.unit ? metres(*part.unit) : seen.unit_m);
   for (const std::string& note : tags.notes)
     fmt::print(out, "warning: scan {}: {}\n", part.name, note);
   return tags;
