@@ -407,7 +407,7 @@ TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
   const std::string file = (directory / "test.gltf").string();
   EXPECT_EQ(error(), file + ": image 0 \"lost.png\": not found, or empty");
   EXPECT_EQ(error_with("/images/0", {{"name", "text"}, {"uri", "data:text/plain;base64,bm8hIQ=="}}),
-            file + ": image 0 \"text\": is neither PNG nor JPEG");
+            file + ": image 0 \"text\": is neither PNG nor JPEG; export it as PNG or JPEG");
   std::vector<unsigned char> broken = png(2, 1, two_texels);
   broken.at(42) ^= 0xff;  // the header of the compressed texels
   // Width in the PNG's header, big-endian at byte 16: larger than allowed, and more than its bytes.
