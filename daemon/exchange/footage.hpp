@@ -13,6 +13,7 @@
 
 namespace previz::exchange {
 
+struct PictureSequence;
 struct ReadAs;
 
 struct Picture {
@@ -44,8 +45,9 @@ class Footage {
 // pixels than this: a small file can claim to hold any number.
 inline constexpr std::size_t most_pixels = std::size_t{1} << 28;
 
+// `read_as` stands for tags of the files that are wrong or lacking (video_tags.hpp).
+std::unique_ptr<Footage> open_pictures(PictureSequence sequence, const ReadAs& read_as);
 std::unique_ptr<Footage> open_pictures(std::vector<std::filesystem::path> files);
-// `read_as` stands for tags of the file that are wrong or lacking (video_tags.hpp).
 std::unique_ptr<Footage> open_video(const std::filesystem::path& file, const ReadAs& read_as);
 std::unique_ptr<Footage> open_video(const std::filesystem::path& file);
 

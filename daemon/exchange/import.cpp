@@ -82,8 +82,9 @@ class FootageImport {
       : file_(description_file), footage_(footage), calibrated_(calibrated), writer_(writer) {}
 
   Imported run(std::vector<std::string>& notes) {
-    const auto pictures = footage_.video.empty() ? open_pictures(footage_.pictures)
-                                                 : open_video(footage_.video, footage_.read_as);
+    const auto pictures = footage_.video.empty()
+                              ? open_pictures(footage_.pictures, footage_.read_as)
+                              : open_video(footage_.video, footage_.read_as);
     std::vector<ImportedFrame> frames;
     while (const auto picture = pictures->next()) {
       check(*picture);

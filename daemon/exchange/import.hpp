@@ -15,10 +15,14 @@
 //                 camera frame, default 0 (exact). Frames that are not listed count as lost.
 //
 // observer, light - the pictures, exactly one of:
-//   pictures      list of paths; or a path whose file name holds one number "%d" or "%04d" (all
-//                 there are; a gap is an error), or wildcards * and ? (in the order of the numbers
-//                 in the names). PNG, JPEG or TIFF, grey or RGB, 8 or 16 bits; all alike. They are
-//                 turned upright as their EXIF data says.
+//   pictures      list of paths; or a path whose file name holds one number, as "%04d", "####",
+//                 "@@@@" or "$F4" (picture_sequence.hpp), also of a range, "plate.####.exr
+//                 1001-1100", or wildcards * and ?. A number that is missing is a lost frame at its
+//                 time, unless timestamps_ns say otherwise. PNG, JPEG, TIFF, WebP, DPX or OpenEXR
+//                 (linear light, 1 is white), grey or RGB, 8 or 16 bits; all alike. They are turned
+//                 upright as their EXIF data says. ICC profiles, PNG's cICP, gAMA and cHRM, TIFF's
+//                 chromaticities and EXIF's Adobe RGB are converted to sRGB's curve and Rec. 709's
+//                 primaries, in 16 bits.
 //   video         path of a video. Y'CbCr 4:2:2 in 8 bits, BT.709, limited range, and full grey are
 //                 kept as they are; everything else becomes RGB or grey, 8 bits, or 16 if it has
 //                 more than 8. Its tags are heeded: which side is up, the shape of a pixel (made
@@ -28,8 +32,8 @@
 //                 its colour matrix counts as BT.709 from 720 lines on and as BT.601 below, as
 //                 players do. What was found and what was assumed is reported. A frame that cannot
 //                 be decoded is lost: it is counted, and its number is left free.
-//   read_as       beside video, in place of tags that are wrong or lacking: {range: "full" or
-//                 "limited", matrix: "bt601", "bt709", "bt2020" or "smpte240m", transfer: "srgb",
+//   read_as       in place of tags that are wrong or lacking: {range: "full" or "limited", matrix
+//                 (of a video): "bt601", "bt709", "bt2020" or "smpte240m", transfer: "srgb",
 //                 "bt709", "hlg", "pq", "linear", "gamma22", "gamma28", "log100", "log316", or "as
 //                 recorded", which leaves it to response; primaries: "bt709", "bt2020", "p3-d65",
 //                 "p3-dci", "bt601-525" or "bt601-625", rotation_deg: 0, 90, 180 or 270 clockwise,

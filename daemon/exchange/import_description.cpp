@@ -118,31 +118,35 @@ bool is_video_name(const std::string& name) {
 
 void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
   const Members& m = camera.members;
-  if (m.has("read_as") && !m.has("video"))
-    m.fail("read_as", "stands for the tags of a video; pictures are read as they are");
   if (m.has("pictures") && m.has("video"))
     m.fail("video", "conflicts with pictures; give only one");
   if (m.has("video")) {
     footage.video = camera.folder / m.read<std::string>("video");
     if (std::error_code none; !fs::is_regular_file(footage.video, none))
       m.fail("video", "names " + footage.video.string() + ", which is not a file");
-    footage.read_as = read_read_as(m);
   } else if (m.has("pictures") && m.value("pictures").is_string() &&
              is_video_name(m.read<std::string>("pictures"))) {
     m.fail("pictures", "is a video; use \"video\" instead of \"pictures\"");
   } else if (m.has("pictures") && m.value("pictures").is_string()) {
-    footage.pictures = matching_files(camera.folder / m.read<std::string>("pictures"));
+    footage.pictures = picture_sequence(camera.folder / m.read<std::string>("pictures"));
   } else if (m.has("pictures")) {
+    std::vector<fs::path> files;
     for (const std::string& name : m.read_list<std::string>("pictures"))
-      footage.pictures.push_back(camera.folder / name);
-    if (footage.pictures.empty()) m.fail("pictures", "is empty; at least one picture is needed");
+      files.push_back(camera.folder / name);
+    if (files.empty()) m.fail("pictures", "is empty; at least one picture is needed");
+    footage.pictures = whole_sequence(std::move(files));
   } else if (camera.in_table("file")) {
+    std::vector<fs::path> files;
     for (const std::string& name : camera.table->column("file"))
-      footage.pictures.push_back(camera.table->file.parent_path() / name);
+      files.push_back(camera.table->file.parent_path() / name);
+    footage.pictures = whole_sequence(std::move(files));
   } else {
     m.fail("pictures", "is missing; allowed: pictures, video, or csv with a column \"file\"");
   }
-  for (const fs::path& picture : footage.pictures)
+  footage.read_as = read_read_as(m);
+  if (footage.read_as.matrix && footage.video.empty())
+    m.fail("read_as", "has a matrix, which pictures do not have; remove it");
+  for (const fs::path& picture : footage.pictures.files)
     if (std::error_code none; !fs::is_regular_file(picture, none))
       throw Error(picture.string() + ": is not a file, but " + m.path("pictures") + " lists it");
 }
@@ -179,7 +183,9 @@ void read_times(const CameraMembers& camera, FootageDescription& footage) {
   }
   if (m.has("start_ns") && !footage.timestamps_ns.empty())
     m.fail("start_ns", "needs fps or \"container\"");
-  const std::size_t pictures = footage.pictures.size(), times = footage.timestamps_ns.size();
+  const std::size_t pictures = footage.pictures.files.size(), times = footage.timestamps_ns.size();
+  if (pictures > 0 && times > 0)  // which say of each picture when it was taken
+    footage.pictures = whole_sequence(std::move(footage.pictures.files));
   if (pictures > 0 && times > 0 && pictures != times)
     m.fail("timestamps_ns", "has " + std::to_string(times) + " entries; there are " +
                                 std::to_string(pictures) + " pictures");
@@ -203,7 +209,8 @@ std::vector<double> read_series(const CameraMembers& camera, const std::string& 
 // Returns the number of frames that is described; 0: it is not known yet, as of a video without
 // times. The lists of such a video must all be for as many.
 std::size_t frame_count(const FootageDescription& footage) {
-  std::size_t count = std::max(footage.pictures.size(), footage.timestamps_ns.size());
+  std::size_t count = std::max(footage.pictures.files.size() + footage.pictures.missing,
+                               footage.timestamps_ns.size());
   if (count > 0) return count;
   for (const auto* series : {&footage.exposure, &footage.exposure_s, &footage.gain})
     if (series->size() > 1) count = std::max(count, series->size());
@@ -265,7 +272,7 @@ void order_by_time(const Members& m, FootageDescription& footage) {
     std::vector<std::size_t> order(times.size());
     std::iota(order.begin(), order.end(), std::size_t{0});
     std::ranges::stable_sort(order, {}, [&](std::size_t i) { return times[i]; });
-    reorder(footage.pictures, order);
+    reorder(footage.pictures.files, order);
     reorder(footage.exposure, order);
     reorder(footage.exposure_s, order);
     reorder(footage.gain, order);

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/exchange/picture_sequence.hpp"
 #include "daemon/exchange/video_tags.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
@@ -20,10 +21,10 @@ inline constexpr std::int64_t latest_ns = std::numeric_limits<std::int64_t>::max
 
 // The frames of a camera. Lists have one entry a frame; `exposure` is resolved, never empty.
 struct FootageDescription {
-  std::string source;                           // "observer" or "light"
-  std::vector<std::filesystem::path> pictures;  // empty: video
+  std::string source;        // "observer" or "light"
+  PictureSequence pictures;  // without files: video
   std::filesystem::path video;
-  ReadAs read_as;                           // of the video
+  ReadAs read_as;
   std::vector<std::int64_t> timestamps_ns;  // empty: fps, or the container's if that is 0
   double fps = 0;
   std::int64_t start_ns = 0;

@@ -1,4 +1,4 @@
-// Reads lists of files, from a table (CSV) or from a pattern.
+// Reads tables of frames (CSV).
 #pragma once
 
 #include <filesystem>
@@ -19,11 +19,5 @@ struct Table {
 // Reads a comma-separated table with a header line and at least one row, without quotes. Throws
 // previz::Error naming file and line.
 Table read_csv(const std::filesystem::path& file);
-
-// Returns the files that match. With one number "%d" or "%0Nd" in the file name these are all such
-// files by number, without a gap; with wildcards * and ?, all such files, ordered with the numbers
-// in their names by value; otherwise the file itself. Throws previz::Error if there is none, or a
-// number is missing.
-std::vector<std::filesystem::path> matching_files(const std::filesystem::path& pattern);
 
 }  // namespace previz::exchange

@@ -1,14 +1,27 @@
+#include <fmt/format.h>
+#include <tiffio.h>
+
+#include <algorithm>
+#include <cmath>
 #include <exiv2/exiv2.hpp>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/orientation.hpp"
+#include "daemon/exchange/picture_color.hpp"
 #include "daemon/exchange/picture_header.hpp"
+#include "daemon/exchange/picture_sequence.hpp"
+#include "daemon/lighting/exr_picture.hpp"
+#include "daemon/tracking/photometry.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::exchange {
 namespace {
+
+namespace fs = std::filesystem;
 
 // A picture with transparency cannot come from a camera; an alpha channel that is opaque everywhere
 // is harmless.
@@ -26,32 +39,139 @@ PixelFormat format_of(const cv::Mat& image) {
   return deep ? PixelFormat::rgb16 : PixelFormat::rgb8;
 }
 
-// Which side of a JPEG or PNG is up, by its EXIF data. (OpenCV turns TIFF itself.)
-Orientation orientation_of(const std::string& file) try {
+// What a picture's file says beside its samples.
+struct Tags {
+  Orientation orientation;
+  ColorTag color;
+};
+
+Tags tags_of(const std::string& file, const std::string& content, bool is_turned) try {
   const auto image = Exiv2::ImageFactory::open(file);
-  if (image->imageType() == Exiv2::ImageType::tiff) return {};
   image->readMetadata();
+  Tags tags{{}, color_tag_of(content, *image)};
+  if (is_turned) return tags;
   const Exiv2::ExifData& data = image->exifData();
   const auto found = data.findKey(Exiv2::ExifKey("Exif.Image.Orientation"));
-  if (found == data.end() || found->count() == 0) return {};
+  if (found == data.end() || found->count() == 0) return tags;
   const float value = found->toFloat();
-  if (!(value >= 1 && value <= 8)) return {};  // is none
-  return exif_orientation(static_cast<int>(value)).value_or(Orientation{});
+  if (value >= 1 && value <= 8)
+    tags.orientation = exif_orientation(static_cast<int>(value)).value_or(Orientation{});
+  return tags;
 } catch (const Exiv2::Error&) {
   return {};  // damaged EXIF data says nothing; the picture may be whole
 }
 
+// OpenCV before 4.13 takes planes of 16 bits for interleaved samples (its issue 29567).
+cv::Mat read_planes(const std::string& name) {
+  const std::unique_ptr<TIFF, decltype(&TIFFClose)> tiff(TIFFOpen(name.c_str(), "r"), TIFFClose);
+  std::uint32_t width = 0, height = 0, rows = 0, columns = 0;
+  std::uint16_t count = 0;
+  if (!tiff || !TIFFGetField(tiff.get(), TIFFTAG_IMAGEWIDTH, &width) ||
+      !TIFFGetField(tiff.get(), TIFFTAG_IMAGELENGTH, &height) ||
+      !TIFFGetField(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, &count) || count > 4)
+    return {};
+  const bool is_tiled = TIFFIsTiled(tiff.get());
+  columns = width;
+  if (is_tiled) {
+    TIFFGetField(tiff.get(), TIFFTAG_TILEWIDTH, &columns);
+    TIFFGetField(tiff.get(), TIFFTAG_TILELENGTH, &rows);
+  } else {
+    TIFFGetFieldDefaulted(tiff.get(), TIFFTAG_ROWSPERSTRIP, &rows);
+    rows = std::min(rows, height);
+  }
+  const tmsize_t bytes = is_tiled ? TIFFTileSize(tiff.get()) : TIFFStripSize(tiff.get());
+  if (columns == 0 || rows == 0 || bytes < tmsize_t{2} * columns * rows ||
+      static_cast<std::uint64_t>(bytes) > 2 * most_pixels)
+    return {};
+  std::vector<std::uint16_t> block(static_cast<std::size_t>(bytes) / 2);
+  std::vector<cv::Mat> planes;
+  for (std::uint16_t plane = 0; plane < count; ++plane) {
+    planes.emplace_back(static_cast<int>(height), static_cast<int>(width), CV_16UC1);
+    for (std::uint32_t y = 0; y < height; y += rows)
+      for (std::uint32_t x = 0; x < width; x += columns) {
+        const auto read =
+            is_tiled ? TIFFReadTile(tiff.get(), block.data(), x, y, 0, plane)
+                     : TIFFReadEncodedStrip(tiff.get(), TIFFComputeStrip(tiff.get(), y, plane),
+                                            block.data(), bytes);
+        if (read < 0) return {};
+        const cv::Rect place(static_cast<int>(x), static_cast<int>(y),
+                             static_cast<int>(std::min(columns, width - x)),
+                             static_cast<int>(std::min(rows, height - y)));
+        cv::Mat(static_cast<int>(rows), static_cast<int>(columns), CV_16UC1,
+                block.data())({{}, place.size()})
+            .copyTo(planes.back()(place));
+      }
+  }
+  if (count > 2) std::swap(planes[0], planes[2]);  // OpenCV's order is blue, green, red
+  cv::Mat picture;
+  cv::merge(planes, picture);
+  return picture;
+}
+
 class PictureFiles final : public Footage {
  public:
-  explicit PictureFiles(std::vector<std::filesystem::path> files) : files_(std::move(files)) {}
+  PictureFiles(PictureSequence sequence, ReadAs read_as)
+      : sequence_(std::move(sequence)), read_as_(std::move(read_as)) {}
 
   std::optional<Picture> next() override {
-    if (index_ == files_.size()) return std::nullopt;
-    const std::uint64_t number = index_;
-    const std::string name = files_[index_++].string();
-    check_picture_file(name);
+    if (index_ == sequence_.files.size()) return std::nullopt;
+    const std::uint64_t number = sequence_.positions[index_];
+    Picture picture = read(sequence_.files[index_++].string());
+    picture.number = number;
+    return picture;
+  }
+
+  std::uint64_t lost() const override { return sequence_.missing; }
+
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes;
+    if (!sequence_.words.empty()) notes.push_back(sequence_.words);
+    for (const auto& [what, said] : said_)
+      notes.push_back(
+          said.first + ": " + what +
+          (said.count == 1 ? "" : "; so are " + std::to_string(said.count) + " pictures"));
+    for (const auto& [tag, colors] : colors_) note_clipping(colors.clipped_share(), notes);
+    note_clipping(outside_ == 0 ? 0 : static_cast<double>(outside_) / static_cast<double>(samples_),
+                  notes);
+    return notes;
+  }
+
+ private:
+  struct Said {
+    std::string first;  // picture
+    std::size_t count = 0;
+  };
+
+  void note_clipping(double share, std::vector<std::string>& notes) const {
+    if (share > 0)
+      notes.push_back(fmt::format(
+          "{}: {:.2g} % of the samples are outside of what Rec. 709 holds, and are clipped",
+          sequence_.files.front().string(), 100 * share));
+  }
+
+  void note(const std::string& name, const std::string& what) {
+    Said& said = said_[what];
+    if (said.count++ == 0) said.first = name;
+  }
+
+  Picture read(const std::string& name) {
+    const std::string content = session::read_file(name);
+    const PictureKind kind = check_picture_file(name, content);
+    if (kind == PictureKind::dpx) return read_dpx(name, content);
+    if (kind == PictureKind::exr) return read_exr(name);
+    const bool is_tiff = kind == PictureKind::tiff;
+    const bool in_planes = is_tiff && has_deep_planes(content);
+    cv::Mat image = decode(name, in_planes);
+    // OpenCV turns TIFF itself.
+    const Tags tags = tags_of(name, content, is_tiff && !in_planes);
+    convert(image, tags.color, name);
+    return shaped(picture_of(image, name), read_as_.orientation.value_or(tags.orientation));
+  }
+
+  // Returns grey, or red, green and blue, of 8 or 16 bits.
+  static cv::Mat decode(const std::string& name, bool has_deep_planes) {
     // UNCHANGED keeps the bit depth, and leaves EXIF's rotation to us: IMREAD_COLOR would turn it.
-    cv::Mat image = cv::imread(name, cv::IMREAD_UNCHANGED);
+    cv::Mat image = has_deep_planes ? read_planes(name) : cv::imread(name, cv::IMREAD_UNCHANGED);
     if (image.empty()) throw Error(name + ": cannot be read as a picture; it is damaged");
     const bool known_depth = image.depth() == CV_8U || image.depth() == CV_16U;
     if (!known_depth || image.channels() == 2 || image.channels() > 4)
@@ -62,31 +182,103 @@ class PictureFiles final : public Footage {
       throw Error(name + ": is transparent in places; allowed: grey or RGB, opaque");
     if (image.channels() >= 3)
       cv::cvtColor(image, image, image.channels() == 4 ? cv::COLOR_BGRA2RGB : cv::COLOR_BGR2RGB);
+    return image;
+  }
+
+  void convert(cv::Mat& image, const ColorTag& tag, const std::string& name) {
+    if (read_as_.keeps_signal) return;
+    const bool is_said = read_as_.transfer || read_as_.primaries || read_as_.range;
+    const auto found = colors_.find(is_said ? ColorTag{} : tag);
+    StillColors& colors = found != colors_.end() ? found->second
+                                                 : colors_
+                                                       .emplace(is_said ? ColorTag{} : tag,
+                                                                is_said ? StillColors(read_as_)
+                                                                        : StillColors(tag, name))
+                                                       .first->second;
+    if (!colors.changes_anything()) return;
+    colors.convert(image, name);
+    note(name, "is converted to Rec. 709 under sRGB's curve, by " + colors.words());
+  }
+
+  Picture read_dpx(const std::string& name, const std::string& content) {
+    // SMPTE ST 268: who wrote it, and the transfer characteristic of its first element.
+    constexpr std::size_t creator = 160, transfer = 801;
+    constexpr char printing_density = 1, logarithmic = 3;
+    ReadAs read_as = read_as_;
+    if (!read_as.transfer) {
+      if (content.at(transfer) == printing_density || content.at(transfer) == logarithmic)
+        throw Error(name +
+                    ": is logarithmic, as film is scanned; convert it to linear OpenEXR or to Rec. "
+                    "709, or give \"read_as\": {\"transfer\": ...} beside \"pictures\" in "
+                    "FRAMES.json if the tag is wrong");
+      // FFmpeg's encoder calls every picture linear.
+      if (content.compare(creator, 4, "Lavc") == 0) read_as.transfer = AVCOL_TRC_BT709;
+    }
+    const auto video = open_video(name, read_as);
+    auto picture = video->next();
+    if (!picture) throw Error(name + ": cannot be read as a picture; it is damaged");
+    if (read_as.transfer && !read_as_.transfer)
+      note(name, "was written by FFmpeg, which calls every DPX linear; its curve is kept");
+    else
+      for (const std::string& what : video->notes())
+        note(name, what.substr(std::min(what.size(), name.size() + 2)));
+    picture->name = name;
+    picture->container_ns.reset();
+    return std::move(*picture);
+  }
+
+  // Scene light; the take holds it from 0 to 1 under sRGB's curve.
+  Picture read_exr(const std::string& name) {
+    std::vector<std::string> oddities;
+    const lighting::LinearPicture light = lighting::read_exr_picture(name, oddities);
+    if (!oddities.empty())
+      throw Error(name + ": " + oddities.front() +
+                  "; convert it (oiiotool IN --colorconvert ACEScg lin_rec709 -o OUT)");
+    cv::Mat image(light.height, light.width, CV_16UC3);
+    auto* sample = image.ptr<std::uint16_t>();
+    for (const glm::vec3& radiance : light.radiance)
+      for (int c = 0; c < 3; ++c) {
+        const float value = radiance[c];
+        outside_ += !(value >= 0 && value <= 1);
+        *sample++ = static_cast<std::uint16_t>(
+            std::lround(65535 * tracking::srgb_encode(value > 0 ? std::min(value, 1.0f) : 0)));
+      }
+    samples_ += 3 * light.radiance.size();
+    note(name, "holds linear light, which is converted to sRGB's curve; 1 is white");
+    return shaped(picture_of(image, name), read_as_.orientation.value_or(Orientation{}));
+  }
+
+  static Picture picture_of(cv::Mat& image, const std::string& name) {
     if (!image.isContinuous()) image = image.clone();
-    Picture picture{format_of(image), image.cols, image.rows, {}, name, {}, number};
+    Picture picture{format_of(image), image.cols, image.rows, {}, name, {}, 0};
     picture.bytes.assign(image.datastart, image.dataend);
-    const Orientation orientation = orientation_of(name);
-    turn(picture, orientation);
-    if (!orientation.is_upright() && turned_++ == 0)
-      first_turned_ = name + ": is " + orientation.words() + ", as its EXIF data says";
     return picture;
   }
 
-  std::vector<std::string> notes() const override {
-    if (turned_ == 0) return {};
-    return {first_turned_ + (turned_ == 1 ? "" : "; " + std::to_string(turned_) + " pictures are")};
+  Picture shaped(Picture picture, const Orientation& orientation) {
+    if (const auto& aspect = read_as_.pixel_aspect) make_square(picture, aspect->num, aspect->den);
+    turn(picture, orientation);
+    if (!orientation.is_upright() && !read_as_.orientation)
+      note(picture.name, "is " + orientation.words() + ", as its EXIF data says");
+    return picture;
   }
 
- private:
-  std::vector<std::filesystem::path> files_;
-  std::size_t index_ = 0, turned_ = 0;
-  std::string first_turned_;
+  PictureSequence sequence_;
+  ReadAs read_as_;
+  std::size_t index_ = 0;
+  std::map<ColorTag, StillColors> colors_;
+  std::map<std::string, Said> said_;
+  std::uint64_t samples_ = 0, outside_ = 0;  // of OpenEXR
 };
 
 }  // namespace
 
-std::unique_ptr<Footage> open_pictures(std::vector<std::filesystem::path> files) {
-  return std::make_unique<PictureFiles>(std::move(files));
+std::unique_ptr<Footage> open_pictures(PictureSequence sequence, const ReadAs& read_as) {
+  return std::make_unique<PictureFiles>(std::move(sequence), read_as);
+}
+
+std::unique_ptr<Footage> open_pictures(std::vector<fs::path> files) {
+  return open_pictures(whole_sequence(std::move(files)), ReadAs{});
 }
 
 }  // namespace previz::exchange

@@ -19,9 +19,9 @@ namespace {
 // that name other files and addresses of networks, and decoders that nobody looks after.
 constexpr const char* allowed_protocols = "file";
 constexpr const char* allowed_formats =
-    "mov,matroska,avi,mxf,mpegts,mpeg,ogg,nut,dv,gxf,asf,yuv4mpegpipe";
+    "mov,matroska,avi,mxf,mpegts,mpeg,ogg,nut,dv,gxf,asf,yuv4mpegpipe,dpx_pipe";
 constexpr const char* allowed_codecs =
-    "ffv1,prores,dnxhd,cfhd,h264,hevc,libdav1d,av1,vp8,vp9,mjpeg,png,jpeg2000,rawvideo,v210,v410,"
+    "ffv1,prores,dnxhd,cfhd,dpx,h264,hevc,libdav1d,av1,vp8,vp9,mjpeg,png,jpeg2000,rawvideo,v210,v410,"
     "r210,"
     "dvvideo,mpeg1video,mpeg2video,mpeg4,theora,huffyuv,ffvhuff,utvideo,qtrle,wrapped_avframe";
 

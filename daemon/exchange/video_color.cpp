@@ -25,8 +25,6 @@ double hlg_light(double signal) {
   return signal <= 0.5 ? signal * signal / 3 : (std::exp((signal - c) / a) + b) / 12;
 }
 
-// Chromaticities of red, green, blue and white.
-using Chromaticities = std::array<std::array<double, 2>, 4>;
 constexpr std::array<double, 2> d65 = {0.3127, 0.3290}, illuminant_c = {0.310, 0.316};
 constexpr Chromaticities rec709 = {{{0.640, 0.330}, {0.300, 0.600}, {0.150, 0.060}, d65}};
 
@@ -130,15 +128,24 @@ std::optional<double> light_of(AVColorTransferCharacteristic transfer, double si
   }
 }
 
+std::optional<std::array<double, 9>> rec709_from(const Chromaticities& from) {
+  const cv::Vec3d white = white_of(from);
+  const cv::Matx33d matrix =
+      xyz_from(rec709).inv() * adapted(white, white_of(rec709)) * xyz_from(from);
+  std::array<double, 9> rows{};
+  std::copy_n(matrix.val, rows.size(), rows.begin());
+  // OpenCV's inverse of a singular matrix is zero, and a white without brightness is infinite.
+  if (!std::ranges::all_of(rows, [](double value) { return std::isfinite(value); }) ||
+      std::abs(cv::determinant(matrix)) < 1e-6)
+    return std::nullopt;
+  return rows;
+}
+
 std::optional<std::array<double, 9>> rec709_from(AVColorPrimaries primaries) {
   const auto from = chromaticities_of(primaries);
   if (!from) return std::nullopt;
   if (*from == rec709) return {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
-  const cv::Matx33d matrix =
-      xyz_from(rec709).inv() * adapted(white_of(*from), white_of(rec709)) * xyz_from(*from);
-  std::array<double, 9> rows{};
-  std::copy_n(matrix.val, rows.size(), rows.begin());
-  return rows;
+  return rec709_from(*from);
 }
 
 ColorConversion::ColorConversion(AVColorTransferCharacteristic transfer, AVColorPrimaries primaries,
@@ -149,15 +156,45 @@ ColorConversion::ColorConversion(AVColorTransferCharacteristic transfer, AVColor
   const auto matrix = rec709_from(primaries);
   std::ranges::copy(*matrix, matrix_.begin());
   if (!changes_anything()) return;
-  const lighting::Response srgb({}, 16);
   constexpr double black = 16.0 / 255, range = 219.0 / 255;
   for (int i = 0; i <= most; ++i) {
     const double sample = i / most;
     const double signal = limited ? std::clamp((sample - black) / range, 0.0, 1.0) : sample;
-    light_.push_back(
+    light_[0].push_back(
         static_cast<float>(changes_transfer_ ? *light_of(transfer, signal) : srgb_signal(signal)));
+  }
+  light_[1] = light_[2] = light_[0];
+  fill_signals();
+}
+
+ColorConversion::ColorConversion(const ColorMeaning& meaning)
+    : changes_transfer_(true), changes_primaries_(true), limited_(false) {
+  std::ranges::copy(meaning.rec709, matrix_.begin());
+  for (std::size_t c = 0; c < 3; ++c)
+    for (int i = 0; i <= most; ++i)
+      light_[c].push_back(static_cast<float>(meaning.light[c](i / most)));
+  fill_signals();
+  // Greys, and colours of all hues.
+  constexpr int steps = 6, step = 65535 / (steps - 1);
+  std::vector<std::uint16_t> samples;
+  for (int i = 0; i < 256; ++i)
+    samples.insert(samples.end(), 3, static_cast<std::uint16_t>(257 * i));
+  for (int i = 0; i < steps * steps * steps; ++i)
+    for (const int n : {i % steps, i / steps % steps, i / steps / steps})
+      samples.push_back(static_cast<std::uint16_t>(n * step));
+  std::vector<std::uint16_t> converted = samples;
+  convert(converted);
+  samples_ = clipped_ = 0;
+  changes_transfer_ = changes_primaries_ =
+      !std::ranges::equal(samples, converted, [](int a, int b) { return std::abs(a - b) <= 128; });
+}
+
+void ColorConversion::fill_signals() {
+  const lighting::Response srgb({}, 16);
+  for (int i = 0; i <= most; ++i) {
+    const double sample = i / most;
     signal_.push_back(srgb.forward(sample * sample));
-    gray_.push_back(srgb.forward(light_.back()));
+    gray_.push_back(srgb.forward(light_[1][static_cast<std::size_t>(i)]));
   }
 }
 
@@ -166,7 +203,7 @@ void ColorConversion::convert(std::span<std::uint16_t> rgb) {
   constexpr float under = -0.5f / 255 / 12.92f, over = 1 + 0.5f / 255 * 2.2f;
   const auto& m = matrix_;
   for (std::size_t i = 0; i + 2 < rgb.size(); i += 3) {
-    const float r = light_[rgb[i]], g = light_[rgb[i + 1]], b = light_[rgb[i + 2]];
+    const float r = light_[0][rgb[i]], g = light_[1][rgb[i + 1]], b = light_[2][rgb[i + 2]];
     for (std::size_t c = 0; c < 3; ++c) {
       const float light = changes_primaries_ ? m[3 * c] * r + m[3 * c + 1] * g + m[3 * c + 2] * b
                                              : (c == 0   ? r

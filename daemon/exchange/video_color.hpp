@@ -1,5 +1,5 @@
-// Converts the colours of a video, by what its tags say of them, to the working space: linear Rec.
-// 709 light in 0..1 under the sRGB curve.
+// Converts the colours of a video or a still, by what its tags say of them, to the working space:
+// linear Rec. 709 light in 0..1 under the sRGB curve.
 #pragma once
 
 extern "C" {
@@ -8,6 +8,7 @@ extern "C" {
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -31,12 +32,26 @@ bool keeps_signal(AVColorTransferCharacteristic transfer);
 // 709, white to white (Bradford). Nothing for unknown primaries; the unit matrix for no tag.
 std::optional<std::array<double, 9>> rec709_from(AVColorPrimaries primaries);
 
+// CIE x and y of red, green, blue and white.
+using Chromaticities = std::array<std::array<double, 2>, 4>;
+// The same matrix for primaries that have no number; nothing for those that span no triangle.
+std::optional<std::array<double, 9>> rec709_from(const Chromaticities& chromaticities);
+
+// What a still's tags say of its samples: the light of a red, green and blue signal of 0..1, and
+// the matrix, row-major, from that light to linear Rec. 709.
+struct ColorMeaning {
+  std::array<std::function<double(double)>, 3> light;
+  std::array<double, 9> rec709;
+};
+
 // Converts pictures of RGB, 16 bits a sample.
 class ColorConversion {
  public:
   // Both must be known. `limited`: the samples are from 16/255 to 235/255, as a capture of HDMI has
   // them; otherwise from 0 to 1.
   ColorConversion(AVColorTransferCharacteristic transfer, AVColorPrimaries primaries, bool limited);
+  // One that moves no sample by half a step of 8 bits changes nothing.
+  explicit ColorConversion(const ColorMeaning& meaning);
 
   bool changes_anything() const { return changes_transfer_ || changes_primaries_ || limited_; }
   // Samples in the order red, green, blue, as many as there are.
@@ -50,11 +65,13 @@ class ColorConversion {
   double clipped_share() const;
 
  private:
+  void fill_signals();
+
   bool changes_transfer_, changes_primaries_, limited_;
   std::array<float, 9> matrix_;
-  std::vector<float> light_;           // of each sample
-  std::vector<std::uint16_t> signal_;  // of the square root of light, in 65535ths
-  std::vector<std::uint16_t> gray_;    // the signal of each sample
+  std::array<std::vector<float>, 3> light_;  // of each sample of red, green and blue
+  std::vector<std::uint16_t> signal_;        // of the square root of light, in 65535ths
+  std::vector<std::uint16_t> gray_;          // the signal of each sample
   std::uint64_t samples_ = 0, clipped_ = 0;
 };
 

@@ -1,10 +1,10 @@
 #include "daemon/calibrate/lens/source.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cctype>
+#include <fstream>
 
 #include "daemon/exchange/footage.hpp"
+#include "daemon/exchange/picture_header.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 
@@ -13,11 +13,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_picture(const fs::path& file) {
-  constexpr std::array endings = {".png", ".jpg", ".jpeg", ".tif", ".tiff"};
-  std::string ending = file.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  return std::ranges::find(endings, ending) != endings.end();
+// As much of a file as says what it is.
+std::string beginning_of(const fs::path& file) {
+  std::string bytes(1 << 16, '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  return bytes;
 }
 
 class SessionPictures final : public PictureSource {
@@ -76,11 +78,18 @@ bool is_session(const fs::path& path) {
 }
 
 std::vector<fs::path> picture_files(const fs::path& folder) {
-  std::vector<fs::path> files;
+  std::vector<fs::path> files, others;
   for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file() && is_picture(entry.path())) files.push_back(entry.path());
+    if (entry.is_regular_file())
+      (exchange::is_picture_name(entry.path()) ? files : others).push_back(entry.path());
+  std::ranges::sort(others);
   if (files.empty())
-    throw Error(folder.string() + ": contains no pictures; allowed: PNG, JPEG, TIFF");
+    for (const fs::path& file : others)
+      if (const auto fault = exchange::picture_fault(file, beginning_of(file)); !fault.empty())
+        throw Error(file.string() + ": " + fault);
+  if (files.empty())
+    throw Error(folder.string() +
+                ": contains no pictures; allowed: PNG, JPEG, TIFF, WebP, DPX, OpenEXR");
   std::ranges::sort(files);
   return files;
 }

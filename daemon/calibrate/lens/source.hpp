@@ -36,7 +36,7 @@ class PictureSource {
 std::unique_ptr<PictureSource> open_source(const std::filesystem::path& path,
                                            const std::string& stream);
 
-// Returns the picture files (PNG, JPEG, TIFF) of a folder, by name. Throws previz::Error if there
+// Returns the picture files of a folder that can be read, by name. Throws previz::Error if there
 // are none.
 std::vector<std::filesystem::path> picture_files(const std::filesystem::path& folder);
 

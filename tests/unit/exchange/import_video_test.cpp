@@ -178,9 +178,6 @@ TEST(ImportVideo, ReadAsIsCheckedMemberByMember) {
   EXPECT_THAT(error_of({{"pixel_aspect", {1, 0}}}), HasSubstr("pixel_aspect"));
   EXPECT_THAT(error_of({{"pixel_aspect", {1}}}), HasSubstr("two numbers"));
   EXPECT_THAT(error_of({{"gamma", 2.2}}), HasSubstr("gamma"));
-  shoot.json["observer"] = {
-      {"pictures", "observer/%04d.png"}, {"fps", 25}, {"exposure", 1}, {"read_as", Json::object()}};
-  EXPECT_THAT(shoot.error(), HasSubstr("stands for the tags of a video"));
   EXPECT_EQ(error_of({{"range", "full"}, {"primaries", "p3-d65"}, {"pixel_aspect", {1, 1}}}), "");
 }
 
