@@ -5,7 +5,9 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <glm/gtc/quaternion.hpp>
 #include <glm/trigonometric.hpp>
+#include <initializer_list>
 #include <numbers>
 #include <optional>
 #include <ostream>
@@ -33,9 +35,10 @@ std::string number_text(double value) {
   return {buffer.data(), end};
 }
 
-std::string tuple_text(const glm::dvec4& row) {
-  return std::string("(") + number_text(row.x) + ", " + number_text(row.y) + ", " +
-         number_text(row.z) + ", " + number_text(row.w) + ")";
+std::string tuple_text(std::initializer_list<double> values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "(" : ", ") + number_text(value);
+  return text + ")";
 }
 
 // Converts between a camera that looks along Z with Y down and one that looks along -Z with Y up.
@@ -47,7 +50,7 @@ glm::dmat4 turned(const glm::dmat4& world_from_camera) {
 }
 
 std::string attribute(const char* type, const char* name, const std::string& value) {
-  return std::string("    ") + type + " " + name + " = " + value + "\n";
+  return std::string("        ") + type + " " + name + " = " + value + "\n";
 }
 
 std::string quoted_text(const std::string& text) {
@@ -218,17 +221,25 @@ std::string to_usda(const CameraTrack& track) {
       "    upAxis = \"Z\"\n    startTimeCode = 0\n    endTimeCode = " +
       std::to_string(track.frames == 0 ? 0 : track.frames - 1) +
       "\n    timeCodesPerSecond = " + fps + "\n    framesPerSecond = " + fps + "\n)\n\n";
-  text += "def Camera \"camera\" (\n    doc = " +
+  text += "def Xform \"camera\" (\n    doc = " +
           quoted_text(track.name + ". " + distortion_words(track.calibration.intrinsics) +
                       timecode_words(track)) +
-          "\n)\n{\n" + usd_lens(track.calibration);
-  text += "    matrix4d xformOp:transform.timeSamples = {\n";
+          "\n)\n{\n";
+  std::string places, turns;
+  glm::dquat before(1, 0, 0, 0);
   for (const CameraKey& key : track.keys) {
     const glm::dmat4 m = turned(key.world_from_camera);
-    text += "        " + std::to_string(key.frame) + ": (" + tuple_text(m[0]) + ", " +
-            tuple_text(m[1]) + ", " + tuple_text(m[2]) + ", " + tuple_text(m[3]) + "),\n";
+    glm::dquat turn = glm::normalize(glm::quat_cast(glm::dmat3(m)));
+    if (glm::dot(turn, before) < 0) turn = -turn;  // the same turn: readers interpolate
+    before = turn;
+    const std::string at = "        " + std::to_string(key.frame) + ": ";
+    places += at + tuple_text({m[3].x, m[3].y, m[3].z}) + ",\n";
+    turns += at + tuple_text({turn.w, turn.x, turn.y, turn.z}) + ",\n";
   }
-  return text + "    }\n    uniform token[] xformOpOrder = [\"xformOp:transform\"]\n}\n";
+  text += "    double3 xformOp:translate.timeSamples = {\n" + places + "    }\n";
+  text += "    quatd xformOp:orient.timeSamples = {\n" + turns + "    }\n";
+  text += "    uniform token[] xformOpOrder = [\"xformOp:translate\", \"xformOp:orient\"]\n\n";
+  return text + "    def Camera \"lens\"\n    {\n" + usd_lens(track.calibration) + "    }\n}\n";
 }
 
 glm::dvec3 zxy_degrees(const glm::dmat3& rotation) {
@@ -245,8 +256,7 @@ glm::dvec3 zxy_degrees(const glm::dmat3& rotation) {
 std::string to_chan(const CameraTrack& track) {
   const glm::dmat4 y_up_from_z_up{{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}, {0, 0, 0, 1}};
   const PinholeIntrinsics& lens = track.calibration.intrinsics;
-  const double vfov = glm::degrees(std::atan((lens.cy + 0.5) / lens.fy) +
-                                   std::atan((lens.height - (lens.cy + 0.5)) / lens.fy));
+  const double vfov = glm::degrees(2 * std::atan(0.5 * lens.height / lens.fy));
   std::string text;
   for (const CameraKey& key : track.keys) {
     const glm::dmat4 m = y_up_from_z_up * turned(key.world_from_camera);

@@ -37,17 +37,19 @@ CameraTrack camera_track(const session::Session& session,
                          const std::vector<session::FrameRecord>& frames,
                          const ObserverCalibration& calibration);
 
-// Returns a .usda layer, Z up, in metres: one UsdGeomCamera with a matrix for each tracked frame
-// (USD interpolates between them). The camera looks along its -Z with Y up, and its matrices
-// multiply row vectors. Focal length and apertures are in tenths of a metre, as USD counts them; if
-// the lens is not known, the focal length assumes a sensor 36 mm wide. The principal point becomes
-// the aperture's offset. USD cannot express distortion, so the camera's documentation states it.
+// Returns a .usda layer, Z up, in metres: a Xform "camera" with a place and a turn for each tracked
+// frame (USD interpolates between them), and in it the UsdGeomCamera "lens", which looks along its
+// -Z with Y up. (three.js 0.187's loader holds a camera still whose own transform has samples.)
+// Focal length and apertures are in tenths of a metre, as USD counts them; if the lens is not
+// known, the focal length assumes a sensor 36 mm wide. The principal point becomes the aperture's
+// offset. USD cannot express distortion, so the camera's documentation states it.
 std::string to_usda(const CameraTrack& track);
 
 // Returns Nuke's camera: a line for each tracked frame, "frame tx ty tz rx ry rz vfov", metres and
 // degrees. Nuke's world is Y up (X stays, its -Z is our Y); the rotation order is Nuke's default,
-// ZXY: the matrix is Ry Rx Rz. vfov is the vertical angle of view of the whole picture, measured
-// in the column of the principal point.
+// ZXY: the matrix is Ry Rx Rz. vfov is the vertical angle of view of the whole picture as Nuke's
+// Camera counts it, 2 atan(height / (2 fy)): what the principal point is off is its window
+// translate.
 std::string to_chan(const CameraTrack& track);
 
 // Returns the angles (x, y, z) in degrees of a rotation matrix in the order ZXY; |x| <= 90.

@@ -37,7 +37,7 @@ struct ScalarLayer {
 };
 
 constexpr std::array color_layers{
-    ColorLayer{{"composite.R", "composite.G", "composite.B"}, &render::Layers::composite},
+    ColorLayer{{"R", "G", "B"}, &render::Layers::composite},
     ColorLayer{{"mixed.R", "mixed.G", "mixed.B"}, &render::Layers::mixed},
     ColorLayer{{"real.R", "real.G", "real.B"}, &render::Layers::real},
     ColorLayer{{"diff.R", "diff.G", "diff.B"}, &render::Layers::diff},
@@ -49,11 +49,14 @@ constexpr std::array scalar_layers{
     ScalarLayer{"depth.Z", &render::Layers::depth},
 };
 
-Imf::FrameBuffer frame_buffer(const render::Layers& layers) {
+// `before_composite` stands before the names of the composite's channels.
+Imf::FrameBuffer frame_buffer(const render::Layers& layers, const std::string& before_composite) {
   Imf::FrameBuffer buffer;
   for (const ColorLayer& layer : color_layers)
-    for (int i = 0; i < 3; ++i)
-      buffer.insert(layer.channels[i], exr_slice(&(layers.*layer.values)[0][i], 3, layers.width));
+    for (std::size_t i = 0; i < 3; ++i)
+      buffer.insert(
+          (layer.values == &render::Layers::composite ? before_composite : "") + layer.channels[i],
+          exr_slice(&(layers.*layer.values)[0][static_cast<int>(i)], 3, layers.width));
   for (const ScalarLayer& layer : scalar_layers)
     buffer.insert(layer.channel, exr_slice((layers.*layer.values).data(), 1, layers.width));
   return buffer;
@@ -101,6 +104,7 @@ Imf::Header header(const render::Layers& layers, const ExrMetadata& metadata) {
       header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
   for (const ScalarLayer& layer : scalar_layers)
     header.channels().insert(layer.channel, Imf::Channel(Imf::FLOAT));
+  header.channels().insert("A", Imf::Channel(Imf::FLOAT));
 
   // The defaults of Imf::Chromaticities are Rec. 709 with D65.
   Imf::addChromaticities(header, Imf::Chromaticities());
@@ -164,7 +168,11 @@ session::Draft exr_draft(const std::filesystem::path& path, const render::Layers
   require_whole(path, layers);
   render::Layers written = layers;
   for (std::size_t i = 0; i < written.diff.size(); ++i) written.diff[i] *= 1.0f - written.mask[i];
-  return exr_draft(path, header(written, metadata), frame_buffer(written));
+  Imf::FrameBuffer channels = frame_buffer(written, "");
+  std::vector<float> opaque(static_cast<std::size_t>(written.width), 1.0f);  // a row for all
+  channels.insert("A",
+                  Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(opaque.data()), sizeof(float), 0));
+  return exr_draft(path, header(written, metadata), channels);
 }
 
 void write_exr(const std::filesystem::path& path, const render::Layers& layers,
@@ -183,7 +191,8 @@ render::Layers read_exr(const std::filesystem::path& path) {
     for (const ColorLayer& layer : color_layers) (layers.*layer.values).resize(pixels);
     for (const ScalarLayer& layer : scalar_layers) (layers.*layer.values).resize(pixels);
 
-    const Imf::FrameBuffer buffer = frame_buffer(layers);
+    const bool is_of_today = file.header().channels().findChannel("R") != nullptr;
+    const Imf::FrameBuffer buffer = frame_buffer(layers, is_of_today ? "" : "composite.");
     if (const auto* samples = file.header().findTypedAttribute<Imf::IntAttribute>("previz.samples"))
       layers.samples = samples->value();
     if (const auto* denoised =

@@ -50,7 +50,8 @@ struct ExrMetadata {
 ExrMetadata exr_metadata(const render::Layers& layers, const Frame& frame,
                          const tracking::Track& track, const set::Set& set);
 
-// Writes the channels composite.R/.G/.B, mixed.R/.G/.B, real.R/.G/.B, diff.R/.G/.B, mask.Y,
+// Writes the composite as R, G, B and an A of 1, which is what most programs look for, and the
+// channels mixed.R/.G/.B, real.R/.G/.B, diff.R/.G/.B, mask.Y,
 // depth.Z, normal.X/.Y/.Z and variance.R/.G/.B, 32-bit float, ZIP compressed. diff is the change
 // that virtual things make to real pixels: (1 - mask) * (Lm - Lr), which is Lm - Lr where the mask
 // is 0 and 0 where it is 1. The file appears whole or not at all; throws previz::Error naming the
@@ -62,7 +63,8 @@ void write_exr(const std::filesystem::path& path, const render::Layers& layers,
 session::Draft exr_draft(const std::filesystem::path& path, const render::Layers& layers,
                          const ExrMetadata& metadata);
 
-// Reads the layers of a file that write_exr wrote (diff comes back as written, multiplied by 1 -
+// Reads the layers of a file that write_exr wrote, also before 2026-11-29, when the composite's
+// channels were composite.R/.G/.B (diff comes back as written, multiplied by 1 -
 // mask). Throws previz::Error naming the file and the channel that is missing.
 render::Layers read_exr(const std::filesystem::path& path);
 

@@ -12,6 +12,7 @@
 namespace previz::exchange::camera_track_test {
 
 using testing::_;
+using testing::ContainsRegex;
 
 // At (1, 2, 3), level, looking along the world's +Y: right = X, down = -Z, forward = Y.
 const glm::dmat4 along_y{{1, 0, 0, 0}, {0, 0, -1, 0}, {0, 1, 0, 0}, {1, 2, 3, 1}};
@@ -32,10 +33,16 @@ double value_of(const std::string& usda, const std::string& name) {
   return std::stod(found[1]);
 }
 
-// A USD camera that looks along +Y with Z up has the rows X, Z, -Y.
+// A USD camera that looks along +Y with Z up is turned about X by a quarter: by the quaternion
+// cos(45), sin(45), 0, 0. The camera lies in what moves, for readers that take no samples from a
+// camera's own transform.
 TEST(CameraTrack, UsdOfALevelCamera) {
   const std::string usda = to_usda(track_of(along_y));
-  EXPECT_THAT(usda, HasSubstr("7: ((1, 0, 0, 0), (0, 0, 1, 0), (0, -1, 0, 0), (1, 2, 3, 1)),"));
+  EXPECT_THAT(usda, HasSubstr("translate.timeSamples = {\n        7: (1, 2, 3),"));
+  std::smatch turn;
+  ASSERT_TRUE(std::regex_search(usda, turn, std::regex(R"(7: \((\S+), (\S+), 0, 0\),)")));
+  for (const int i : {1, 2}) EXPECT_NEAR(std::stod(turn[i]), std::sqrt(0.5), 1e-15);
+  EXPECT_THAT(usda, ContainsRegex("def Xform \"camera\"(.|\n)*def Camera \"lens\""));
   EXPECT_THAT(usda, HasSubstr("upAxis = \"Z\""));
   EXPECT_THAT(usda, HasSubstr("endTimeCode = 10\n"));
   EXPECT_THAT(usda, HasSubstr("12A \\\"close\\\""));
@@ -72,6 +79,32 @@ std::vector<double> chan_of(const glm::dmat4& world_from_camera) {
 
 auto near(double value) {
   return testing::DoubleNear(value, 1e-12);
+}
+
+// Two turns by a little more and less than half a turn: between them lie a few degrees.
+TEST(CameraTrack, UsdTurnsTheShortWay) {
+  CameraTrack track = track_of(glm::rotate(glm::dmat4(1), glm::radians(178.0), {0, 0, 1}));
+  track.keys.push_back({8, glm::rotate(glm::dmat4(1), glm::radians(183.0), {0, 0, 1})});
+  const std::string usda = to_usda(track);
+  std::array<glm::dvec4, 2> turns{};
+  const std::string orient = usda.substr(usda.find("orient.timeSamples"));
+  for (const int i : {0, 1}) {
+    std::smatch found;
+    const std::regex form(std::to_string(7 + i) + R"(: \((\S+), (\S+), (\S+), (\S+)\),)");
+    ASSERT_TRUE(std::regex_search(orient, found, form));
+    for (int n = 0; n < 4; ++n) turns[i][n] = std::stod(found[n + 1]);
+  }
+  EXPECT_NEAR(glm::dot(turns[0], turns[1]), std::cos(glm::radians(2.5)), 1e-12);
+}
+
+// Nuke's Camera has the picture's middle in its axis, and shifts the window: the angle does not
+// depend on the principal point.
+TEST(CameraTrack, ChanHasNukesAngle) {
+  CameraTrack track = track_of(along_y);
+  track.calibration.intrinsics = {256, 144, 300, 299.3, 130.2, 76.5, 0, 0, 0, 0, 0};
+  std::istringstream line(to_chan(track));
+  const std::vector<double> numbers{std::istream_iterator<double>(line), {}};
+  EXPECT_NEAR(numbers.back(), glm::degrees(2 * std::atan(72 / 299.3)), 1e-12);
 }
 
 // Our +Y is Nuke's -Z, where an unturned camera looks.

@@ -1,15 +1,18 @@
 // The EXR that carries every layer: exact names, exact values, honest header.
 #include "daemon/output/exr.hpp"
 
+#include <ImfArray.h>
 #include <ImfChannelList.h>
 #include <ImfChromaticitiesAttribute.h>
 #include <ImfDoubleAttribute.h>
 #include <ImfInputFile.h>
 #include <ImfIntAttribute.h>
 #include <ImfMatrixAttribute.h>
+#include <ImfRgbaFile.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 
+#include "daemon/output/exr_file.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -112,11 +115,10 @@ TEST_F(Exr, ChannelsAreExactlyTheNamedOnesIn32BitFloat) {
     names.insert(channel.name());
     EXPECT_EQ(channel.channel().type, Imf::FLOAT) << channel.name();
   }
-  const std::set<std::string> expected{"composite.R", "composite.G", "composite.B", "mixed.R",
-                                       "mixed.G",     "mixed.B",     "real.R",      "real.G",
-                                       "real.B",      "diff.R",      "diff.G",      "diff.B",
-                                       "mask.Y",      "depth.Z",     "normal.X",    "normal.Y",
-                                       "normal.Z",    "variance.R",  "variance.G",  "variance.B"};
+  const std::set<std::string> expected{
+      "R",       "G",        "B",        "A",        "mixed.R",    "mixed.G",    "mixed.B",
+      "real.R",  "real.G",   "real.B",   "diff.R",   "diff.G",     "diff.B",     "mask.Y",
+      "depth.Z", "normal.X", "normal.Y", "normal.Z", "variance.R", "variance.G", "variance.B"};
   EXPECT_EQ(names, expected);
   EXPECT_EQ(header.compression(), Imf::ZIP_COMPRESSION);
 }
@@ -137,6 +139,49 @@ TEST_F(Exr, EveryValueComesBackBitForBit) {
   EXPECT_EQ(read.variance, written.variance);
   EXPECT_EQ(read.mask, written.mask);
   EXPECT_EQ(read.depth, written.depth);
+}
+
+// Programs that know no layers read R, G, B and A.
+TEST_F(Exr, TheCompositeIsWhatOtherProgramsRead) {
+  const render::Layers written = sample_layers(7, 4);
+  write_exr(file_, written, {});
+  Imf::Array2D<Imf::Rgba> pixels(4, 7);
+  Imf::RgbaInputFile file(file_.c_str());
+  file.setFrameBuffer(&pixels[0][0], 1, 7);
+  file.readPixels(0, 3);
+  for (int i = 0; i < 28; ++i) {
+    const Imf::Rgba& read = pixels[i / 7][i % 7];
+    EXPECT_EQ(read.r, Imath::half(written.composite[i].r)) << i;
+    EXPECT_EQ(read.g, Imath::half(written.composite[i].g)) << i;
+    EXPECT_EQ(read.b, Imath::half(written.composite[i].b)) << i;
+    EXPECT_EQ(read.a, Imath::half(1.0f)) << i;
+  }
+}
+
+TEST_F(Exr, FilesWithANamedCompositeAreRead) {
+  const render::Layers written = sample_layers(7, 4);
+  write_exr(file_, written, {});
+  // The same pixels with other names: all channels of the file by the names of earlier versions.
+  Imf::Header header(7, 4);
+  Imf::FrameBuffer buffer;
+  std::vector<std::vector<float>> samples;
+  samples.reserve(32);
+  Imf::InputFile read(file_.c_str());
+  const Imf::ChannelList& channels = read.header().channels();
+  Imf::FrameBuffer in;
+  for (auto channel = channels.begin(); channel != channels.end(); ++channel) {
+    const std::string name = channel.name();
+    if (name == "A") continue;
+    const std::string old = name.size() == 1 ? "composite." + name : name;
+    const Imf::Slice slice = exr_slice(samples.emplace_back(28).data(), 1, 7);
+    header.channels().insert(old, Imf::Channel(Imf::FLOAT));
+    in.insert(name, slice);
+    buffer.insert(old, slice);
+  }
+  read.setFrameBuffer(in);
+  read.readPixels(0, 3);
+  exr_draft(file_, header, buffer).put();
+  EXPECT_EQ(read_exr(file_).composite, written.composite);
 }
 
 TEST_F(Exr, HeaderSaysWhatThePictureIs) {
