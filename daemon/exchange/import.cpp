@@ -54,6 +54,9 @@ double one_of(const std::vector<double>& series, std::size_t i, double none) {
   return series.size() == 1 ? series[0] : series[i];
 }
 
+// More than any timecode counts.
+constexpr double most_timecode_frames = 1e15;
+
 struct Size {
   int width = 0, height = 0;
 };
@@ -140,13 +143,16 @@ class FootageImport {
       notes.push_back(footage_.source + ": " + session::words_of(imported.rate));
     const auto first = pictures.timecode();
     if (!first) return;
-    const session::Timecode of_file{*first, imported.rate.fps};
-    const auto number = static_cast<std::int64_t>(imported.frames.front().number);
+    const session::Timecode of_file{first->first, imported.rate.fps};
+    const double after = static_cast<double>(imported.frames.front().number) +
+                         static_cast<double>(first->frames) + first->seconds * of_file.fps;
+    const std::int64_t number =
+        std::llround(std::clamp(after, -most_timecode_frames, most_timecode_frames));
     const auto digits = session::timecode_after(of_file, number);
     if (digits)
       imported.timecode = session::Timecode{session::words_of(*digits), of_file.fps};
     else
-      notes.push_back(footage_.source + ": its timecode, " + set::printable(*first) +
+      notes.push_back(footage_.source + ": its timecode, " + set::printable(first->first) +
                       ", does not fit this rate and is skipped");
   }
 
@@ -189,7 +195,11 @@ class FootageImport {
                   "292 years; check " + footage_.source + ".start_ns and fps in " + file_.string() +
                   ", or give timestamps_ns");
     if (footage_.fps > 0) return footage_.start_ns + static_cast<std::int64_t>(since_start);
-    if (!picture.container_ns) throw Error(picture.name + ": has no time stamp in its container");
+    if (!picture.container_ns)
+      throw Error(picture.name +
+                  ": has no time stamp in its file (a bare stream such as .h264 has none, and an "
+                  "AVI file not all); give \"fps\", the clip's rate, beside \"video\" in " +
+                  file_.string());
     const std::int64_t time = footage_.start_ns + *picture.container_ns;
     if (time < 0 || (!before.empty() && time <= before.back().timestamp_ns))
       throw Error(picture.name +

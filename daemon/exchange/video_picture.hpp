@@ -19,7 +19,7 @@ class VideoPictures {
  public:
   // Throws previz::Error as tags_of() does.
   VideoPictures(const AVFrame& first, AVStream& stream, AVFormatContext& context,
-                const ReadAs& read_as, std::filesystem::path file);
+                const NamedColors& container, const ReadAs& read_as, std::filesystem::path file);
 
   // Returns the frame upright, with square pixels, in the working space; as it is where that needs
   // no change. `name` is for errors.
