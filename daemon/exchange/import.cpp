@@ -11,6 +11,7 @@
 
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/import_description.hpp"
+#include "daemon/exchange/size_reason.hpp"
 #include "daemon/scene/assets.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
@@ -89,7 +90,7 @@ class FootageImport {
                                                  : open_video(footage_.video, footage_.read_as);
     std::vector<ImportedFrame> frames;
     while (const auto picture = pictures->next()) {
-      check(*picture);
+      check(*picture, *pictures);
       const std::size_t i = picture->number;
       check_count(i, *picture);
       Frame frame;
@@ -170,13 +171,15 @@ class FootageImport {
                   file_.string() + " describes under " + footage_.source);
   }
 
-  void check(const Picture& picture) {
+  void check(const Picture& picture, const Footage& pictures) {
     if (calibrated_ &&
         (picture.width != calibrated_->width || picture.height != calibrated_->height))
       throw Error(picture.name + ": is " + std::to_string(picture.width) + "x" +
                   std::to_string(picture.height) + "; " + file_.string() + ": " + footage_.source +
                   ".intrinsics is for " + std::to_string(calibrated_->width) + "x" +
-                  std::to_string(calibrated_->height));
+                  std::to_string(calibrated_->height) +
+                  size_reason(picture.width, picture.height, calibrated_->width,
+                              calibrated_->height, pictures.shape()));
     const std::string is = text(picture.format, picture.width, picture.height);
     if (first_.empty()) first_ = is;
     if (is != first_)

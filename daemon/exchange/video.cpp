@@ -10,6 +10,7 @@
 
 #include "daemon/exchange/damaged_packet.hpp"
 #include "daemon/exchange/decoder_words.hpp"
+#include "daemon/exchange/film_formats.hpp"
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/track_timecode.hpp"
 #include "daemon/exchange/video_packets.hpp"
@@ -104,8 +105,9 @@ class VideoFile final : public Footage {
     AVFormatContext* context = nullptr;
     // "file:" keeps a name with a colon from being taken for another protocol.
     url_ = "file:" + std::filesystem::absolute(file).string();
-    av::check(avformat_open_input(&context, url_.c_str(), nullptr, Limits().get()), file,
-              "cannot be read as a video");
+    const int opened = avformat_open_input(&context, url_.c_str(), nullptr, Limits().get());
+    if (opened < 0) refuse_undecodable(nullptr);
+    av::check(opened, file, "cannot be read as a video");
     demuxer_.reset(context);
     demuxer_words_.emplace(context);
     std::vector<NamedColors> colors;
@@ -113,8 +115,10 @@ class VideoFile final : public Footage {
       colors.push_back(named_colors(*context->streams[i]->codecpar));
     probe(*context);
     const AVCodec* codec = nullptr;
-    track_ = av::check(av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0), file,
-                       "has no decodable video");
+    track_ = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
+    if (track_ < 0) refuse_undecodable(context);
+    av::check(track_, file, "has no decodable video");
+    tracks_ = words_of_tracks(*context, track_);
     if (static_cast<std::size_t>(track_) < colors.size())
       container_colors_ = colors[static_cast<std::size_t>(track_)];
     decoder_.reset(av::made(avcodec_alloc_context3(codec)));
@@ -134,7 +138,8 @@ class VideoFile final : public Footage {
     }
     words_.emplace(decoder_.get());
     packets_.emplace(*demuxer_, track_);
-    av::check(avcodec_open2(decoder_.get(), codec, Limits().get()), file, "cannot be decoded");
+    const int opened_decoder = avcodec_open2(decoder_.get(), codec, Limits().get());
+    av::check(opened_decoder, file, std::string("cannot be decoded as ") + codec->name);
   }
 
   std::optional<Picture> next() override {
@@ -166,6 +171,12 @@ class VideoFile final : public Footage {
     return track_timecode(*demuxer_, track_, file_begins_, url_);
   }
 
+  std::vector<std::string> shape() const override {
+    std::vector<std::string> shape = pictures_ ? pictures_->shape() : std::vector<std::string>{};
+    if (!tracks_.empty()) shape.push_back(tracks_);
+    return shape;
+  }
+
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes = pictures_ ? pictures_->notes() : std::vector<std::string>{};
     if (const std::uint64_t count = lost_.all())
@@ -174,6 +185,7 @@ class VideoFile final : public Footage {
                       " cannot be decoded without what is damaged or missing in the file" +
                       (first_fault_.empty() ? "" : " (" + first_fault_ + ")"));
     if (!end_fault_.empty()) notes.push_back(end_fault_);
+    if (!tracks_.empty()) notes.push_back(file_.string() + ": " + tracks_);
     if (!joints_.empty())
       notes.push_back(fmt::format(
           "{}: its times begin again at frame {}{}: recordings are joined; the times continue",
@@ -190,6 +202,32 @@ class VideoFile final : public Footage {
 
  private:
   AVStream& stream() const { return *demuxer_->streams[track_]; }
+
+  // Throws where it is known what the file is, or how it is coded.
+  void refuse_undecodable(const AVFormatContext* opened) const {
+    if (const std::string words = undecodable_words(file_, opened); !words.empty())
+      throw Error(file_.string() + ": " + words);
+  }
+
+  // Several tracks of pictures are said; a cover is none.
+  static std::string words_of_tracks(const AVFormatContext& file, int used) {
+    std::vector<std::string> sizes;
+    std::size_t number = 0;
+    for (unsigned i = 0; i < file.nb_streams; ++i) {
+      const AVStream& stream = *file.streams[i];
+      if (stream.codecpar->codec_type != AVMEDIA_TYPE_VIDEO ||
+          stream.disposition & AV_DISPOSITION_ATTACHED_PIC)
+        continue;
+      sizes.push_back(fmt::format("{}x{}", stream.codecpar->width, stream.codecpar->height));
+      if (static_cast<int>(i) == used) number = sizes.size();
+    }
+    if (sizes.size() < 2) return "";
+    return fmt::format(
+        "has {} video tracks, {}; number {} is used (for the first: ffmpeg -i IN -map 0:v:0 -c "
+        "copy "
+        "OUT)",
+        sizes.size(), fmt::join(sizes, " and "), number);
+  }
 
   // Looks into the streams, with decoders that have the limits, too.
   void probe(AVFormatContext& context) {
@@ -353,7 +391,7 @@ class VideoFile final : public Footage {
   std::optional<VideoPackets::Unit> next_part_;
   std::int64_t part_ns_ = 0;           // from the first part's first frame
   std::vector<std::uint64_t> joints_;  // numbers of the first frames of further parts
-  std::string first_fault_, end_fault_;
+  std::string first_fault_, end_fault_, tracks_;
 };
 
 }  // namespace

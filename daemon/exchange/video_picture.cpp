@@ -67,6 +67,17 @@ VideoPictures::VideoPictures(const AVFrame& first, AVStream& stream, AVFormatCon
                          : fmt::format("converted to {}", to_string(target.format));
   if (colors_.changes_anything()) done += ", sRGB's curve, Rec. 709";
   notes_.push_back(fmt::format("{}: {}: {}", file_.string(), tags_.words, done));
+  const auto keeps = [&](const char* member) {
+    return fmt::format(" of the file's {}x{}, which \"read_as\": {{{}}} beside \"video\" keeps",
+                       first.width, first.height, member);
+  };
+  if (!tags_.orientation.is_upright())
+    shape_.push_back("its pictures are " + tags_.orientation.words() +
+                     keeps("\"rotation_deg\": 0"));
+  if (tags_.pixel_aspect.num != tags_.pixel_aspect.den)
+    shape_.push_back(fmt::format("its pixels, {}:{} wide to high, are resampled to square{}",
+                                 tags_.pixel_aspect.num, tags_.pixel_aspect.den,
+                                 keeps("\"pixel_aspect\": [1, 1]")));
   if (!tags_.orientation.is_upright())
     notes_.push_back(fmt::format("{}: its pictures are {}, so that they are upright",
                                  file_.string(), tags_.orientation.words()));
