@@ -16,11 +16,10 @@ namespace previz::exchange {
 namespace {
 
 // In the words of libavcodec 59 (h264, hevc, and the concealment of errors that h264, mpeg2 and
-// mpeg4 share), and of the demuxers, before numbers are put in. ImportVideoWithAHole,
-// ImportTruncatedVideo and ImportVideo.ATransportStreamThatLostPackets... show that they are still
-// its words.
-constexpr std::array<std::string_view, 5> damage = {"Packet corrupt", "error while decoding",
-                                                    "concealing", "illegal short term buffer state",
+// mpeg4 share) before numbers are put in. ImportVideoWithAHole and ImportTruncatedVideo show that
+// they are still its words.
+constexpr std::array<std::string_view, 4> damage = {"error while decoding", "concealing",
+                                                    "illegal short term buffer state",
                                                     "First slice in a frame missing"};
 constexpr std::array<std::string_view, 5> missing = {
     "Frame num gap", "eference picture missing", "issing reference picture",

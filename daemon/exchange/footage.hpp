@@ -25,6 +25,13 @@ struct Picture {
   std::uint64_t number = 0;                  // in the footage, from 0; lost frames count
 };
 
+// "10:00:00:00", and so many frames and seconds after it.
+struct FileTimecode {
+  std::string first;
+  std::int64_t frames = 0;
+  double seconds = 0;
+};
+
 class Footage {
  public:
   virtual ~Footage() = default;
@@ -34,8 +41,12 @@ class Footage {
   virtual std::optional<Picture> next() = 0;
   // Returns how many frames have been left out so far.
   virtual std::uint64_t lost() const { return 0; }
-  // Returns the timecode that the file has for its frame 0, lost or not: "10:00:00:00".
-  virtual std::optional<std::string> timecode() const { return std::nullopt; }
+  // Returns the timecode that the file has for its frame 0, lost or not; only after the first
+  // frame.
+  virtual std::optional<FileTimecode> timecode() const { return std::nullopt; }
+  // Returns why the pictures have the size that they have, if that is not plain, in plain words;
+  // only after the first picture.
+  virtual std::vector<std::string> shape() const { return notes(); }
   // Returns the conversions and what is lost in plain words; they are complete after the last
   // picture.
   virtual std::vector<std::string> notes() const { return {}; }

@@ -11,6 +11,7 @@
 
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/import_description.hpp"
+#include "daemon/exchange/size_reason.hpp"
 #include "daemon/scene/assets.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
@@ -54,6 +55,9 @@ double one_of(const std::vector<double>& series, std::size_t i, double none) {
   return series.size() == 1 ? series[0] : series[i];
 }
 
+// More than any timecode counts.
+constexpr double most_timecode_frames = 1e15;
+
 struct Size {
   int width = 0, height = 0;
 };
@@ -87,7 +91,7 @@ class FootageImport {
                               : open_video(footage_.video, footage_.read_as);
     std::vector<ImportedFrame> frames;
     while (const auto picture = pictures->next()) {
-      check(*picture);
+      check(*picture, *pictures);
       const std::size_t i = picture->number;
       check_count(i, *picture);
       Frame frame;
@@ -141,13 +145,16 @@ class FootageImport {
       notes.push_back(footage_.source + ": " + session::words_of(imported.rate));
     const auto first = pictures.timecode();
     if (!first) return;
-    const session::Timecode of_file{*first, imported.rate.fps};
-    const auto number = static_cast<std::int64_t>(imported.frames.front().number);
+    const session::Timecode of_file{first->first, imported.rate.fps};
+    const double after = static_cast<double>(imported.frames.front().number) +
+                         static_cast<double>(first->frames) + first->seconds * of_file.fps;
+    const std::int64_t number =
+        std::llround(std::clamp(after, -most_timecode_frames, most_timecode_frames));
     const auto digits = session::timecode_after(of_file, number);
     if (digits)
       imported.timecode = session::Timecode{session::words_of(*digits), of_file.fps};
     else
-      notes.push_back(footage_.source + ": its timecode, " + set::printable(*first) +
+      notes.push_back(footage_.source + ": its timecode, " + set::printable(first->first) +
                       ", does not fit this rate and is skipped");
   }
 
@@ -165,13 +172,15 @@ class FootageImport {
                   file_.string() + " describes under " + footage_.source);
   }
 
-  void check(const Picture& picture) {
+  void check(const Picture& picture, const Footage& pictures) {
     if (calibrated_ &&
         (picture.width != calibrated_->width || picture.height != calibrated_->height))
       throw Error(picture.name + ": is " + std::to_string(picture.width) + "x" +
                   std::to_string(picture.height) + "; " + file_.string() + ": " + footage_.source +
                   ".intrinsics is for " + std::to_string(calibrated_->width) + "x" +
-                  std::to_string(calibrated_->height));
+                  std::to_string(calibrated_->height) +
+                  size_reason(picture.width, picture.height, calibrated_->width,
+                              calibrated_->height, pictures.shape()));
     const std::string is = text(picture.format, picture.width, picture.height);
     if (first_.empty()) first_ = is;
     if (is != first_)
@@ -190,7 +199,11 @@ class FootageImport {
                   "292 years; check " + footage_.source + ".start_ns and fps in " + file_.string() +
                   ", or give timestamps_ns");
     if (footage_.fps > 0) return footage_.start_ns + static_cast<std::int64_t>(since_start);
-    if (!picture.container_ns) throw Error(picture.name + ": has no time stamp in its container");
+    if (!picture.container_ns)
+      throw Error(picture.name +
+                  ": has no time stamp in its file (a bare stream such as .h264 has none, and an "
+                  "AVI file not all); give \"fps\", the clip's rate, beside \"video\" in " +
+                  file_.string());
     const std::int64_t time = footage_.start_ns + *picture.container_ns;
     if (time < 0 || (!before.empty() && time <= before.back().timestamp_ns))
       throw Error(picture.name +

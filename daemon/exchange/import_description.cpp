@@ -4,12 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <map>
 #include <numeric>
 
+#include "daemon/exchange/film_formats.hpp"
 #include "daemon/exchange/import_tables.hpp"
 #include "daemon/exchange/json_members.hpp"
 #include "daemon/exchange/read_as.hpp"
@@ -108,13 +108,6 @@ struct CameraMembers {
       members.fail(key, "is also a column of " + table->file.string() + "; give only one of them");
   }
 };
-
-bool is_video_name(const std::string& name) {
-  std::string ending = fs::path(name).extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  constexpr std::array endings = {".mp4", ".mov", ".mkv", ".avi", ".webm", ".m4v", ".mxf", ".mts"};
-  return std::ranges::find(endings, ending) != endings.end();
-}
 
 void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
   const Members& m = camera.members;

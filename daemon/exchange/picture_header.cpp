@@ -205,12 +205,6 @@ std::optional<PictureKind> kind_of(std::string_view file) {
   return std::nullopt;
 }
 
-std::string ending_of(const std::filesystem::path& file) {
-  std::string ending = file.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
-  return ending;
-}
-
 bool is_raw_name(const std::string& ending) {
   static constexpr std::array endings = {".3fr", ".arw", ".cr2", ".cr3", ".crw", ".dcr", ".dng",
                                          ".erf", ".fff", ".iiq", ".kdc", ".mef", ".mos", ".mrw",
@@ -312,6 +306,12 @@ bool has_deep_planes(std::string_view tiff) {
   constexpr std::uint64_t planes = 2;
   const Directory first = first_directory(tiff);
   return value_of(first, planar_configuration) == planes && value_of(first, bits_per_sample) == 16;
+}
+
+std::string ending_of(const std::filesystem::path& file) {
+  std::string ending = file.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](unsigned char c) { return std::tolower(c); });
+  return ending;
 }
 
 bool is_picture_name(const std::filesystem::path& file) {

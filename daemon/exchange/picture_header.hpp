@@ -32,6 +32,9 @@ PictureKind check_picture_file(const std::filesystem::path& file, std::string_vi
 // Returns whether a TIFF has a plane for each colour, of 16 bits a sample.
 bool has_deep_planes(std::string_view tiff);
 
+// Returns what follows the last point of the name, with the point, in small letters.
+std::string ending_of(const std::filesystem::path& file);
+
 // Returns whether a file of this name is a picture of a kind that can be read.
 bool is_picture_name(const std::filesystem::path& file);
 

@@ -123,6 +123,8 @@ class PictureFiles final : public Footage {
 
   std::uint64_t lost() const override { return sequence_.missing; }
 
+  std::vector<std::string> shape() const override { return turned_; }
+
   std::vector<std::string> notes() const override {
     std::vector<std::string> notes;
     if (!sequence_.words.empty()) notes.push_back(sequence_.words);
@@ -258,8 +260,11 @@ class PictureFiles final : public Footage {
   Picture shaped(Picture picture, const Orientation& orientation) {
     if (const auto& aspect = read_as_.pixel_aspect) make_square(picture, aspect->num, aspect->den);
     turn(picture, orientation);
-    if (!orientation.is_upright() && !read_as_.orientation)
-      note(picture.name, "is " + orientation.words() + ", as its EXIF data says");
+    if (!orientation.is_upright() && !read_as_.orientation) {
+      const std::string what = "is " + orientation.words() + ", as its EXIF data says";
+      turned_ = {picture.name + ": " + what};
+      note(picture.name, what);
+    }
     return picture;
   }
 
@@ -268,6 +273,7 @@ class PictureFiles final : public Footage {
   std::size_t index_ = 0;
   std::map<ColorTag, StillColors> colors_;
   std::map<std::string, Said> said_;
+  std::vector<std::string> turned_;          // the last picture that was
   std::uint64_t samples_ = 0, outside_ = 0;  // of OpenEXR
 };
 

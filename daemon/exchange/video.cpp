@@ -1,13 +1,19 @@
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
-#include <array>
-#include <limits>
+#include <ranges>
 #include <set>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "daemon/exchange/damaged_packet.hpp"
 #include "daemon/exchange/decoder_words.hpp"
+#include "daemon/exchange/film_formats.hpp"
 #include "daemon/exchange/footage.hpp"
+#include "daemon/exchange/track_timecode.hpp"
+#include "daemon/exchange/video_packets.hpp"
 #include "daemon/exchange/video_picture.hpp"
 #include "daemon/exchange/video_tags.hpp"
 #include "drivers/av.hpp"
@@ -19,11 +25,16 @@ namespace {
 // that name other files and addresses of networks, and decoders that nobody looks after.
 constexpr const char* allowed_protocols = "file";
 constexpr const char* allowed_formats =
-    "mov,matroska,avi,mxf,mpegts,mpeg,ogg,nut,dv,gxf,asf,yuv4mpegpipe,dpx_pipe";
+    "mov,matroska,avi,mxf,mpegts,mpeg,ogg,nut,dv,gxf,asf,yuv4mpegpipe,h264,hevc,"
+    "dpx_pipe";
 constexpr const char* allowed_codecs =
-    "ffv1,prores,dnxhd,cfhd,dpx,h264,hevc,libdav1d,av1,vp8,vp9,mjpeg,png,jpeg2000,rawvideo,v210,v410,"
+    "ffv1,prores,dnxhd,cfhd,dpx,h264,hevc,libdav1d,av1,vp8,vp9,mjpeg,png,jpeg2000,rawvideo,v210,"
+    "v410,"
     "r210,"
     "dvvideo,mpeg1video,mpeg2video,mpeg4,theora,huffyuv,ffvhuff,utvideo,qtrle,wrapped_avframe";
+
+// So many joints of recordings are named, and the others counted.
+constexpr std::size_t named_joints = 3;
 
 // Options for opening a file or a decoder, with the limits of what is read.
 class Limits {
@@ -76,6 +87,11 @@ class LostFrames {
     }
     return passed_;
   }
+  // Times begin again: all have passed.
+  void begin_part() {
+    passed_ += waiting_.size();
+    waiting_.clear();
+  }
   std::uint64_t all() const { return passed_ + waiting_.size(); }
 
  private:
@@ -90,15 +106,23 @@ class VideoFile final : public Footage {
     const QuietLibav quiet;
     AVFormatContext* context = nullptr;
     // "file:" keeps a name with a colon from being taken for another protocol.
-    const std::string url = "file:" + std::filesystem::absolute(file).string();
-    av::check(avformat_open_input(&context, url.c_str(), nullptr, Limits().get()), file,
-              "cannot be read as a video");
+    url_ = "file:" + std::filesystem::absolute(file).string();
+    const int opened = avformat_open_input(&context, url_.c_str(), nullptr, Limits().get());
+    if (opened < 0) refuse_undecodable(nullptr);
+    av::check(opened, file, "cannot be read as a video");
     demuxer_.reset(context);
     demuxer_words_.emplace(context);
+    std::vector<NamedColors> colors;
+    for (unsigned i = 0; i < context->nb_streams; ++i)
+      colors.push_back(named_colors(*context->streams[i]->codecpar));
     probe(*context);
     const AVCodec* codec = nullptr;
-    track_ = av::check(av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0), file,
-                       "has no decodable video");
+    track_ = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
+    if (track_ < 0) refuse_undecodable(context);
+    av::check(track_, file, "has no decodable video");
+    tracks_ = words_of_tracks(*context, track_);
+    if (static_cast<std::size_t>(track_) < colors.size())
+      container_colors_ = colors[static_cast<std::size_t>(track_)];
     decoder_.reset(av::made(avcodec_alloc_context3(codec)));
     av::check(avcodec_parameters_to_context(decoder_.get(), stream().codecpar), file,
               "cannot be decoded");
@@ -106,15 +130,18 @@ class VideoFile final : public Footage {
     decoder_->thread_count = 0;  // 0: one thread per core
     const AVCodecDescriptor* kind = avcodec_descriptor_get(codec->id);
     all_are_key_frames_ = kind && kind->props & AV_CODEC_PROP_INTRA_ONLY;
-    if (all_are_key_frames_) {
-      decoder_->err_recognition = AV_EF_EXPLODE;
-    } else {
+    const std::string_view container = demuxer_->iformat->name;
+    is_bare_ = container == "h264" || container == "hevc";
+    if (all_are_key_frames_ || is_bare_) decoder_->err_recognition = AV_EF_EXPLODE;
+    if (!all_are_key_frames_) {
       // Frames refer to others: several at once would hide which of them is damaged, and faults
       // that harm no picture, as at a cut, would end all.
       decoder_->thread_type = FF_THREAD_SLICE;
     }
     words_.emplace(decoder_.get());
-    av::check(avcodec_open2(decoder_.get(), codec, Limits().get()), file, "cannot be decoded");
+    packets_.emplace(*demuxer_, track_);
+    const int opened_decoder = avcodec_open2(decoder_.get(), codec, Limits().get());
+    av::check(opened_decoder, file, std::string("cannot be decoded as ") + codec->name);
   }
 
   std::optional<Picture> next() override {
@@ -123,10 +150,11 @@ class VideoFile final : public Footage {
       if (frame_->decode_error_flags || frame_->flags & AV_FRAME_FLAG_CORRUPT) lost_.add(pts);
       if (lost_.contains(pts)) continue;
       // What came before the first frame that can be decoded belongs to a part that was cut away.
-      if (shown_ == 0) add_leading(pts);
+      if (!part_has_begun_) add_leading(pts);
       const std::uint64_t number = shown_ + lost_.before(pts);
       const std::string name = file_.string() + " frame " + std::to_string(number);
-      if (!pictures_) pictures_.emplace(*frame_, stream(), *demuxer_, read_as_, file_);
+      if (!pictures_)
+        pictures_.emplace(*frame_, stream(), *demuxer_, container_colors_, read_as_, file_);
       Picture picture = pictures_->picture(*frame_, name);
       picture.number = number;
       picture.container_ns = container_ns(pts);
@@ -140,16 +168,15 @@ class VideoFile final : public Footage {
 
   std::uint64_t lost() const override { return lost_.all(); }
 
-  // Containers have it as a track of its own, or as the video's or the file's own words.
-  std::optional<std::string> timecode() const override {
-    const auto of = [](const AVDictionary* words) {
-      return av_dict_get(words, "timecode", nullptr, 0);
-    };
-    const AVDictionaryEntry* found = of(stream().metadata);
-    if (!found) found = of(demuxer_->metadata);
-    for (unsigned i = 0; !found && i < demuxer_->nb_streams; ++i)
-      found = of(demuxer_->streams[i]->metadata);
-    return found ? std::optional<std::string>(found->value) : std::nullopt;
+  std::optional<FileTimecode> timecode() const override {
+    const QuietLibav quiet;
+    return track_timecode(*demuxer_, track_, file_begins_, url_);
+  }
+
+  std::vector<std::string> shape() const override {
+    std::vector<std::string> shape = pictures_ ? pictures_->shape() : std::vector<std::string>{};
+    if (!tracks_.empty()) shape.push_back(tracks_);
+    return shape;
   }
 
   std::vector<std::string> notes() const override {
@@ -160,6 +187,13 @@ class VideoFile final : public Footage {
                       " cannot be decoded without what is damaged or missing in the file" +
                       (first_fault_.empty() ? "" : " (" + first_fault_ + ")"));
     if (!end_fault_.empty()) notes.push_back(end_fault_);
+    if (!tracks_.empty()) notes.push_back(file_.string() + ": " + tracks_);
+    if (!joints_.empty())
+      notes.push_back(fmt::format(
+          "{}: its times begin again at frame {}{}: recordings are joined; the times continue",
+          file_.string(), fmt::join(joints_ | std::views::take(named_joints), ", "),
+          joints_.size() > named_joints ? fmt::format(" and {} more", joints_.size() - named_joints)
+                                        : ""));
     for (unsigned i = 0; i < demuxer_->nb_streams; ++i)
       if (demuxer_->streams[i]->codecpar->codec_type == AVMEDIA_TYPE_AUDIO) {
         notes.push_back(file_.string() + ": its sound is ignored");
@@ -171,6 +205,32 @@ class VideoFile final : public Footage {
  private:
   AVStream& stream() const { return *demuxer_->streams[track_]; }
 
+  // Throws where it is known what the file is, or how it is coded.
+  void refuse_undecodable(const AVFormatContext* opened) const {
+    if (const std::string words = undecodable_words(file_, opened); !words.empty())
+      throw Error(file_.string() + ": " + words);
+  }
+
+  // Several tracks of pictures are said; a cover is none.
+  static std::string words_of_tracks(const AVFormatContext& file, int used) {
+    std::vector<std::string> sizes;
+    std::size_t number = 0;
+    for (unsigned i = 0; i < file.nb_streams; ++i) {
+      const AVStream& stream = *file.streams[i];
+      if (stream.codecpar->codec_type != AVMEDIA_TYPE_VIDEO ||
+          stream.disposition & AV_DISPOSITION_ATTACHED_PIC)
+        continue;
+      sizes.push_back(fmt::format("{}x{}", stream.codecpar->width, stream.codecpar->height));
+      if (static_cast<int>(i) == used) number = sizes.size();
+    }
+    if (sizes.size() < 2) return "";
+    return fmt::format(
+        "has {} video tracks, {}; number {} is used (for the first: ffmpeg -i IN -map 0:v:0 -c "
+        "copy "
+        "OUT)",
+        sizes.size(), fmt::join(sizes, " and "), number);
+  }
+
   // Looks into the streams, with decoders that have the limits, too.
   void probe(AVFormatContext& context) {
     std::vector<Limits> limits(context.nb_streams);
@@ -179,61 +239,78 @@ class VideoFile final : public Footage {
     const int result = avformat_find_stream_info(&context, options.data());
     for (std::size_t i = 0; i < limits.size(); ++i) *limits[i].get() = options[i];  // what is left
     av::check(result, file_, "cannot be read as a video");
-    // A stream that was received, not saved, may lack parts: what the demuxer says of them is heard
-    // as it is read again.
+    // A stream that was received, not saved, may lack parts: the demuxer marks them as it is read
+    // again.
     if (context.iformat->flags & AVFMT_TS_DISCONT)
       avformat_seek_file(&context, -1, 0, 0, 0, AVSEEK_FLAG_BYTE);
-    demuxer_words_->told_of_damage();
   }
 
   // Returns false after the last frame.
   bool decode() {
     for (;;) {
       const int got = avcodec_receive_frame(decoder_.get(), frame_.get());
-      if (got == AVERROR_EOF) return false;
+      if (got == AVERROR_EOF) {
+        if (!next_part_) return false;
+        begin_part();
+        continue;
+      }
       heed_words();
       if (got == 0) return true;
       if (got != AVERROR(EAGAIN)) {
         lose(av::error_text(got));
         continue;
       }
-      if (!read()) avcodec_send_packet(decoder_.get(), nullptr);
+      std::optional<VideoPackets::Unit> unit = packets_->next();
+      if (!unit) note_end();
+      if (unit && !unit->begins_part) {
+        send(*unit);
+      } else {
+        next_part_ = std::move(unit);
+        avcodec_send_packet(decoder_.get(), nullptr);
+      }
     }
   }
 
-  // Gives the decoder the next packet; returns false after the last.
-  bool read() {
-    const int read = av_read_frame(demuxer_.get(), packet_.get());
-    if (read == AVERROR(EIO)) av::check(read, file_, "cannot be read to its end");
-    if (read < 0) {
-      if (read != AVERROR_EOF)
-        end_fault_ = file_.string() + ": is damaged after " + std::to_string(shown_) +
-                     " frames; what follows cannot be read: " + av::error_text(read);
-      return false;
-    }
-    // The demuxer says this of a piece of the stream: the end of this packet, or the next one.
-    if (demuxer_words_->told_of_damage()) incomplete_ = 2;
-    if (packet_->stream_index == track_) send();
-    av_packet_unref(packet_.get());
-    return true;
+  void note_end() {
+    const int error = packets_->error();
+    if (error == AVERROR(EIO)) av::check(error, file_, "cannot be read to its end");
+    if (error < 0)
+      end_fault_ = file_.string() + ": is damaged after " + std::to_string(shown_) +
+                   " frames; what follows cannot be read: " + av::error_text(error);
   }
 
-  void send() {
-    sent_pts_ = packet_->pts;
-    if (all_are_key_frames_ || packet_->flags & AV_PKT_FLAG_KEY) {
+  // All frames of the part before are decoded; no frame of the next one refers to them.
+  void begin_part() {
+    avcodec_flush_buffers(decoder_.get());
+    lost_.begin_part();
+    joints_.push_back(shown_ + lost_.all());
+    std::int64_t end = 0;
+    if (part_has_begun_ && !__builtin_add_overflow(last_pts_, frame_duration_, &end))
+      part_ns_ = container_ns(end).value_or(part_ns_);
+    refers_to_damage_ = damaged_before_ = part_has_begun_ = false;
+    sent_pts_ = key_pts_ = last_pts_ = AV_NOPTS_VALUE;
+    leading_.clear();
+    const VideoPackets::Unit first = *std::exchange(next_part_, std::nullopt);
+    send(first);
+  }
+
+  void send(const VideoPackets::Unit& unit) {
+    const AVPacket& packet = *unit.packet;
+    sent_pts_ = packet.pts;
+    if (all_are_key_frames_ || packet.flags & AV_PKT_FLAG_KEY) {
       damaged_before_ = std::exchange(refers_to_damage_, false);
       key_pts_ = sent_pts_;
     }
-    if (shown_ == 0 && !(packet_->flags & AV_PKT_FLAG_DISCARD) && sent_pts_ != AV_NOPTS_VALUE)
+    last_pts_ = std::max(last_pts_, sent_pts_);  // AV_NOPTS_VALUE is less than all
+    if (packet.duration > 0) frame_duration_ = packet.duration;
+    if (!part_has_begun_ && !(packet.flags & AV_PKT_FLAG_DISCARD) && sent_pts_ != AV_NOPTS_VALUE)
       leading_.push_back(sent_pts_);
     // A frame that refers to a damaged one decodes without a word, to a picture that is wrong; and
     // those before a key frame in time, but after it in the file, refer to what was before it.
     if (refers_to_damage_ || (damaged_before_ && sent_pts_ < key_pts_)) lost_.add(sent_pts_);
-    if (incomplete_ > 0 || packet_->flags & AV_PKT_FLAG_CORRUPT)
-      lose("a part of it is missing in the file");
-    if (has_hole(*packet_, decoder_->codec_id)) lose("a piece of it is empty in the file");
-    incomplete_ = std::max(0, incomplete_ - 1);
-    if (const int sent = avcodec_send_packet(decoder_.get(), packet_.get()); sent < 0)
+    if (unit.incomplete) lose("a part of it is missing in the file");
+    if (has_hole(packet, decoder_->codec_id)) lose("a piece of it is empty in the file");
+    if (const int sent = avcodec_send_packet(decoder_.get(), &packet); sent < 0)
       lose(av::error_text(sent));
     heed_words();
   }
@@ -251,6 +328,11 @@ class VideoFile final : public Footage {
 
   // The packet last sent cannot be decoded.
   void lose(const std::string& why) {
+    if (is_bare_)
+      throw Error(fmt::format(
+          "{}: is a stream without times, and is damaged after {} frames ({}): which frames are "
+          "lost cannot be told; put it into a container that has times, such as .mkv or .mp4",
+          file_.string(), shown_, why));
     if (!lost_.contains(sent_pts_)) lost_.add(sent_pts_);
     if (first_fault_.empty()) first_fault_ = why;
     if (all_are_key_frames_) return;
@@ -268,6 +350,8 @@ class VideoFile final : public Footage {
     first_pts_ = first;
     for (const std::int64_t pts : leading_) first_pts_ = std::min(first_pts_, pts);
     leading_.clear();
+    part_has_begun_ = true;
+    if (joints_.empty()) file_begins_ = first_pts_;
   }
 
   // Counts from the first frame, decoded or lost.
@@ -277,27 +361,39 @@ class VideoFile final : public Footage {
       return std::nullopt;
     const std::int64_t ns = av_rescale_q(since_first, stream().time_base, {1, 1'000'000'000});
     // libav returns its word for no time where the number is too large.
-    return ns == AV_NOPTS_VALUE ? std::nullopt : std::optional(ns);
+    std::int64_t since_start = 0;
+    if (ns == AV_NOPTS_VALUE || __builtin_add_overflow(part_ns_, ns, &since_start))
+      return std::nullopt;
+    return since_start;
   }
 
   std::filesystem::path file_;
+  std::string url_;
   ReadAs read_as_;
+  NamedColors container_colors_;
   av::Demuxer demuxer_;
   int track_ = 0;
   av::Codec decoder_;
-  std::optional<DecoderWords> words_, demuxer_words_;
-  av::Packet packet_{av::made(av_packet_alloc())};
+  std::optional<DecoderWords> words_, demuxer_words_;  // the demuxer's are only not printed
+  std::optional<VideoPackets> packets_;
   av::Picture frame_{av::made(av_frame_alloc())};
   bool all_are_key_frames_ = false;
+  bool is_bare_ = false;  // a stream without a container, and so without times
   std::optional<VideoPictures> pictures_;
   std::uint64_t shown_ = 0;
   LostFrames lost_;
-  int incomplete_ = 0;             // so many packets, from the next on, may lack a part
   bool refers_to_damage_ = false;  // frames until the next key frame
   bool damaged_before_ = false;    // frames before the last key frame
-  std::int64_t sent_pts_ = AV_NOPTS_VALUE, key_pts_ = AV_NOPTS_VALUE, first_pts_ = 0;
-  std::vector<std::int64_t> leading_;  // times of the packets before the first frame
-  std::string first_fault_, end_fault_;
+  // Times of this part: most files have only one.
+  std::int64_t sent_pts_ = AV_NOPTS_VALUE, key_pts_ = AV_NOPTS_VALUE, last_pts_ = AV_NOPTS_VALUE;
+  std::int64_t first_pts_ = 0, frame_duration_ = 0;
+  std::int64_t file_begins_ = 0;       // first_pts_ of the first part
+  std::vector<std::int64_t> leading_;  // of the packets before the first frame
+  bool part_has_begun_ = false;        // a frame has been shown
+  std::optional<VideoPackets::Unit> next_part_;
+  std::int64_t part_ns_ = 0;           // from the first part's first frame
+  std::vector<std::uint64_t> joints_;  // numbers of the first frames of further parts
+  std::string first_fault_, end_fault_, tracks_;
 };
 
 }  // namespace

@@ -53,9 +53,10 @@ std::span<std::uint16_t> deep_samples(Picture& picture) {
 }  // namespace
 
 VideoPictures::VideoPictures(const AVFrame& first, AVStream& stream, AVFormatContext& context,
-                             const ReadAs& read_as, std::filesystem::path file)
+                             const NamedColors& container, const ReadAs& read_as,
+                             std::filesystem::path file)
     : file_(std::move(file)),
-      tags_(tags_of(first, stream, context, read_as, file_)),
+      tags_(tags_of(first, stream, context, container, read_as, file_)),
       // Grey has no colours to convert, and swscale gives Y'CbCr its full range.
       colors_(tags_.transfer,
               is_gray(AVPixelFormat(first.format)) ? AVCOL_PRI_UNSPECIFIED : tags_.primaries,
@@ -66,6 +67,17 @@ VideoPictures::VideoPictures(const AVFrame& first, AVStream& stream, AVFormatCon
                          : fmt::format("converted to {}", to_string(target.format));
   if (colors_.changes_anything()) done += ", sRGB's curve, Rec. 709";
   notes_.push_back(fmt::format("{}: {}: {}", file_.string(), tags_.words, done));
+  const auto keeps = [&](const char* member) {
+    return fmt::format(" of the file's {}x{}, which \"read_as\": {{{}}} beside \"video\" keeps",
+                       first.width, first.height, member);
+  };
+  if (!tags_.orientation.is_upright())
+    shape_.push_back("its pictures are " + tags_.orientation.words() +
+                     keeps("\"rotation_deg\": 0"));
+  if (tags_.pixel_aspect.num != tags_.pixel_aspect.den)
+    shape_.push_back(fmt::format("its pixels, {}:{} wide to high, are resampled to square{}",
+                                 tags_.pixel_aspect.num, tags_.pixel_aspect.den,
+                                 keeps("\"pixel_aspect\": [1, 1]")));
   if (!tags_.orientation.is_upright())
     notes_.push_back(fmt::format("{}: its pictures are {}, so that they are upright",
                                  file_.string(), tags_.orientation.words()));
@@ -169,6 +181,9 @@ void VideoPictures::convert_color(const AVFrame& frame, AVPixelFormat format, Pi
 }
 
 void VideoPictures::repack(const AVFrame& frame, AVPixelFormat format, Picture& picture) {
+  // swscale makes less than white of 8 bits' white where it goes to 16 (65283).
+  const bool widens = format == AV_PIX_FMT_RGB48LE && depth_of(frame) <= 8;
+  if (widens) format = AV_PIX_FMT_RGB24;
   scaler_.reset(sws_getCachedContext(scaler_.release(), picture.width, picture.height,
                                      AVPixelFormat(frame.format), picture.width, picture.height,
                                      format, SWS_BILINEAR | SWS_ACCURATE_RND | SWS_BITEXACT,
@@ -180,6 +195,11 @@ void VideoPictures::repack(const AVFrame& frame, AVPixelFormat format, Picture& 
                        picture.height, 1);
   sws_scale(scaler_.get(), frame.data, frame.linesize, 0, picture.height, planes.data(),
             strides.data());
+  if (!widens) return;
+  // In the same bytes, from the last sample on.
+  const std::span<std::uint16_t> deep = deep_samples(picture);
+  for (std::size_t i = deep.size(); i-- > 0;)
+    deep[i] = static_cast<std::uint16_t>(257 * picture.bytes[i]);
 }
 
 }  // namespace previz::exchange

@@ -19,13 +19,15 @@ class VideoPictures {
  public:
   // Throws previz::Error as tags_of() does.
   VideoPictures(const AVFrame& first, AVStream& stream, AVFormatContext& context,
-                const ReadAs& read_as, std::filesystem::path file);
+                const NamedColors& container, const ReadAs& read_as, std::filesystem::path file);
 
   // Returns the frame upright, with square pixels, in the working space; as it is where that needs
   // no change. `name` is for errors.
   Picture picture(const AVFrame& frame, const std::string& name);
   // What was found and done, in plain words. It is complete after the last frame.
   std::vector<std::string> notes() const;
+  // What was done to their shape, and how to have them as they were filmed.
+  const std::vector<std::string>& shape() const { return shape_; }
 
  private:
   // The session's format for the picture, and libav's name for that format.
@@ -44,7 +46,7 @@ class VideoPictures {
   VideoTags tags_;
   ColorConversion colors_;
   std::optional<LumaChroma> luma_chroma_;
-  std::vector<std::string> notes_;
+  std::vector<std::string> notes_, shape_;
   av::Scaler scaler_;
 };
 

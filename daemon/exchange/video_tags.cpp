@@ -85,30 +85,89 @@ void refuse_log_curves(const AVDictionary* metadata, const std::filesystem::path
               "\": ...} beside \"video\" in FRAMES.json if the tag is wrong");
 }
 
-void read_colors(const AVFrame& frame, const ReadAs& read_as, const std::filesystem::path& file,
-                 VideoTags& tags) {
+// A tag, and who says it, in words: "" for the frames themselves.
+template <typename Tag>
+struct Choice {
+  Tag tag;
+  std::string source;
+};
+
+// `nothing` is the tag's own value for "unspecified".
+template <typename Tag, typename Name>
+Choice<Tag> choose(const std::optional<Tag>& given, Tag frame, Tag container, Tag nothing,
+                   Name name) {
+  if (given) return {*given, " (as FRAMES.json says)"};
+  if (frame == nothing && container == nothing) return {nothing, " (assumed)"};
+  if (frame == nothing) return {container, " (from the container)"};
+  if (container == nothing || container == frame) return {frame, ""};
+  return {frame, " (from the frames; the container says " + name_of(name(container)) + ")"};
+}
+
+// libav's decoders of these name a matrix whatever the file says (JPEG and VP8 have none but that
+// of Rec. 601), or one that encoders do not set (DNxHD).
+bool decoder_assumes_matrix(AVCodecID codec) {
+  return codec == AV_CODEC_ID_MJPEG || codec == AV_CODEC_ID_VP8 || codec == AV_CODEC_ID_DNXHD;
+}
+
+// Reads the colours into `tags`, with the words for them.
+void read_colors(const AVFrame& frame, AVCodecID codec, const NamedColors& container,
+                 const ReadAs& read_as, const std::filesystem::path& file, VideoTags& tags) {
   const auto format = AVPixelFormat(frame.format);
-  const bool tagged_full = tag_of(frame.color_range, AVCOL_RANGE_NB) == AVCOL_RANGE_JPEG ||
-                           has_range_in_its_name(format) ||
-                           (tag_of(frame.color_range, AVCOL_RANGE_NB) == AVCOL_RANGE_UNSPECIFIED &&
-                            (is_rgb(format) || is_gray(format)));
-  tags.full_range = read_as.range ? *read_as.range == AVCOL_RANGE_JPEG : tagged_full;
-  tags.matrix = read_as.matrix.value_or(tag_of(frame.colorspace, AVCOL_SPC_NB));
-  if (tags.matrix == AVCOL_SPC_UNSPECIFIED) tags.matrix = usual_matrix(frame);
-  if (!is_rgb(format) && !is_gray(format) && !luma_shares(tags.matrix))
-    refuse(file, "has the colour matrix " + name_of(av_color_space_name(tags.matrix)), "matrix=709",
-           "matrix");
-  tags.transfer = read_as.keeps_signal
-                      ? AVCOL_TRC_UNSPECIFIED
-                      : read_as.transfer.value_or(tag_of(frame.color_trc, AVCOL_TRC_NB));
+  const bool has_matrix = !is_rgb(format) && !is_gray(format);
+  tags.words = name_of(av_get_pix_fmt_name(format));
+
+  AVColorSpace of_frame = tag_of(frame.colorspace, AVCOL_SPC_NB);
+  if (decoder_assumes_matrix(codec) && container.matrix != AVCOL_SPC_UNSPECIFIED)
+    of_frame = AVCOL_SPC_UNSPECIFIED;
+  auto matrix = choose(read_as.matrix, of_frame, container.matrix, AVCOL_SPC_UNSPECIFIED,
+                       [](AVColorSpace tag) { return av_color_space_name(tag); });
+  tags.matrix = matrix.tag == AVCOL_SPC_UNSPECIFIED ? usual_matrix(frame) : matrix.tag;
+  if (has_matrix) {
+    if (!luma_shares(tags.matrix))
+      refuse(file, "has the colour matrix " + name_of(av_color_space_name(tags.matrix)),
+             "matrix=709", "matrix");
+    tags.words += ", matrix " + name_of(av_color_space_name(tags.matrix)) + matrix.source;
+  }
+
+  auto range = choose(
+      read_as.range,
+      has_range_in_its_name(format) ? AVCOL_RANGE_JPEG : tag_of(frame.color_range, AVCOL_RANGE_NB),
+      container.range, AVCOL_RANGE_UNSPECIFIED,
+      [](AVColorRange tag) { return tag == AVCOL_RANGE_JPEG ? "full" : "limited"; });
+  tags.full_range =
+      range.tag == AVCOL_RANGE_UNSPECIFIED ? !has_matrix : range.tag == AVCOL_RANGE_JPEG;
+  tags.words += (tags.full_range ? ", full range" : ", limited range") + range.source;
+
+  auto transfer = choose(read_as.transfer, tag_of(frame.color_trc, AVCOL_TRC_NB),
+                         container.transfer, AVCOL_TRC_UNSPECIFIED,
+                         [](AVColorTransferCharacteristic t) { return av_color_transfer_name(t); });
+  tags.transfer = read_as.keeps_signal ? AVCOL_TRC_UNSPECIFIED : transfer.tag;
   if (!keeps_signal(tags.transfer) && !light_of(tags.transfer, 0))
     refuse(file,
            "has the transfer characteristics " + name_of(av_color_transfer_name(tags.transfer)),
            "transfer=709", "transfer");
-  tags.primaries = read_as.primaries.value_or(tag_of(frame.color_primaries, AVCOL_PRI_NB));
+  if (read_as.keeps_signal)
+    tags.words += ", transfer as recorded (as FRAMES.json says)";
+  else if (tags.transfer == AVCOL_TRC_UNSPECIFIED)
+    tags.words += ", no transfer (the response curve holds; without one sRGB is assumed)";
+  else
+    tags.words +=
+        ", transfer " + name_of(av_color_transfer_name(tags.transfer)) + transfer.source +
+        (keeps_signal(tags.transfer) ? " (kept: the response curve holds, or sRGB's)" : "");
+
+  auto primaries = choose(read_as.primaries, tag_of(frame.color_primaries, AVCOL_PRI_NB),
+                          container.primaries, AVCOL_PRI_UNSPECIFIED,
+                          [](AVColorPrimaries tag) { return av_color_primaries_name(tag); });
+  tags.primaries = primaries.tag;
   if (!rec709_from(tags.primaries))
     refuse(file, "has the primaries " + name_of(av_color_primaries_name(tags.primaries)),
            "primaries=709", "primaries");
+  if (!is_gray(format))
+    tags.words += ", primaries " +
+                  (tags.primaries == AVCOL_PRI_UNSPECIFIED
+                       ? std::string("bt709")
+                       : name_of(av_color_primaries_name(tags.primaries))) +
+                  primaries.source;
 }
 
 std::optional<Orientation> orientation_in(const std::uint8_t* bytes, std::size_t size,
@@ -144,37 +203,6 @@ AVRational pixel_aspect_of(const AVRational& said, const std::filesystem::path& 
   return said;
 }
 
-const char* assumed(bool given, bool tagged) {
-  return given ? " (as FRAMES.json says)" : tagged ? "" : " (assumed)";
-}
-
-std::string words_of(const AVFrame& frame, const ReadAs& read_as, const VideoTags& tags) {
-  const auto format = AVPixelFormat(frame.format);
-  std::string text = name_of(av_get_pix_fmt_name(format));
-  if (!is_rgb(format) && !is_gray(format))
-    text += ", matrix " + name_of(av_color_space_name(tags.matrix)) +
-            assumed(read_as.matrix.has_value(),
-                    tag_of(frame.colorspace, AVCOL_SPC_NB) != AVCOL_SPC_UNSPECIFIED);
-  const bool range_tagged = tag_of(frame.color_range, AVCOL_RANGE_NB) != AVCOL_RANGE_UNSPECIFIED ||
-                            has_range_in_its_name(format);
-  text += std::string(tags.full_range ? ", full range" : ", limited range") +
-          assumed(read_as.range.has_value(), range_tagged);
-  if (read_as.keeps_signal)
-    text += ", transfer as recorded (as FRAMES.json says)";
-  else if (tags.transfer == AVCOL_TRC_UNSPECIFIED)
-    text += ", no transfer (the response curve holds; without one sRGB is assumed)";
-  else
-    text += ", transfer " + name_of(av_color_transfer_name(tags.transfer)) +
-            assumed(read_as.transfer.has_value(), true) +
-            (keeps_signal(tags.transfer) ? " (kept: the response curve holds, or sRGB's)" : "");
-  if (!is_gray(format))
-    text += ", primaries " + (tags.primaries == AVCOL_PRI_UNSPECIFIED
-                                  ? std::string("bt709 (assumed)")
-                                  : name_of(av_color_primaries_name(tags.primaries)) +
-                                        assumed(read_as.primaries.has_value(), true));
-  return text;
-}
-
 }  // namespace
 
 bool has_range_in_its_name(AVPixelFormat format) {
@@ -196,20 +224,25 @@ bool is_rgb(AVPixelFormat format) {
          description->flags & (AV_PIX_FMT_FLAG_RGB | AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_BAYER);
 }
 
+NamedColors named_colors(const AVCodecParameters& said) {
+  return {tag_of(said.color_range, AVCOL_RANGE_NB), tag_of(said.color_space, AVCOL_SPC_NB),
+          tag_of(said.color_trc, AVCOL_TRC_NB), tag_of(said.color_primaries, AVCOL_PRI_NB)};
+}
+
 VideoTags tags_of(const AVFrame& frame, AVStream& stream, AVFormatContext& context,
-                  const ReadAs& read_as, const std::filesystem::path& file) {
+                  const NamedColors& container, const ReadAs& read_as,
+                  const std::filesystem::path& file) {
   VideoTags tags;
   const bool curve_is_given = read_as.keeps_signal || read_as.transfer;
   if (!curve_is_given)
     for (const AVDictionary* metadata : {context.metadata, stream.metadata, frame.metadata})
       refuse_log_curves(metadata, file);
-  read_colors(frame, read_as, file, tags);
+  read_colors(frame, stream.codecpar->codec_id, container, read_as, file, tags);
   tags.orientation =
       read_as.orientation ? *read_as.orientation : orientation_of(frame, stream, file);
   tags.pixel_aspect = pixel_aspect_of(read_as.pixel_aspect.value_or(av_guess_sample_aspect_ratio(
                                           &context, &stream, const_cast<AVFrame*>(&frame))),
                                       file);
-  tags.words = words_of(frame, read_as, tags);
   return tags;
 }
 

@@ -23,6 +23,16 @@ struct ReadAs {
   bool keeps_signal = false;  // transfer "as recorded": the response curve says what it means
 };
 
+// The colours that a container names; libav puts the decoder's in their place as it looks into the
+// streams, and some decoders say "unspecified" there.
+struct NamedColors {
+  AVColorRange range = AVCOL_RANGE_UNSPECIFIED;
+  AVColorSpace matrix = AVCOL_SPC_UNSPECIFIED;
+  AVColorTransferCharacteristic transfer = AVCOL_TRC_UNSPECIFIED;
+  AVColorPrimaries primaries = AVCOL_PRI_UNSPECIFIED;
+};
+NamedColors named_colors(const AVCodecParameters& said);
+
 struct VideoTags {
   bool full_range = false;
   AVColorSpace matrix = AVCOL_SPC_UNSPECIFIED;  // never left unspecified for Y'CbCr
@@ -34,10 +44,12 @@ struct VideoTags {
   std::string words;
 };
 
-// Reads the tags of a decoded frame, its stream and its file. Throws previz::Error, naming `file`
-// and what makes it work, where they ask for what cannot be done.
+// Reads the tags of a decoded frame, its stream and its file; colours that the frame does not name
+// are the container's. Throws previz::Error, naming `file` and what makes it work, where they ask
+// for what cannot be done.
 VideoTags tags_of(const AVFrame& frame, AVStream& stream, AVFormatContext& context,
-                  const ReadAs& read_as, const std::filesystem::path& file);
+                  const NamedColors& container, const ReadAs& read_as,
+                  const std::filesystem::path& file);
 
 // Whether the format has no colours, or has them as red, green and blue.
 bool is_gray(AVPixelFormat format);

@@ -35,17 +35,18 @@ void write_picture(const std::filesystem::path& file, const cv::Mat& picture) {
 
 namespace {
 
-av::Codec open_encoder(const VideoForm& form) {
+av::Codec open_encoder(const VideoForm& form, const AVOutputFormat& container) {
   const AVCodec* codec = avcodec_find_encoder_by_name(form.encoder.c_str());
   if (!codec) throw Error("libav has no encoder " + form.encoder);
   av::Codec encoder(avcodec_alloc_context3(codec));
   encoder->width = form.width;
   encoder->height = form.height;
   encoder->pix_fmt = av_get_pix_fmt(form.pixel_format.c_str());
-  encoder->time_base = {1, form.fps};
-  encoder->framerate = {form.fps, 1};
+  encoder->time_base = {form.seconds, form.fps};
+  encoder->framerate = {form.fps, form.seconds};
   encoder->thread_count = 1;
-  encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+  // A bare stream has its head before the frames.
+  if (!(container.flags & AVFMT_NOTIMESTAMPS)) encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
   encoder->strict_std_compliance = FF_COMPLIANCE_EXPERIMENTAL;
   encoder->color_range = form.range;
   encoder->colorspace = form.matrix;
@@ -75,6 +76,7 @@ AVStream& add_stream(AVFormatContext& context, const AVCodecContext& encoder,
                      const VideoForm& form) {
   AVStream* stream = avformat_new_stream(&context, nullptr);
   avcodec_parameters_from_context(stream->codecpar, &encoder);
+  if (form.container) form.container(*stream->codecpar);
   stream->time_base = encoder.time_base;
   stream->avg_frame_rate = encoder.framerate;
   stream->sample_aspect_ratio = form.pixel_aspect;
@@ -110,7 +112,7 @@ void write_video(const std::filesystem::path& file, const VideoForm& form,
   AVFormatContext* context = nullptr;
   ASSERT_GE(avformat_alloc_output_context2(&context, nullptr, nullptr, file.c_str()), 0);
   const av::Muxer muxer(context);
-  const av::Codec encoder = open_encoder(form);
+  const av::Codec encoder = open_encoder(form, *context->oformat);
   AVStream& stream = add_stream(*context, *encoder, form);
   ASSERT_GE(avio_open(&muxer->pb, file.c_str(), AVIO_FLAG_WRITE), 0);
   ASSERT_GE(avformat_write_header(context, nullptr), 0);

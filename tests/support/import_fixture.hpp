@@ -28,9 +28,9 @@ void write_picture(const std::filesystem::path& file, const cv::Mat& picture);
 // A video as write_video() makes it.
 struct VideoForm {
   std::string pixel_format = "rgb24";
-  int width = 32, height = 16, fps = 25;
-  std::string encoder = "ffv1";                  // libav's name
-  std::map<std::string, std::string> options{};  // the encoder's
+  int width = 32, height = 16, fps = 25, seconds = 1;  // fps frames in so many seconds
+  std::string encoder = "ffv1";                        // libav's name
+  std::map<std::string, std::string> options{};        // the encoder's
   AVColorRange range = AVCOL_RANGE_UNSPECIFIED;
   AVColorSpace matrix = AVCOL_SPC_UNSPECIFIED;
   AVColorTransferCharacteristic transfer = AVCOL_TRC_UNSPECIFIED;
@@ -41,6 +41,8 @@ struct VideoForm {
   std::map<std::string, std::string> metadata{};  // of the stream
   // Changes the packet of a number, in the order of decoding; false leaves it out.
   std::function<bool(AVPacket&, int)> spoil{};
+  // Changes what the container says of the stream, not the encoder.
+  std::function<void(AVCodecParameters&)> container{};
 };
 
 // Each frame's rows packed, planes one after the other, in the order of the pixel format. The

@@ -321,4 +321,166 @@ TEST(ImportVideo, PrimariesOfSmallDifferenceAreConvertedToo) {
   }
 }
 
+// ------------------------------------------------------------ what only the container says
+
+struct Wrapped {
+  const char *name, *encoder, *pixel_format, *file;
+  std::map<std::string, std::string> options{};
+};
+
+std::ostream& operator<<(std::ostream& out, const Wrapped& wrapped) {
+  return out << wrapped.name;
+}
+
+// A frame of one colour, limited range of that depth.
+Bytes flat_frame(const std::string& pixel_format, int width, int height,
+                 const std::array<double, 3>& samples) {
+  const int depth = pixel_format.ends_with("10le") ? 10 : 8;
+  const int chroma_y = pixel_format.starts_with("yuv422") ? 1 : 2;
+  Bytes bytes;
+  for (std::size_t plane = 0; plane < 3; ++plane) {
+    const double sample = samples[plane];
+    const int columns = plane ? width / 2 : width, rows = plane ? height / chroma_y : height;
+    put_plane(bytes, {sample, sample, sample, sample}, columns, rows, depth);
+  }
+  return bytes;
+}
+
+// Red by H.273's equations in the matrix that is said.
+Bytes red_frame(const Wrapped& wrapped, AVColorSpace matrix, int width, int height) {
+  const std::string pixel_format = wrapped.pixel_format;
+  const auto [red, blue] = luma_shares(matrix);
+  const double r = 0.8, g = 0.2, b = 0.1, y = red * r + (1 - red - blue) * g + blue * b;
+  const double unit = pixel_format.ends_with("10le") ? 4 : 1;
+  const bool full = pixel_format.starts_with("yuvj");
+  const double pb = (b - y) / (2 * (1 - blue)), pr = (r - y) / (2 * (1 - red));
+  return flat_frame(
+      pixel_format, width, height,
+      {full ? 255 * y : (219 * y + 16) * unit, full ? 255 * pb + 128 : (224 * pb + 128) * unit,
+       full ? 255 * pr + 128 : (224 * pr + 128) * unit});
+}
+
+class ImportVideoContainerColors : public testing::TestWithParam<Wrapped> {};
+
+// The encoder is told nothing; what would be assumed by the number of lines is the other matrix.
+TEST_P(ImportVideoContainerColors, CountWhereTheFramesSayNothing) {
+  const Wrapped& wrapped = GetParam();
+  for (const auto& [matrix, height] : {std::pair{bt709, 144}, std::pair{bt601, 720}}) {
+    VideoForm form = {.pixel_format = wrapped.pixel_format,
+                      .width = 256,
+                      .height = height,
+                      .encoder = wrapped.encoder,
+                      .options = wrapped.options};
+    form.container = [&](AVCodecParameters& said) {
+      said.color_space = matrix;
+      said.color_trc = trc709;
+      said.color_primaries = pri709;
+    };
+    Shoot shoot;
+    shoot.film(wrapped.file, form, {red_frame(wrapped, matrix, 256, height)});
+    const ImportReport report = shoot.import();
+    EXPECT_THAT(report.notes.at(0),
+                AllOf(HasSubstr(matrix == bt709 ? "matrix bt709" : "matrix smpte170m"),
+                      Not(HasSubstr("primaries bt709 (assumed)")), Not(HasSubstr("no transfer"))));
+    const FramePtr frame = shoot.open()->read(0);
+    ASSERT_TRUE(frame->format == PixelFormat::rgb8 || frame->format == PixelFormat::rgb16 ||
+                frame->format == PixelFormat::yuv422p8);
+    if (frame->format == PixelFormat::yuv422p8) continue;  // is BT.709
+    const bool deep = frame->format == PixelFormat::rgb16;
+    constexpr Rgb expected = {0.8, 0.2, 0.1};
+    for (std::size_t c = 0; c < 3; ++c)
+      EXPECT_NEAR(deep ? (frame->bytes[2 * c] + 256 * frame->bytes[2 * c + 1]) / 257.0
+                       : double(frame->bytes[c]),
+                  255 * expected[c], 3)
+          << "channel " << c << " of " << height << " lines";
+  }
+}
+
+const Wrapped wrappings[] = {
+    {"prores_mov", "prores_ks", "yuv422p10le", "take.mov"},
+    {"prores_mkv", "prores_ks", "yuv422p10le", "take.mkv"},
+    {"prores_old_mov", "prores", "yuv422p10le", "take.mov"},
+    {"ffv1_mkv", "ffv1", "yuv420p", "take.mkv"},
+    {"mjpeg_mov", "mjpeg", "yuvj420p", "take.mov", {{"qmin", "2"}, {"qmax", "2"}}},
+    {"v210_mov", "v210", "yuv422p10le", "take.mov"},
+    {"cfhd_mov", "cfhd", "yuv422p10le", "take.mov"},
+    {"h264_mov", "libx264", "yuv420p", "take.mov", {{"qp", "0"}}},
+    {"hevc_mov",
+     "libx265",
+     "yuv420p",
+     "take.mov",
+     {{"x265-params", "lossless=1:log-level=none:pools=none:bframes=0"}}},
+    {"vp8_mkv", "libvpx", "yuv420p", "take.mkv", {{"crf", "4"}}},
+    {"vp9_mkv", "libvpx-vp9", "yuv420p", "take.mkv", {{"lossless", "1"}}},
+    {"mpeg2_mkv", "mpeg2video", "yuv420p", "take.mkv"},
+    {"mpeg4_mov", "mpeg4", "yuv420p", "take.mov"},
+    {"dnxhr_mov", "dnxhd", "yuv422p", "take.mov", {{"profile", "dnxhr_hq"}}}};
+INSTANTIATE_TEST_SUITE_P(Codecs, ImportVideoContainerColors, testing::ValuesIn(wrappings),
+                         [](const auto& wrapped) { return std::string(wrapped.param.name); });
+
+TEST(ImportVideo, ColoursOfTheContainerAreNamedAsSuch) {
+  const Wrapped prores = wrappings[0];
+  VideoForm form = {.pixel_format = prores.pixel_format, .encoder = prores.encoder};
+  form.container = [](AVCodecParameters& said) {
+    said.color_space = bt709;
+    said.color_trc = trc709;
+    said.color_primaries = pri709;
+  };
+  Shoot shoot;
+  shoot.film("take.mov", form, {red_frame(prores, bt709, 32, 16)});
+  EXPECT_THAT(shoot.import().notes.at(0), AllOf(HasSubstr("matrix bt709 (from the container)"),
+                                                HasSubstr("transfer bt709 (from the container)"),
+                                                HasSubstr("primaries bt709 (from the container)")));
+}
+
+TEST(ImportVideo, FramesThatDisagreeWithTheContainerCountAndItIsSaid) {
+  VideoForm form = {.pixel_format = "yuv420p", .encoder = "libx264"};
+  form.matrix = bt709;
+  form.transfer = trc709;
+  form.primaries = pri709;
+  form.container = [](AVCodecParameters& said) { said.color_space = bt601; };
+  Shoot shoot;
+  shoot.film("take.mov", form, {red_frame({"", "", "yuv420p", ""}, bt709, 32, 16)});
+  EXPECT_THAT(shoot.import().notes.at(0),
+              HasSubstr("matrix bt709 (from the frames; the container says smpte170m)"));
+}
+
+// ------------------------------------------------------------ RGB that goes to 16 bits
+
+// White and black are all bits of a sample, by any way that RGB of 8 to 16 bits lies in memory.
+TEST(ImportVideo, WhiteStaysWhiteWhereRGBBecomesDeeper) {
+  struct Form {
+    const char *pixel_format, *encoder, *file;
+    std::size_t bytes_per_pixel;
+    std::uint16_t most = 255;
+  };
+  for (const Form& rgb :
+       {Form{"rgb24", "png", "take.mkv", 3}, Form{"rgba", "png", "take.mkv", 4},
+        Form{"bgr0", "ffv1", "take.mkv", 4}, Form{"bgra", "ffv1", "take.mkv", 4},
+        Form{"gbrp", "utvideo", "take.mkv", 3}, Form{"bgr24", "rawvideo", "take.nut", 3},
+        Form{"0rgb", "rawvideo", "take.nut", 4}, Form{"argb", "qtrle", "take.mov", 4},
+        Form{"gbrp10le", "ffv1", "take.mkv", 6, 1023},
+        Form{"gbrp12le", "ffv1", "take.mkv", 6, 4095},
+        Form{"gbrp10le", "r210", "take.mov", 6, 1023},
+        Form{"gbrp14le", "ffv1", "take.mkv", 6, 16383},
+        Form{"rgb48be", "png", "take.mkv", 6, 65535}}) {
+    for (const AVColorPrimaries primaries : {p3, pri2020}) {
+      Bytes white(32 * 16 * rgb.bytes_per_pixel, 255);
+      if (rgb.most > 255)
+        for (std::size_t i = 0; i < white.size(); i += 2)
+          white[i + 1] = static_cast<std::uint8_t>(rgb.most >> 8);
+      VideoForm form = {.pixel_format = rgb.pixel_format, .encoder = rgb.encoder};
+      form.primaries = primaries;
+      form.transfer = trc_srgb;
+      Shoot shoot;
+      const char* name = primaries == p3 ? "p3-d65" : "bt2020";
+      shoot.film(rgb.file, form, {white},
+                 {{"fps", 25}, {"read_as", {{"primaries", name}, {"range", "full"}}}});
+      const FramePtr frame = shoot.first_frame();
+      ASSERT_EQ(frame->format, PixelFormat::rgb16) << rgb.pixel_format;
+      EXPECT_EQ(frame->bytes, Bytes(frame->bytes.size(), 255)) << rgb.pixel_format;
+    }
+  }
+}
+
 }  // namespace previz::exchange::import_video_color_test
