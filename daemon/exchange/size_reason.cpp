@@ -13,7 +13,7 @@ constexpr double same_shape = 0.01;
 
 // Pixels' centres are whole numbers, so that a picture begins half a pixel before 0.
 std::string scaled(char axis, double factor) {
-  return fmt::format("f{0} times {1:.5g}, c{0} + 0.5 times {1:.5g} less 0.5", axis, factor);
+  return fmt::format("f{0} * {1:.5g}, (c{0} + 0.5) * {1:.5g} - 0.5", axis, factor);
 }
 
 }  // namespace

@@ -104,44 +104,7 @@ class VideoFile final : public Footage {
   VideoFile(const std::filesystem::path& file, const ReadAs& read_as)
       : file_(file), read_as_(read_as) {
     const QuietLibav quiet;
-    AVFormatContext* context = nullptr;
-    // "file:" keeps a name with a colon from being taken for another protocol.
-    url_ = "file:" + std::filesystem::absolute(file).string();
-    const int opened = avformat_open_input(&context, url_.c_str(), nullptr, Limits().get());
-    if (opened < 0) refuse_undecodable(nullptr);
-    av::check(opened, file, "cannot be read as a video");
-    demuxer_.reset(context);
-    demuxer_words_.emplace(context);
-    std::vector<NamedColors> colors;
-    for (unsigned i = 0; i < context->nb_streams; ++i)
-      colors.push_back(named_colors(*context->streams[i]->codecpar));
-    probe(*context);
-    const AVCodec* codec = nullptr;
-    track_ = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
-    if (track_ < 0) refuse_undecodable(context);
-    av::check(track_, file, "has no decodable video");
-    tracks_ = words_of_tracks(*context, track_);
-    if (static_cast<std::size_t>(track_) < colors.size())
-      container_colors_ = colors[static_cast<std::size_t>(track_)];
-    decoder_.reset(av::made(avcodec_alloc_context3(codec)));
-    av::check(avcodec_parameters_to_context(decoder_.get(), stream().codecpar), file,
-              "cannot be decoded");
-    decoder_->pkt_timebase = stream().time_base;
-    decoder_->thread_count = 0;  // 0: one thread per core
-    const AVCodecDescriptor* kind = avcodec_descriptor_get(codec->id);
-    all_are_key_frames_ = kind && kind->props & AV_CODEC_PROP_INTRA_ONLY;
-    const std::string_view container = demuxer_->iformat->name;
-    is_bare_ = container == "h264" || container == "hevc";
-    if (all_are_key_frames_ || is_bare_) decoder_->err_recognition = AV_EF_EXPLODE;
-    if (!all_are_key_frames_) {
-      // Frames refer to others: several at once would hide which of them is damaged, and faults
-      // that harm no picture, as at a cut, would end all.
-      decoder_->thread_type = FF_THREAD_SLICE;
-    }
-    words_.emplace(decoder_.get());
-    packets_.emplace(*demuxer_, track_);
-    const int opened_decoder = avcodec_open2(decoder_.get(), codec, Limits().get());
-    av::check(opened_decoder, file, std::string("cannot be decoded as ") + codec->name);
+    open_decoder(*open_file());
   }
 
   std::optional<Picture> next() override {
@@ -204,6 +167,52 @@ class VideoFile final : public Footage {
 
  private:
   AVStream& stream() const { return *demuxer_->streams[track_]; }
+
+  // Returns the decoder of the track.
+  const AVCodec* open_file() {
+    const AVCodec* codec = nullptr;
+    AVFormatContext* context = nullptr;
+    // "file:" keeps a name with a colon from being taken for another protocol.
+    url_ = "file:" + std::filesystem::absolute(file_).string();
+    const int opened = avformat_open_input(&context, url_.c_str(), nullptr, Limits().get());
+    if (opened < 0) refuse_undecodable(nullptr);
+    av::check(opened, file_, "cannot be read as a video");
+    demuxer_.reset(context);
+    demuxer_words_.emplace(context);
+    std::vector<NamedColors> colors;
+    for (unsigned i = 0; i < context->nb_streams; ++i)
+      colors.push_back(named_colors(*context->streams[i]->codecpar));
+    probe(*context);
+    track_ = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
+    if (track_ < 0) refuse_undecodable(context);
+    av::check(track_, file_, "has no decodable video");
+    tracks_ = words_of_tracks(*context, track_);
+    if (static_cast<std::size_t>(track_) < colors.size())
+      container_colors_ = colors[static_cast<std::size_t>(track_)];
+    return codec;
+  }
+
+  void open_decoder(const AVCodec& codec) {
+    decoder_.reset(av::made(avcodec_alloc_context3(&codec)));
+    av::check(avcodec_parameters_to_context(decoder_.get(), stream().codecpar), file_,
+              "cannot be decoded");
+    decoder_->pkt_timebase = stream().time_base;
+    decoder_->thread_count = 0;  // 0: one thread per core
+    const AVCodecDescriptor* kind = avcodec_descriptor_get(codec.id);
+    all_are_key_frames_ = kind && kind->props & AV_CODEC_PROP_INTRA_ONLY;
+    const std::string_view container = demuxer_->iformat->name;
+    is_bare_ = container == "h264" || container == "hevc";
+    if (all_are_key_frames_ || is_bare_) decoder_->err_recognition = AV_EF_EXPLODE;
+    if (!all_are_key_frames_) {
+      // Frames refer to others: several at once would hide which of them is damaged, and faults
+      // that harm no picture, as at a cut, would end all.
+      decoder_->thread_type = FF_THREAD_SLICE;
+    }
+    words_.emplace(decoder_.get());
+    packets_.emplace(*demuxer_, track_);
+    const int opened_decoder = avcodec_open2(decoder_.get(), &codec, Limits().get());
+    av::check(opened_decoder, file_, std::string("cannot be decoded as ") + codec.name);
+  }
 
   // Throws where it is known what the file is, or how it is coded.
   void refuse_undecodable(const AVFormatContext* opened) const {

@@ -68,8 +68,8 @@ VideoPictures::VideoPictures(const AVFrame& first, AVStream& stream, AVFormatCon
   if (colors_.changes_anything()) done += ", sRGB's curve, Rec. 709";
   notes_.push_back(fmt::format("{}: {}: {}", file_.string(), tags_.words, done));
   const auto keeps = [&](const char* member) {
-    return fmt::format(" of the file's {}x{}, which \"read_as\": {{{}}} beside \"video\" keeps",
-                       first.width, first.height, member);
+    return fmt::format("; \"read_as\": {{{}}} beside \"video\" keeps the file's {}x{}", member,
+                       first.width, first.height);
   };
   if (!tags_.orientation.is_upright())
     shape_.push_back("its pictures are " + tags_.orientation.words() +

@@ -23,9 +23,9 @@ TEST(ImportVideo, ASizeThatDoesNotFitSaysWhy) {
   form.pixel_aspect = {2, 1};
   EXPECT_THAT(refusal(form),
               AllOf(HasSubstr("is 64x16; "), HasSubstr("is for 32x16"),
-                    HasSubstr("its pixels, 2:1 wide to high, are resampled to square of the file's "
-                              "32x16, which \"read_as\": {\"pixel_aspect\": [1, 1]}"),
-                    HasSubstr("intrinsics for 64x16 fit with fx times 2, cx + 0.5 times 2 less")));
+                    HasSubstr("its pixels, 2:1 wide to high, are resampled to square; \"read_as\": "
+                              "{\"pixel_aspect\": [1, 1]} beside \"video\" keeps the file's 32x16"),
+                    HasSubstr("intrinsics for 64x16 fit with fx * 2, (cx + 0.5) * 2 - 0.5")));
   form.pixel_aspect = {0, 1};
   form.display_matrix = {0, 1 << 16, 0, -(1 << 16), 0, 0, 0, 0, 1 << 30};
   EXPECT_THAT(refusal(form),
@@ -35,9 +35,8 @@ TEST(ImportVideo, ASizeThatDoesNotFitSaysWhy) {
   form.display_matrix = {};
   form.width = 64;
   form.height = 32;
-  EXPECT_THAT(refusal(form),
-              HasSubstr("intrinsics for 64x32 fit with fx times 2, cx + 0.5 times 2 less 0.5, fy "
-                        "times 2, cy + 0.5 times 2 less 0.5"));
+  EXPECT_THAT(refusal(form), HasSubstr("intrinsics for 64x32 fit with fx * 2, (cx + 0.5) * 2 - "
+                                       "0.5, fy * 2, (cy + 0.5) * 2 - 0.5"));
   form.height = 48;
   EXPECT_THAT(refusal(form), HasSubstr("crops its sensor: calibrate with pictures of this size"));
 }
