@@ -64,18 +64,24 @@ void print_poses(const std::vector<TrackedFrame>& frames, std::ostream& out) {
   out << '\n';
 }
 
-void print_tags(const std::vector<TrackedFrame>& frames, std::ostream& out) {
+void print_tags(const std::vector<TrackedFrame>& frames, const tracking::PoseJudgement& judgement,
+                std::ostream& out) {
   std::map<int, std::pair<std::size_t, std::size_t>> counts;  // seen, used for the camera
   std::map<std::string, std::size_t> carriers;
   for (const TrackedFrame& frame : frames) {
-    for (const int tag : frame.seen_tags) ++counts[tag].first;
+    for (const int tag : std::set(frame.seen_tags.begin(), frame.seen_tags.end()))
+      ++counts[tag].first;
     for (const int tag : frame.record.tags) ++counts[tag].second;
     for (const auto& [name, carrier] : frame.record.carriers)
       if (!carrier.tags.empty()) ++carriers[name];
   }
-  for (const auto& [tag, count] : counts)
+  for (const auto& [tag, count] : counts) {
     out << "  tag " << tag << ": seen in " << count.first << " frames, used for the camera in "
-        << count.second << '\n';
+        << count.second;
+    if (const std::string why = judgement.why_unusable(tag); count.second == 0 && !why.empty())
+      out << ": " << why;
+    out << '\n';
+  }
   for (const auto& [name, count] : carriers)
     out << "  carrier \"" << name << "\": found in " << count << " frames\n";
 }
@@ -118,7 +124,8 @@ void print_reasons(const std::vector<TrackedFrame>& frames, std::ostream& out) {
 std::vector<TrackedFrame> track_frames(const pipeline::Take& take,
                                        const std::function<bool(std::uint64_t)>& wanted,
                                        const std::function<void(const std::string&)>& note,
-                                       const std::stop_token& stop) {
+                                       const std::stop_token& stop,
+                                       tracking::PoseJudgement* judgement) {
   pipeline::TrackStage stage(take.set, take.observer, take.session.track, pipeline::start_of(take));
   std::vector<TrackedFrame> frames;
   const std::size_t count = take.observer_stream->records().size();
@@ -135,6 +142,7 @@ std::vector<TrackedFrame> track_frames(const pipeline::Take& take,
     }
     stage(shot);
     for (const std::string& trouble : stage.troubles()) note(trouble);
+    if (judgement) judgement->add(shot.frame, shot.track);
     if (wanted(i)) frames.push_back(tracked_frame(shot));
   }
   return frames;
@@ -170,12 +178,13 @@ int track_take(const TrackOptions& options, std::ostream& out) {
       pipeline::open_take(options.session, options.set_file, options.any_paths, options.stop);
   for (const std::string& what : take.session.missing) out << "session: " << what << std::endl;
   report::Once noted;
+  tracking::PoseJudgement judgement(take.set.tracking, take.observer);
   const std::vector<TrackedFrame> frames = track_frames(
       take, [](std::uint64_t) { return true; },
       [&](const std::string& what) {
         if (noted.is_first(report::wording(what))) out << what << std::endl;
       },
-      options.stop);
+      options.stop, &judgement);
   if (options.stop.stop_requested())
     throw Error(options.session.string() + ": tracking interrupted; nothing written");
   if (options.out) {
@@ -184,9 +193,10 @@ int track_take(const TrackOptions& options, std::ostream& out) {
     session::replace_file(*options.out, lines);
   }
   print_poses(frames, out);
-  print_tags(frames, out);
+  print_tags(frames, judgement, out);
   print_strangers(frames, take.set.tracking, out);
   print_reasons(frames, out);
+  for (const std::string& doubt : judgement.doubts()) out << "warning: " << doubt << '\n';
   if (options.out) out << options.out->string() << std::endl;
   const bool found =
       std::ranges::any_of(frames, [](const auto& one) { return one.record.tracked; });

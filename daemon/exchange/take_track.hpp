@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "daemon/pipeline/take.hpp"
+#include "daemon/tracking/pose_judgement.hpp"
 #include "daemon/tracking/tracker.hpp"
 
 namespace previz::exchange {
@@ -26,12 +27,13 @@ struct TrackedFrame {
 };
 
 // Tracks the frames of the take for which `wanted` returns true, in order, by the take's set; a
-// frame that cannot be read is left out and named to `note`. A stop ends it early. Throws
-// previz::Error as pipeline::TrackStage does.
+// frame that cannot be read is left out and named to `note`. `judgement` is given every frame,
+// unless it is null. A stop ends it early. Throws previz::Error as pipeline::TrackStage does.
 std::vector<TrackedFrame> track_frames(const pipeline::Take& take,
                                        const std::function<bool(std::uint64_t)>& wanted,
                                        const std::function<void(const std::string&)>& note,
-                                       const std::stop_token& stop);
+                                       const std::stop_token& stop,
+                                       tracking::PoseJudgement* judgement = nullptr);
 
 // Returns the frame as a line of JSON: frame, timestamp_ns, tracked, tags_seen; if tracked also
 // world_from_camera (4 rows of 4, as FRAMES.json has it), covariance, tags and
@@ -46,8 +48,9 @@ struct TrackOptions {
   bool any_paths = false;                         // as post::RenderOptions has it
   std::stop_token stop;
 };
-// Tracks every frame and prints how many were found, how well, by which tags, and why the others
-// were not. Returns 0; 1 if no frame was tracked.
+// Tracks every frame and prints how many were found, how well, by which tags, why the others were
+// not, and what of it does not hold (tracking/pose_judgement.hpp). Returns 0; 1 if no frame was
+// tracked.
 int track_take(const TrackOptions& options, std::ostream& out);
 
 }  // namespace previz::exchange

@@ -81,7 +81,7 @@ previzd calibrate tags walk --set desk.toml --size 80mm --write: Finds the tags'
 previzd model takes/12A_take003 --set desk.toml --write: Makes the phantom of the boxes that were marked on the rig while this take was recorded.
 previzd model walk --set desk.toml --parts real.toml --write: Makes the phantom of the real scene from the walk's tags and the points marked in real.toml, and adds it to the set file.
 previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.
-previzd check takes/12A_take003: Does the same for a take and its own set, and measures in five of its frames how many pixels the edges of phantoms and removed objects are from those of the pictures. Where that is more than 2 px it says what to look at.
+previzd check takes/12A_take003: Does the same for a take and its own set, and measures in five of its frames how many pixels the edges of phantoms and removed objects are from those of the pictures. Where that is more than 2 px it says what to look at. It also tracks five frames, and says what does not fit of tags and lens.
 previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the rest.
 previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Run again, it continues where it stopped.
 previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
@@ -104,7 +104,7 @@ previzd takes copy takes/12A_* --to /media/disk/day1: Copies takes, and reads th
 previzd takes check takes/12A_take003 --repair repaired: Reads a take from end to end; if it was cut off or damaged, writes every complete frame and line of it into the new take repaired/12A_take003, which says what is lost. The damaged one is not changed.
 previzd takes delete takes/12A_take001: Deletes a take. A good one is deleted only with --good, and foreign files in its folder are kept.
 previzd render takes --good --out renders: Renders all good takes, each into a folder named after it.
-previzd track takes/12A_take003 --out poses.jsonl: Finds the camera in every frame without rendering, and reports why it is lost where it is.
+previzd track takes/12A_take003 --out poses.jsonl: Finds the camera in every frame without rendering, and reports why it is lost where it is, and what does not fit: tags of another family, printed twice, moved or scaled, another lens, a rolling shutter.
 previzd export takes/12A_take003 camera: Writes the take's camera for USD and Nuke, and each object where it stands.
 )",
                                true};

@@ -11,6 +11,7 @@
 #include "daemon/pipeline/check.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/post/check_model.hpp"
+#include "daemon/post/check_tracking.hpp"
 #include "daemon/render/check.hpp"
 #include "daemon/scene/check.hpp"
 #include "daemon/set/check.hpp"
@@ -106,6 +107,7 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
     const fit::Figure figure = fit_of_model(*take, *scene);
     describe_fit(figure, take->set, out);
     remark_on_fit(figure, take->set, findings);
+    remark_on_tracking(*take, findings);
   }
   if (!findings.remarks.empty()) out << "\nworth checking\n";
   for (const std::string& remark : findings.remarks) out << "  " << remark << '\n';

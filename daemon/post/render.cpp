@@ -27,6 +27,7 @@
 #include "daemon/scene/check.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
+#include "daemon/tracking/pose_judgement.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::post {
@@ -130,6 +131,7 @@ struct Job {
   pipeline::Metrics& metrics;
   const SumsFolders* sums;  // null: the samples are rendered here
   RenderReport& report;
+  tracking::PoseJudgement& judgement;
 };
 
 MadeOn made_on(const render::Device& device) {
@@ -201,6 +203,7 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
   stages.source("observer", lit, [&] {
     std::optional<Shot> shot = shots.next();
     if (shot) shot->only_neighbour = !frames.is_written(shot->index);
+    if (shot) job.judgement.add(shot->frame, shot->track);
     if (shot && shot->light)
       for (const std::string& what : shot->light->lighting.report.notes)
         if (light_notes.is_first(report::wording(what))) progress.note("light: " + what);
@@ -276,7 +279,8 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
       << std::endl;
   if (options.on_begin) options.on_begin();
   output::Progress progress(out, options.terminal, to_do.size(), now_s());
-  const Job job{options, take, scene, device, directory, metrics, sums, report};
+  tracking::PoseJudgement judgement(take.set.tracking, take.observer);
+  const Job job{options, take, scene, device, directory, metrics, sums, report, judgement};
   while (!to_do.empty() && !options.stop.stop_requested()) {
     const std::set<std::uint64_t> left = render_frames(job, to_do, progress);
     to_do.clear();
@@ -291,6 +295,8 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
                     " left unfinished by a process that ended, and " +
                     (to_do.size() == 1 ? "is" : "are") + " rendered here");
   }
+  if (options.stop.stop_requested()) return;
+  for (const std::string& doubt : judgement.doubts()) progress.note("tracking: " + doubt);
 }
 
 void report_opened(const RenderDirectory& directory, const RenderReport& report,

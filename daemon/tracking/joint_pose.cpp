@@ -4,6 +4,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
+#include <numeric>
 #include <opencv2/core.hpp>
 
 #include "daemon/tracking/least_squares.hpp"
@@ -55,31 +56,51 @@ struct Prepared {
   Whitening whiten;
 };
 
-// Computes measured - projected (x0,y0,..) and the derivative by a small motion of the camera.
-// Returns false if the tag is behind the camera.
-bool residual(const Prepared& tag, const PinholeIntrinsics& lens, const CameraFromWorld& pose,
-              cv::Matx<double, 8, 1>* r, cv::Matx<double, 8, 6>* jacobian) {
-  for (std::size_t i = 0; i < 4; ++i) {
-    const glm::dvec3 x = pose.rotation * tag.world[i] + pose.translation;
-    if (!(x.z > 1e-9)) return false;
-    glm::dmat2 by_ray;
-    const glm::dvec2 pixel = distort(lens, {x.x / x.z, x.y / x.z}, &by_ray);
-    const int row = int(2 * i);
-    (*r)(row) = tag.corners[i].x - pixel.x;
-    (*r)(row + 1) = tag.corners[i].y - pixel.y;
-    const glm::dvec2 by_x = by_ray[0] / x.z, by_y = by_ray[1] / x.z;
-    const glm::dvec2 by_z = -(by_ray[0] * x.x + by_ray[1] * x.y) / (x.z * x.z);
-    for (int k = 0; k < 2; ++k) {
-      // The point moves by x cross w for a rotation w of the camera, by -v for a translation v.
-      const glm::dvec3 g(by_x[k], by_y[k], by_z[k]);
-      const glm::dvec3 by_rotation = glm::cross(g, x);
-      for (int c = 0; c < 3; ++c) {
-        (*jacobian)(row + k, c) = by_rotation[c];
-        (*jacobian)(row + k, 3 + c) = -g[c];
-      }
+Prepared prepared(const TagObservation& tag) {
+  Prepared p{{}, tag.corners, whitening(tag, kCornerFloorPx)};
+  for (std::size_t i = 0; i < 4; ++i) p.world[i] = corner_in_world(tag, i);
+  return p;
+}
+
+using Residual = cv::Matx<double, 8, 1>;
+using Jacobian = cv::Matx<double, 8, 6>;
+
+// Computes measured - projected of corner i and the derivative by a small motion of the camera.
+// Returns false if the corner is behind the camera.
+bool residual(const Prepared& tag, std::size_t i, const PinholeIntrinsics& lens,
+              const CameraFromWorld& pose, Residual* r, Jacobian* jacobian) {
+  const glm::dvec3 x = pose.rotation * tag.world[i] + pose.translation;
+  if (!(x.z > 1e-9)) return false;
+  glm::dmat2 by_ray;
+  const glm::dvec2 pixel = distort(lens, {x.x / x.z, x.y / x.z}, &by_ray);
+  const int row = int(2 * i);
+  (*r)(row) = tag.corners[i].x - pixel.x;
+  (*r)(row + 1) = tag.corners[i].y - pixel.y;
+  const glm::dvec2 by_x = by_ray[0] / x.z, by_y = by_ray[1] / x.z;
+  const glm::dvec2 by_z = -(by_ray[0] * x.x + by_ray[1] * x.y) / (x.z * x.z);
+  for (int k = 0; k < 2; ++k) {
+    // The point moves by x cross w for a rotation w of the camera, by -v for a translation v.
+    const glm::dvec3 g(by_x[k], by_y[k], by_z[k]);
+    const glm::dvec3 by_rotation = glm::cross(g, x);
+    for (int c = 0; c < 3; ++c) {
+      (*jacobian)(row + k, c) = by_rotation[c];
+      (*jacobian)(row + k, 3 + c) = -g[c];
     }
   }
   return true;
+}
+
+bool residual(const Prepared& tag, const PinholeIntrinsics& lens, const CameraFromWorld& pose,
+              Residual* r, Jacobian* jacobian) {
+  for (std::size_t i = 0; i < 4; ++i)
+    if (!residual(tag, i, lens, pose, r, jacobian)) return false;
+  return true;
+}
+
+CameraFromWorld pose_after(const CameraFromWorld& pose, const Vector6& step) {
+  const glm::dmat3 back = rotation_by({-step(0), -step(1), -step(2)});
+  return {orthonormal(back * pose.rotation),
+          back * (pose.translation - glm::dvec3(step(3), step(4), step(5)))};
 }
 
 // The cost function: whitened squares, or a redescending loss of each tag's distance in px (Geman
@@ -96,12 +117,7 @@ class Problem {
  public:
   Problem(const std::vector<TagObservation>& tags, const PinholeIntrinsics& lens)
       : lens_(lens), observations_(tags) {
-    for (const TagObservation& tag : tags) {
-      Prepared p{{}, tag.corners, {}};
-      for (std::size_t i = 0; i < 4; ++i) p.world[i] = corner_in_world(tag, i);
-      tags_.push_back(p);
-    }
-    set_model_error(kCornerFloorPx);
+    for (const TagObservation& tag : tags) tags_.push_back(prepared(tag));
   }
 
   void set_model_error(double px) {
@@ -114,8 +130,8 @@ class Problem {
     Accumulated sum;
     for (std::size_t index : used) {
       const Prepared& tag = tags_[index];
-      cv::Matx<double, 8, 1> r;
-      cv::Matx<double, 8, 6> j;
+      Residual r;
+      Jacobian j;
       if (!residual(tag, lens_, pose, &r, &j)) {
         sum.cost = HUGE_VAL;
         return sum;
@@ -151,9 +167,7 @@ class Problem {
     }
 
     static CameraFromWorld moved(const CameraFromWorld& pose, const Vector6& step) {
-      const glm::dmat3 back = rotation_by({-step(0), -step(1), -step(2)});
-      return {orthonormal(back * pose.rotation),
-              back * (pose.translation - glm::dvec3(step(3), step(4), step(5)))};
+      return pose_after(pose, step);
     }
   };
 
@@ -247,6 +261,50 @@ std::optional<CameraFromWorld> agree(const Problem& problem,
   return std::nullopt;
 }
 
+// The camera's pose at the picture's middle row, and its motion while the height is read.
+struct MovingPose {
+  CameraFromWorld pose;
+  Vector6 motion = Vector6::zeros();
+};
+
+struct RowsProblem {
+  const std::vector<Prepared>& tags;
+  const PinholeIntrinsics& lens;
+  int motions;  // 3: it turns; 6: it moves, too
+
+  double time_of(const glm::dvec2& corner) const { return (corner.y + 0.5) / lens.height - 0.5; }
+
+  NormalEquations<12> evaluate(const MovingPose& at) const {
+    NormalEquations<12> sum;
+    for (const Prepared& tag : tags) {
+      Residual r;
+      Jacobian j;
+      cv::Matx<double, 8, 12> by;
+      for (std::size_t i = 0; i < 4; ++i) {
+        const double time = time_of(tag.corners[i]);
+        if (!residual(tag, i, lens, pose_after(at.pose, time * at.motion), &r, &j)) {
+          sum.cost = HUGE_VAL;
+          return sum;
+        }
+        for (int row = int(2 * i); row < int(2 * i) + 2; ++row)
+          for (int c = 0; c < 6; ++c) {
+            by(row, c) = j(row, c);
+            by(row, 6 + c) = c < motions ? time * j(row, c) : 0;
+          }
+      }
+      r = tag.whiten * r;
+      sum.add<8>(tag.whiten * by, r);
+      sum.cost += r.dot(r);
+    }
+    return sum;
+  }
+
+  static MovingPose moved(const MovingPose& at, const cv::Matx<double, 12, 1>& step) {
+    return {pose_after(at.pose, step.get_minor<6, 1>(0, 0)),
+            at.motion + step.get_minor<6, 1>(6, 0)};
+  }
+};
+
 struct Consensus {
   std::vector<std::size_t> used;
   CameraFromWorld pose;
@@ -311,6 +369,57 @@ double tag_error_px(const TagObservation& tag, const CameraFromWorld& pose,
     squares += glm::dot(d, d);
   }
   return std::isfinite(squares) ? std::sqrt(squares / 4) : HUGE_VAL;
+}
+
+std::optional<FittedPose> refitted_pose(const std::vector<TagObservation>& tags,
+                                        const PinholeIntrinsics& lens,
+                                        const CameraFromWorld& start) {
+  std::vector<std::size_t> all(tags.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  const auto minimum = Problem(tags, lens).minimise(all, start, {}, 50);
+  return minimum ? std::optional(describe(*minimum, tags, lens, all)) : std::nullopt;
+}
+
+std::optional<RowsFit> fit_of_rows(const std::vector<TagObservation>& tags,
+                                   const PinholeIntrinsics& lens, const CameraFromWorld& start,
+                                   bool also_moves) {
+  std::vector<Prepared> all;
+  for (const TagObservation& tag : tags) all.push_back(prepared(tag));
+  const RowsProblem problem{all, lens, also_moves ? 6 : 3};
+  const auto minimum = least_squares(problem, MovingPose{start, {}}, {50, 1e-4});
+  RowsFit fit{minimum.equations.cost, int(8 * tags.size()) - 6 - problem.motions, 0, 0};
+  if (minimum.why == Stopped::outside || fit.degrees_of_freedom <= 0) return std::nullopt;
+  double squares = 0;
+  for (const Prepared& tag : all)
+    for (std::size_t i = 0; i < 4; ++i) {
+      Residual r, first, last;
+      Jacobian j;
+      const Vector6& motion = minimum.at.motion;
+      const CameraFromWorld& pose = minimum.at.pose;
+      if (!residual(tag, i, lens, pose_after(pose, problem.time_of(tag.corners[i]) * motion), &r,
+                    &j) ||
+          !residual(tag, i, lens, pose_after(pose, -0.5 * motion), &first, &j) ||
+          !residual(tag, i, lens, pose_after(pose, 0.5 * motion), &last, &j))
+        return std::nullopt;
+      const auto k = int(2 * i);
+      squares += r(k) * r(k) + r(k + 1) * r(k + 1);
+      fit.moved_px += std::hypot(first(k) - last(k), first(k + 1) - last(k + 1));
+    }
+  fit.moved_px /= 4.0 * double(tags.size());
+  fit.rms_px = std::sqrt(squares / (4.0 * double(tags.size())));
+  return fit;
+}
+
+double expected_rms_px(const std::vector<TagObservation>& tags, int degrees_of_freedom) {
+  std::vector<double> variances;
+  for (const TagObservation& tag : tags) {
+    double sum = 0;
+    for (std::size_t i = 0; i < 8; ++i) sum += tag.covariance[9 * i];
+    variances.push_back(sum / 8 + kCornerFloorPx * kCornerFloorPx);
+  }
+  const auto middle = variances.begin() + std::ptrdiff_t(variances.size() / 2);
+  std::nth_element(variances.begin(), middle, variances.end());
+  return std::sqrt(2 * *middle * degrees_of_freedom / (8.0 * double(tags.size())));
 }
 
 double consistency_gate_px(const PinholeIntrinsics& lens) {

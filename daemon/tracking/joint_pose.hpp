@@ -41,6 +41,30 @@ std::vector<FittedPose> solve_joint_pose(const std::vector<TagObservation>& tags
                                          const PinholeIntrinsics& lens,
                                          const std::optional<CameraFromWorld>& seed);
 
+// Moves the pose to the minimum over all of these tags, weighed by the corners' covariances and the
+// least error of the model (0.03 px), whatever the residuals are: chi_square says whether they are
+// as large as they should be. Returns nothing if a tag is behind the camera.
+std::optional<FittedPose> refitted_pose(const std::vector<TagObservation>& tags,
+                                        const PinholeIntrinsics& lens,
+                                        const CameraFromWorld& start);
+
+// As a rolling shutter exposes a picture: a camera that turns, and moves if `also_moves`, at a
+// constant velocity while rows are read, its pose that of the middle row. In a single plane of tags
+// both together are hardly determined.
+struct RowsFit {
+  double chi_square = 0;  // as of refitted_pose()
+  int degrees_of_freedom = 0;
+  double rms_px = 0;    // as of FittedPose
+  double moved_px = 0;  // by which the tags move while the picture's height is read, mean
+};
+std::optional<RowsFit> fit_of_rows(const std::vector<TagObservation>& tags,
+                                   const PinholeIntrinsics& lens, const CameraFromWorld& start,
+                                   bool also_moves);
+
+// Returns the rms distance that noise alone would leave between the corners of most tags and their
+// projections: by the median of the tags' variances.
+double expected_rms_px(const std::vector<TagObservation>& tags, int degrees_of_freedom);
+
 // Returns the rms distance in px between a tag's corners and their projection; infinite if the tag
 // cannot be seen (it is behind the camera, or seen from behind).
 double tag_error_px(const TagObservation& tag, const CameraFromWorld& pose,

@@ -6,8 +6,10 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/matrix.hpp>
+#include <iterator>
 #include <opencv2/core.hpp>
 #include <set>
+#include <utility>
 
 #include "daemon/tracking/pose_starts.hpp"
 #include "drivers/calibration/pinhole.hpp"
@@ -85,11 +87,13 @@ Track TagMap::locate(const std::vector<TagDetection>& detections, std::int64_t t
   for (const TagDetection& d : detections) {
     const auto known = tags_.find(d.id);
     if (known == tags_.end()) continue;
-    if (!d.trouble.empty())
+    if (!d.trouble.empty()) {
+      track.unusable.push_back({d.id, d.trouble});
       add_to_list(trouble, tags_in_words({d.id}) + ": " + d.trouble, "; ");
-    else
+    } else {
       tags.push_back(
           {d.id, known->second.size_m, known->second.world_from_tag, d.corners, d.covariance});
+    }
   }
   if (tags.empty()) {
     track.reason = trouble;
@@ -107,10 +111,18 @@ Track TagMap::locate(const std::vector<TagDetection>& detections, std::int64_t t
       else
         used.erase(found);
     }
+    const auto is_twice = [&](int id) {
+      return std::ranges::count(tags, id, &TagObservation::id) > 1;
+    };
+    std::vector<int> twice;
+    std::ranges::copy_if(left_out, std::back_inserter(twice), is_twice);
+    std::erase_if(left_out, is_twice);
+    if (!twice.empty()) add_to_list(trouble, tags_in_words(twice) + ": there twice", "; ");
     if (!left_out.empty())
       add_to_list(trouble, tags_in_words(left_out) + ": not where the set file says", "; ");
   }
   if (!trouble.empty()) add_to_list(track.reason, trouble, "; ");
+  track.observations = std::move(tags);
   return track;
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/tracking/tag_observation.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz::tracking {
@@ -33,6 +34,12 @@ struct CarrierTrack {
   std::string reason;               // as Track::reason
 };
 
+// A tag of the set whose corners cannot be used in a frame.
+struct UnusableTag {
+  int id = 0;
+  std::string why;
+};
+
 enum class TrackStatus { tracked, ambiguous, lost };
 const char* to_string(TrackStatus status);  // "tracked" and so on
 
@@ -43,7 +50,11 @@ struct Track {
   // If lost or ambiguous, the reason in plain words. If tracked, which tags were left out and why,
   // if any.
   std::string reason;
-  std::vector<int> seen_tags;          // every id detected, in the map or not; empty without tags
+  std::vector<int> seen_tags;  // every id detected, in the map or not, as often as it was; empty
+                               // without tags
+  // The tags of the stage that could be measured, used or not, and those that could not.
+  std::vector<TagObservation> observations;
+  std::vector<UnusableTag> unusable;
   std::vector<CarrierTrack> carriers;  // all of the set's
 };
 

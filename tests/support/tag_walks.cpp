@@ -2,6 +2,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "daemon/tracking/tag_place.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 #include "tests/support/units.hpp"
 
@@ -68,8 +69,8 @@ calibrate::TagWalk walk_of(const PinholeIntrinsics& lens, const std::vector<glm:
       calibrate::TagSighting seen;
       seen.picture = p;
       seen.tag = t;
-      seen.corners = calibrate::projected_tag(lens, tracking::camera_from_world(cameras[p]),
-                                              tags[t].world_from_tag, tags[t].size_m);
+      seen.corners = tracking::projected_tag(lens, tracking::camera_from_world(cameras[p]),
+                                             tags[t].world_from_tag, tags[t].size_m);
       seen.variance_px2 = noise_px * noise_px;
       bool is_seen = true;
       for (std::size_t i = 0; i < 4; ++i) {

@@ -5,16 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-#include <glm/matrix.hpp>
-#include <opencv2/core.hpp>
+#include <span>
 
 #include "daemon/calibrate/lens/report.hpp"
-#include "daemon/tracking/least_squares.hpp"
+#include "daemon/tracking/tag_place.hpp"
 
 namespace previz::calibrate {
 namespace {
 
-constexpr double moved_loss = 3;        // standard deviations, as of the map's adjustment
 constexpr double moved_gain = 60;       // of the cost; noise gains as a chi-square of 6 degrees
 constexpr double restless_share = 0.3;  // of sightings that disagree
 constexpr std::size_t most_cuts = 24;
@@ -27,83 +25,36 @@ struct OneTag {
   const TagPlaces& places;
   std::size_t tag;
   double model_error_px;
-  std::vector<std::size_t> sightings;  // in the walk's order
-};
+  std::vector<std::size_t> sightings;                      // in the walk's order
+  std::vector<tracking::TagView> views = views_of(*this);  // the same
 
-using Place = cv::Matx<double, 8, 1>;
-
-// Returns how far the corners of a sighting lie from their projection, px.
-Place off(const OneTag& one, std::size_t sighting, const glm::dmat4& place) {
-  const TagSighting& seen = one.walk.sightings[sighting];
-  const auto at =
-      projected_tag(one.lens, one.places.cameras[seen.picture], place, one.places.sizes_m[one.tag]);
-  Place result;
-  for (int i = 0; i < 4; ++i) {
-    const glm::dvec2 d = seen.corners[std::size_t(i)] - at[std::size_t(i)];
-    result(2 * i) = d.x;
-    result(2 * i + 1) = d.y;
+  static std::vector<tracking::TagView> views_of(const OneTag& one) {
+    std::vector<tracking::TagView> views;
+    for (const std::size_t s : one.sightings) {
+      const TagSighting& seen = one.walk.sightings[s];
+      views.push_back({one.places.cameras[seen.picture], seen.corners,
+                       seen.variance_px2 + one.model_error_px * one.model_error_px});
+    }
+    return views;
   }
-  return result;
-}
-
-double variance_of(const OneTag& one, std::size_t sighting) {
-  return one.walk.sightings[sighting].variance_px2 + one.model_error_px * one.model_error_px;
-}
-
-double cost_of(const OneTag& one, std::size_t sighting, const glm::dmat4& place) {
-  const Place r = off(one, sighting, place);
-  const double scale = 8 * moved_loss * moved_loss;
-  const double squares = r.dot(r) / variance_of(one, sighting);
-  return std::isfinite(squares) ? scale * std::log(1 + squares / scale) : HUGE_VAL;
-}
+};
 
 using Range = std::pair<std::size_t, std::size_t>;  // of OneTag::sightings
 
-double cost_of(const OneTag& one, const Range& range, const glm::dmat4& place) {
-  double sum = 0;
-  for (std::size_t i = range.first; i < range.second; ++i)
-    sum += cost_of(one, one.sightings[i], place);
-  return sum;
+std::span<const tracking::TagView> views_in(const OneTag& one, const Range& range) {
+  return std::span(one.views).subspan(range.first, range.second - range.first);
 }
 
-// Some of the sightings, with weights of the robust loss and derivatives by central differences.
-struct PlaceProblem {
-  const OneTag& one;
-  const Range& range;
-
-  tracking::NormalEquations<6> evaluate(const glm::dmat4& place) const {
-    constexpr double small = 1e-6, scale = 8 * moved_loss * moved_loss;
-    tracking::NormalEquations<6> sum;
-    sum.cost = cost_of(one, range, place);
-    for (std::size_t i = range.first; i < range.second && std::isfinite(sum.cost); ++i) {
-      const std::size_t s = one.sightings[i];
-      cv::Matx<double, 8, 6> by;
-      for (int c = 0; c < 6; ++c) {
-        cv::Vec6d motion = cv::Vec6d::all(0);
-        motion[c] = small;
-        const Place slope =
-            (off(one, s, moved(place, -motion)) - off(one, s, moved(place, motion))) *
-            (1 / (2 * small));
-        for (int k = 0; k < 8; ++k) by(k, c) = slope(k);
-      }
-      const Place r = off(one, s, place);
-      const double variance = variance_of(one, s);
-      sum.add(by, r, 1 / (variance * (1 + r.dot(r) / variance / scale)));
-    }
-    return sum;
-  }
-
-  // Moves a place by a rotation and a shift along the tag's own axes.
-  static glm::dmat4 moved(const glm::dmat4& place, const cv::Matx61d& by) {
-    glm::dmat4 motion(tracking::rotation_by({by(0), by(1), by(2)}));
-    motion[3] = glm::dvec4(by(3), by(4), by(5), 1);
-    return place * motion;
-  }
-};
+double cost_of(const OneTag& one, const Range& range, const glm::dmat4& place) {
+  return tracking::place_cost(one.lens, views_in(one, range), place, one.places.sizes_m[one.tag]);
+}
 
 glm::dmat4 fitted_place(const OneTag& one, const Range& range, const glm::dmat4& place) {
-  const tracking::LeastSquaresLimits limits{.most_trials = 12, .settled_gain = 1e-6};
-  return tracking::least_squares(PlaceProblem{one, range}, place, limits).at;
+  return tracking::fitted_place(one.lens, views_in(one, range), place, one.places.sizes_m[one.tag]);
+}
+
+tracking::CornerPixels off(const OneTag& one, std::size_t view, const glm::dmat4& place) {
+  return tracking::corners_off(one.lens, one.views[view], place, one.places.sizes_m[one.tag]);
 }
 
 // A walk that is cut in two: a place before and one after.
@@ -142,8 +93,11 @@ Cut best_cut(const OneTag& one, const glm::dmat4& place) {
 double moved_px(const OneTag& one, const Cut& cut) {
   double sum = 0;
   for (std::size_t i = 0; i < one.sightings.size(); ++i) {
-    const Place d = off(one, one.sightings[i], cut.before) - off(one, one.sightings[i], cut.after);
-    sum += std::sqrt(d.dot(d) / 4);
+    const auto before = off(one, i, cut.before), after = off(one, i, cut.after);
+    double squares = 0;
+    for (std::size_t k = 0; k < 4; ++k)
+      squares += glm::dot(before[k] - after[k], before[k] - after[k]);
+    sum += std::sqrt(squares / 4);
   }
   return sum / double(one.sightings.size());
 }
@@ -160,11 +114,10 @@ Suspect looked_at(const OneTag& one) {
   const std::size_t count = one.sightings.size();
   std::size_t disagree = 0;
   double most_gates = 0, gate_px = 0;  // the gate's mean
-  for (const std::size_t s : one.sightings) {
-    const Place r = off(one, s, place);
-    const double px = std::sqrt(r.dot(r) / 4);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double px = std::sqrt(tracking::squares_of(off(one, i, place)) / 4);
     suspect.moved.off_px = std::max(suspect.moved.off_px, px);
-    const double gate = sighting_gate_px(one.walk.sightings[s], one.model_error_px);
+    const double gate = sighting_gate_px(one.walk.sightings[one.sightings[i]], one.model_error_px);
     most_gates = std::max(most_gates, px / gate);
     gate_px += gate / double(count);
     if (px > gate) ++disagree;

@@ -8,6 +8,7 @@
 
 #include "daemon/tracking/least_squares.hpp"
 #include "daemon/tracking/pose_starts.hpp"
+#include "daemon/tracking/tag_place.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 
@@ -376,18 +377,6 @@ double sighting_gate_px(const TagSighting& sighting, double model_error_px) {
   constexpr double least_px = 1, sigmas = 4.5;
   return std::max(least_px,
                   sigmas * std::sqrt(sighting.variance_px2 + model_error_px * model_error_px));
-}
-
-tracking::CornerPixels projected_tag(const PinholeIntrinsics& lens,
-                                     const tracking::CameraFromWorld& camera,
-                                     const glm::dmat4& world_from_tag, double size_m) {
-  tracking::CornerPixels pixels;
-  for (std::size_t corner = 0; corner < 4; ++corner) {
-    const glm::dvec3 world(world_from_tag * glm::dvec4(tracking::tag_corner(size_m, corner), 1));
-    const glm::dvec3 x = camera.rotation * world + camera.translation;
-    pixels[corner] = x.z > 1e-6 ? distort(lens, {x.x / x.z, x.y / x.z}) : glm::dvec2(HUGE_VAL);
-  }
-  return pixels;
 }
 
 double tag_squares_px2(const TagSighting& sighting, const PinholeIntrinsics& lens,

@@ -89,11 +89,6 @@ double chi_square(const TagWalk& walk, const TagsAndLens& at, const TagAdjustmen
 // standard deviations.
 double sighting_gate_px(const TagSighting& sighting, double model_error_px);
 
-// Returns where a tag's corners are projected; infinite coordinates if one is behind the camera.
-tracking::CornerPixels projected_tag(const PinholeIntrinsics& lens,
-                                     const tracking::CameraFromWorld& camera,
-                                     const glm::dmat4& world_from_tag, double size_m);
-
 // Returns the sum of squared distances of the four corners, px^2.
 double tag_squares_px2(const TagSighting& sighting, const PinholeIntrinsics& lens,
                        const TagPlaces& places);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "daemon/tracking/pose_starts.hpp"
+#include "daemon/tracking/tag_place.hpp"
 
 namespace previz::calibrate {
 namespace {

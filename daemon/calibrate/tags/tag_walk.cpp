@@ -1,10 +1,14 @@
 #include "daemon/calibrate/tags/tag_walk.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <bit>
 #include <charconv>
 #include <sstream>
 
 #include "daemon/calibrate/lens/length.hpp"
+#include "daemon/tracking/other_tags.hpp"
 #include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
 
@@ -13,6 +17,7 @@ namespace {
 
 constexpr std::size_t pictures_of_a_session = 150;
 constexpr std::size_t every_of_a_walk = 5;
+constexpr std::size_t most_sampled = 5;  // pictures, to say what they hold in place of the tags
 
 std::size_t stride_of(const PictureSource& source, const WalkOptions& options) {
   if (options.every > 0) return std::size_t(options.every);
@@ -41,10 +46,13 @@ struct SeenTag {
   TagSighting sighting;
 };
 
+// `doubles` counts the pictures in which a tag is more than once.
 std::vector<SeenTag> usable_tags(const std::vector<tracking::TagDetection>& detections,
-                                 const WalkOptions& options) {
+                                 const WalkOptions& options, std::map<int, int>& doubles) {
   std::map<int, int> times;
   for (const tracking::TagDetection& tag : detections) ++times[tag.id];
+  for (const auto& [id, count] : times)
+    if (count > 1) ++doubles[id];
   std::vector<SeenTag> tags;
   for (const tracking::TagDetection& tag : detections) {
     const bool carried = std::ranges::find(options.left_out, tag.id) != options.left_out.end();
@@ -75,6 +83,14 @@ void number_tags(const std::vector<SeenTag>& seen, const TagSizes& sizes, TagWal
     walk.sightings.back().tag =
         std::size_t(std::ranges::lower_bound(walk.ids, tag.id) - walk.ids.begin());
   }
+}
+
+// Says that no picture shows a tag that can be measured, and what they show instead.
+std::string nothing_seen(std::size_t looked_at, const std::vector<FramePtr>& sampled,
+                         const ResponseCurve& response, const std::string& family) {
+  const std::string instead = tracking::other_tags(sampled, family, response);
+  return fmt::format("none of the {} pictures examined shows a tag of {} that can be measured{}{}",
+                     looked_at, family, instead.empty() ? "" : "; ", instead);
 }
 
 }  // namespace
@@ -113,13 +129,18 @@ TagWalk gather_walk(PictureSource& source, const PinholeIntrinsics& lens,
   tracking::TagDetector detector(options.detector, lens, response);
   TagWalk walk;
   std::vector<SeenTag> seen;
+  std::map<int, int> doubles;
+  std::vector<FramePtr> sampled;
   std::size_t index = 0, looked_at = 0;
   const std::size_t stride = stride_of(source, options);
   for (auto picture = source.next(); picture; picture = source.next()) {
     if (index++ % stride) continue;
     ++looked_at;
     insist_on_size(*picture, lens);
-    std::vector<SeenTag> tags = usable_tags(detector.detect(*picture->frame, 1), options);
+    const auto detections = detector.detect(*picture->frame, 1);
+    if (detections.empty() && std::has_single_bit(looked_at) && sampled.size() < most_sampled)
+      sampled.push_back(picture->frame);
+    std::vector<SeenTag> tags = usable_tags(detections, options, doubles);
     if (tags.empty()) continue;
     for (SeenTag& tag : tags) {
       tag.sighting.picture = walk.pictures.size();
@@ -127,9 +148,13 @@ TagWalk gather_walk(PictureSource& source, const PinholeIntrinsics& lens,
     }
     walk.pictures.push_back(picture->name);
   }
+  for (const auto& [id, pictures] : doubles)
+    report(
+        fmt::format("tag {} is there twice in {} of the pictures: printed twice, or shown on a "
+                    "screen; those pictures are used without it: remove or cover one of the two",
+                    id, pictures));
   if (seen.empty())
-    throw Error("none of the " + std::to_string(looked_at) + " pictures examined shows a tag of " +
-                options.detector.family + " that can be measured");
+    throw Error(nothing_seen(looked_at, sampled, response, options.detector.family));
   number_tags(seen, options.sizes, walk);
   report(std::to_string(looked_at) + " of " + std::to_string(index) + " pictures examined, " +
          std::to_string(walk.pictures.size()) + " show tags: " + tracking::tags_in_words(walk.ids));

@@ -34,9 +34,9 @@ struct WalkOptions {
 };
 
 // Returns the tags that can be measured in the pictures; a tag that is in one picture twice is left
-// out of that picture. `report` gets lines for the reader of the result. Throws previz::Error if
-// the pictures are not of the lens's size, if the size of a seen tag is not known, and if no
-// picture shows a tag.
+// out of that picture, and named. `report` gets lines for the reader of the result. Throws
+// previz::Error if the pictures are not of the lens's size, if the size of a seen tag is not known,
+// and if no picture shows a tag, with what they show instead.
 TagWalk gather_walk(PictureSource& source, const PinholeIntrinsics& lens,
                     const ResponseCurve& response, const WalkOptions& options,
                     const std::function<void(const std::string&)>& report);

@@ -118,6 +118,7 @@ TEST_F(UntrackedTake, PosesAreFoundWithoutRendering) {
   EXPECT_THAT(said_.str(), HasSubstr("3 of 4 frames tracked, corners off by "));
   EXPECT_THAT(said_.str(), HasSubstr("tag 3: seen in 3 frames, used for the camera in 3\n"));
   EXPECT_THAT(said_.str(), HasSubstr("1 without a pose, e.g. frame 2: "));
+  EXPECT_THAT(said_.str(), Not(HasSubstr("warning")));
   std::istringstream lines(session::read_file(*options.out));
   int count = 0;
   for (std::string line; std::getline(lines, line); ++count) {
@@ -135,6 +136,19 @@ TEST_F(UntrackedTake, PosesAreFoundWithoutRendering) {
     EXPECT_EQ(json["tags"], nlohmann::json({3}));
   }
   EXPECT_EQ(count, frames);
+}
+
+// What is judged is shown with the tracker's tests (PoseJudgement.*).
+TEST_F(UntrackedTake, SaysWhatDoesNotHold) {
+  TrackOptions options;
+  options.session = session_;
+  options.set_file = directory_ / "other.toml";
+  const std::string text = session::open_session(session_).info.set_text;
+  session::replace_file(*options.set_file, "[tracking]\nfamily = \"tag25h9\"\n" + text);
+  EXPECT_EQ(track_take(options, said_), 1);
+  EXPECT_THAT(said_.str(), HasSubstr("warning: no tag of tag25h9 in any picture: the pictures hold "
+                                     "tags of tag36h11: tag 3; write tracking.family"));
+  EXPECT_THAT(said_.str(), Not(HasSubstr("tag 3: seen")));
 }
 
 // It was refused: "track.jsonl has no pose".

@@ -278,6 +278,16 @@ TEST_F(Check, TakesSetAndCalibrationOfASession) {
   expect_said("tracking is off: only a session with recorded poses can be used");
 }
 
+// It said that nothing is virtual, and nothing of the tracking.
+TEST_F(Check, SaysThatATakeCannotBeTracked) {
+  write_take(
+      "[set]\nname = 'lost'\n[lighting]\nmode = 'sources'\n[[tag]]\nid = 3\nsize_m = 0.1\n"
+      "position_m = [0, 0, 0]\n",
+      {"observer", "light"});
+  ASSERT_EQ(check_file("take"), 0) << said_;
+  expect_said("tracking: none of 1 frame looked at has a pose (no tag in the picture)");
+}
+
 // `render` refuses it later.
 TEST_F(Check, ATakeWithoutLightIsAProblem) {
   write_take("[set]\nname = 'dark'\n[tracking]\nenabled = false\n", {"observer"});

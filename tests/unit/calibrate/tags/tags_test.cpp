@@ -399,6 +399,38 @@ TEST(TagSurvey, AChainOfPairsIsNamed) {
   EXPECT_EQ(missing_of_tags(survey, {}, 0).size(), 7u);
 }
 
+// Tag 2 lies there twice in the last pictures, which keep the others.
+TEST_F(TagCommand, NamesATagThatIsThereTwice) {
+  for (int i = 0; i < 2; ++i) {
+    const std::string file =
+        (folder / "walk" / (std::to_string(10000 + i).substr(1) + ".png")).string();
+    test::TagScene scene;
+    scene.lens = test::plain_lens(640, 480, 600);
+    scene.tags = tags_at(i);
+    scene.tags.push_back(test::flat_tag(2, 0.08, {-0.1, -0.1, 0}));
+    const double angle = (-40 + 80.0 * i / (pictures - 1)) * degree;
+    scene.world_from_camera = test::camera_looking(
+        {0.75 * std::sin(angle), -0.75 * std::cos(angle), 0.55 + 0.1 * (i % 3)}, {0.02, 0.02, 0});
+    std::mt19937 random(5);
+    const Frame frame =
+        test::expose(test::render(scene), {.full_well_e = 20000, .response = {}}, random);
+    cv::imwrite(file, cv::Mat(frame.height, frame.width, CV_8UC3,
+                              const_cast<std::uint8_t*>(frame.bytes.data())));
+  }
+  options.force = true;
+  const std::string words = said();
+  EXPECT_THAT(words, HasSubstr("tag 2 is there twice in 2 of the pictures: printed twice"));
+  EXPECT_THAT(words, HasSubstr("tag 2: 12 pictures"));
+  EXPECT_THAT(words, HasSubstr("tag 3: 14 pictures"));
+}
+
+TEST_F(TagCommand, SaysWhatThePicturesHoldInPlaceOfTags) {
+  options.family = "tag25h9";
+  EXPECT_THAT(said(), AllOf(HasSubstr("none of the 14 pictures examined shows a tag of tag25h9"),
+                            HasSubstr("the pictures hold tags of tag36h11: tags 1, 2, 3 and 4"),
+                            HasSubstr("--family tag36h11")));
+}
+
 TEST_F(TagCommand, SaysWhatItLacks) {
   options.sizes = "";
   EXPECT_THAT(said(), HasSubstr("the size of tags 2, 3 and 4 is unknown: give --size"));

@@ -1,0 +1,373 @@
+#include "daemon/tracking/pose_judgement.hpp"
+
+#include <apriltag/apriltag.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <optional>
+#include <utility>
+
+#include "daemon/tracking/other_tags.hpp"
+#include "daemon/tracking/tag_family.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::tracking {
+namespace {
+
+constexpr std::size_t kMostKept = 8;  // frames of a kind
+constexpr std::size_t kMostPictures = 5;
+constexpr double kDoubtfulShare = 0.05;  // of the tracked frames
+// Lenses and paper are off their models by as much in a good set (calibrate::TagAdjustment).
+constexpr double kWorthAWordPx = 0.3;
+constexpr double kDeviate = 4.753;  // of the normal distribution: one in a million is above
+constexpr double kLeastGain = 4;    // by which a cause lessens the residuals' mean square
+constexpr double kDecisive = 10;    // difference of Bayesian information criteria
+constexpr double kWorthAFactor = 0.004;
+constexpr double kAgreesPx = 0.5;      // of tags that disagreed before
+constexpr std::size_t kLeastTags = 3;  // of two, one that moved away looks like a factor of sizes
+constexpr double kSameFactor = 0.015;
+constexpr double kLeastVariancePx2 = 0.03 * 0.03;  // of a corner, as of a pose's fit
+
+// Returns what a chi-square exceeds once in a million times (Wilson and Hilferty 1931).
+double rare_chi_square(int degrees) {
+  const double spread = 2.0 / (9.0 * degrees);
+  return degrees * std::pow(1 - spread + kDeviate * std::sqrt(spread), 3);
+}
+
+// An explanation of residuals, by a model with further unknowns.
+struct Cause {
+  double chi_square = 0, rms_px = 0;
+  int residuals = 0, degrees_of_freedom = 0, unknowns = 0;  // unknowns beside the poses
+  double value = 0;                                         // factor or px
+
+  double mean_square() const { return chi_square / std::max(1, degrees_of_freedom); }
+  // Bayesian information criterion of residuals of unknown variance (Schwarz 1978).
+  double criterion() const {
+    return residuals * std::log(chi_square / residuals) + unknowns * std::log(double(residuals));
+  }
+};
+
+void add(Cause& all, std::size_t tags, double chi_square, int degrees, double rms_px) {
+  all.residuals += int(8 * tags);
+  all.degrees_of_freedom += degrees;
+  all.chi_square += chi_square;
+  all.rms_px += rms_px * rms_px * double(tags);  // see mean_of()
+}
+
+Cause mean_of(Cause all) {
+  all.rms_px = std::sqrt(8 * all.rms_px / std::max(1, all.residuals));
+  return all;
+}
+
+using Frames = std::vector<JudgedFrame>;
+// Changes what is believed about a frame by a factor.
+using Change = std::function<void(double factor, std::vector<TagObservation>&, PinholeIntrinsics&)>;
+
+void scale_sizes(double factor, std::vector<TagObservation>& tags, PinholeIntrinsics& /*lens*/) {
+  for (TagObservation& tag : tags) tag.size_m *= factor;
+}
+
+void scale_focal_length(double factor, std::vector<TagObservation>& /*tags*/,
+                        PinholeIntrinsics& lens) {
+  lens.fx *= factor;
+  lens.fy *= factor;
+}
+
+// Returns the best pose of the frame under a change.
+std::optional<FittedPose> best_pose(const std::vector<TagObservation>& tags,
+                                    const PinholeIntrinsics& lens) {
+  const std::vector<FittedPose> poses = solve_joint_pose(tags, lens, {});
+  return poses.empty() ? std::nullopt : std::optional(poses.front());
+}
+
+// Returns how badly the frames fit, with a loss that grows slowly, so that a scan finds its way.
+double misfit(const Frames& frames, const PinholeIntrinsics& lens, const Change& change,
+              double factor) {
+  constexpr double scale_px = 0.1, outside_px = 100;
+  double sum = 0;
+  for (const JudgedFrame& frame : frames) {
+    std::vector<TagObservation> tags = frame.tags;
+    PinholeIntrinsics changed = lens;
+    change(factor, tags, changed);
+    const auto pose = best_pose(tags, changed);
+    for (const TagObservation& tag : tags) {
+      const double off = pose ? tag_error_px(tag, pose->pose, changed) : outside_px;
+      sum += std::log1p(std::pow(std::min(off, outside_px) / scale_px, 2));
+    }
+  }
+  return sum;
+}
+
+// Finds the factor between 0.4 and 2.5 that fits best: by a scan, then by halving its step.
+double best_factor(const Frames& frames, const PinholeIntrinsics& lens, const Change& change) {
+  constexpr double step = 0.025, finest = 2e-5;
+  double best = 0, least = misfit(frames, lens, change, 1);
+  const auto look_at = [&](double exponent) {
+    const double value = misfit(frames, lens, change, std::exp(exponent));
+    if (value >= least) return false;
+    least = value;
+    best = exponent;
+    return true;
+  };
+  for (int i = -36; i <= 36; ++i)
+    if (i != 0) look_at(i * step);
+  for (double by = step / 2; by > finest; by /= 2)
+    while (look_at(best - by) || look_at(best + by)) {
+    }
+  return std::exp(best);
+}
+
+std::optional<Cause> cause_by_factor(const Frames& frames, const PinholeIntrinsics& lens,
+                                     const Change& change) {
+  Cause cause;
+  cause.unknowns = 1;
+  cause.value = best_factor(frames, lens, change);
+  if (std::abs(cause.value - 1) < kWorthAFactor) return std::nullopt;
+  for (const JudgedFrame& frame : frames) {
+    std::vector<TagObservation> tags = frame.tags;
+    PinholeIntrinsics changed = lens;
+    change(cause.value, tags, changed);
+    const auto start = best_pose(tags, changed);
+    const auto fit = start ? refitted_pose(tags, changed, start->pose) : std::nullopt;
+    if (!fit) return std::nullopt;
+    add(cause, tags.size(), fit->chi_square, fit->degrees_of_freedom, fit->rms_px);
+  }
+  --cause.degrees_of_freedom;
+  return mean_of(cause);
+}
+
+std::optional<Cause> cause_by_rows(const Frames& frames, const PinholeIntrinsics& lens,
+                                   bool also_moves) {
+  Cause cause;
+  for (const JudgedFrame& frame : frames) {
+    const auto fit = fit_of_rows(frame.tags, lens, frame.fit.pose, also_moves);
+    if (!fit) return std::nullopt;
+    add(cause, frame.tags.size(), fit->chi_square, fit->degrees_of_freedom, fit->rms_px);
+    cause.unknowns += also_moves ? 6 : 3;
+    cause.value = std::max(cause.value, fit->moved_px);
+  }
+  return mean_of(cause);
+}
+
+std::string percent(double factor) {
+  return fmt::format("{:.1f} %", 100 * factor);
+}
+
+// Says that the sizes may be of all that is printed, where they should be of its border.
+std::string border_words(const std::string& family, double factor) {
+  const TagFamily made = make_tag_family(family);
+  const double inside = double(made->width_at_border) / made->total_width;
+  if (std::abs(factor / inside - 1) > kSameFactor) return "";
+  return fmt::format(
+      "; that is {} of the {} cells across a print of {}: size_m is the side of the inner square, "
+      "where black and white meet, not of the outer edge",
+      made->width_at_border, made->total_width, family);
+}
+
+std::string size_words(const Frames& frames, const std::string& family, double factor) {
+  const TagObservation& tag = frames.front().tags.front();
+  return fmt::format(
+             "all tags measure {} of their size_m, as prints that were scaled to a page do: "
+             "measure one, "
+             "and correct the sizes (tag {}: {:.4g} m in place of {:.4g} m)",
+             percent(factor), tag.id, factor * tag.size_m, tag.size_m) +
+         border_words(family, factor);
+}
+
+std::string focal_words(const Frames& /*frames*/, const std::string& /*family*/, double factor) {
+  return fmt::format(
+      "the lens's fx and fy are {} too {}, as after a zoom or with another lens's file: calibrate "
+      "the lens as it was",
+      percent(std::abs(1 - 1 / factor)), factor > 1 ? "small" : "large");
+}
+
+std::string rows_words(const Frames& /*frames*/, const std::string& /*family*/, double moved_px) {
+  return fmt::format(
+      "the rows of a picture do not fit one pose, as with a rolling shutter: the tags move by "
+      "{:.1f} px while its height is read; move the camera more slowly, or use one with a global "
+      "shutter or a faster readout",
+      moved_px);
+}
+
+// Returns the likely cause of the frames' residuals.
+std::string cause_words(const Frames& frames, const PinholeIntrinsics& lens,
+                        const std::string& family) {
+  using Words = std::string (*)(const Frames&, const std::string&, double);
+  Cause none;
+  for (const JudgedFrame& frame : frames)
+    add(none, frame.tags.size(), frame.fit.chi_square, frame.fit.degrees_of_freedom, 0);
+  std::vector<std::pair<Cause, Words>> causes;
+  const auto offer = [&](const std::optional<Cause>& cause, Words words) {
+    if (cause && kLeastGain * cause->mean_square() < none.mean_square())
+      causes.emplace_back(*cause, words);
+  };
+  offer(cause_by_factor(frames, lens, scale_sizes), size_words);
+  offer(cause_by_factor(frames, lens, scale_focal_length), focal_words);
+  const auto turning = cause_by_rows(frames, lens, false),
+             moving = cause_by_rows(frames, lens, true);
+  const bool also_moves =
+      moving && (!turning || moving->criterion() < turning->criterion() - kDecisive);
+  offer(also_moves ? moving : turning, rows_words);
+  std::ranges::sort(causes, {}, [](const auto& one) { return one.first.criterion(); });
+  std::string text;
+  for (const auto& [cause, words] : causes)
+    if (cause.criterion() < causes.front().first.criterion() + kDecisive)
+      add_to_list(
+          text,
+          words(frames, family, cause.value) + fmt::format(" ({:.2f} px remain)", cause.rms_px),
+          "; or ");
+  return text.empty() ? "the lens, the [[tag]] tables and how flat the tags are do not fit "
+                        "together: `previzd calibrate tags` measures where the tags are"
+                      : text;
+}
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+}  // namespace
+
+PoseJudgement::PoseJudgement(const set::Tracking& tracking, const ObserverCalibration& camera)
+    : tracking_(tracking), camera_(camera) {}
+
+void PoseJudgement::add(const FramePtr& frame, const Track& track) {
+  ++frames_;
+  std::map<int, int> times;
+  for (const int id : track.seen_tags) ++times[id];
+  for (const auto& [id, count] : times)
+    if (count > 1) ++doubles_[id];
+  if (!times.empty()) {
+    has_seen_a_tag_ = true;
+    without_tags_.clear();
+  }
+  if (tracking_.enabled && !has_seen_a_tag_ && std::has_single_bit(frames_) &&
+      without_tags_.size() < kMostPictures)
+    without_tags_.push_back(frame);
+
+  std::vector<TagObservation> tags;  // without those that are there twice
+  std::ranges::copy_if(track.observations, std::back_inserter(tags),
+                       [&](const TagObservation& tag) { return times[tag.id] == 1; });
+  if (!track.pose) {
+    if (tags.size() >= kLeastTags && track.candidates.empty()) {
+      ++at_odds_;
+      if (lost_.size() < kMostKept) lost_.push_back({std::move(tags), {}, {}});
+    }
+    return;
+  }
+  ++tracked_;
+  count(track, tags);
+  const std::vector<int>& used = track.pose->tags;
+  std::erase_if(tags, [&](const TagObservation& tag) {
+    return std::ranges::find(used, tag.id) == used.end();
+  });
+  if (tags.empty()) return;
+  const CameraFromWorld pose = camera_from_world(track.pose->world_from_camera);
+  const auto fit = refitted_pose(tags, camera_.intrinsics, pose);
+  if (!fit) return;
+  ++judged_;
+  const double expected = expected_rms_px(tags, fit->degrees_of_freedom);
+  if (fit->chi_square <= rare_chi_square(fit->degrees_of_freedom) ||
+      fit->rms_px <= std::hypot(expected, kWorthAWordPx))
+    return;
+  ++doubtful_;
+  rms_px_.push_back(fit->rms_px);
+  expected_px_.push_back(expected);
+  worst_.push_back({std::move(tags), pose, *fit});
+  std::ranges::sort(worst_, std::greater(),
+                    [](const JudgedFrame& one) { return one.fit.chi_square; });
+  if (worst_.size() > kMostKept) worst_.pop_back();
+}
+
+void PoseJudgement::count(const Track& track, const std::vector<TagObservation>& tags) {
+  const std::vector<int>& used = track.pose->tags;
+  for (const TagObservation& tag : tags) {
+    Seen& seen = seen_[tag.id];
+    ++seen.frames;
+    if (std::ranges::find(used, tag.id) != used.end()) {
+      ++seen.used;
+      continue;
+    }
+    if (seen.views.size() >= kMostKept) continue;
+    double variance = kLeastVariancePx2;
+    for (std::size_t i = 0; i < 8; ++i) variance += tag.covariance[9 * i] / 8;
+    seen.views.push_back({camera_from_world(track.pose->world_from_camera), tag.corners, variance});
+  }
+  for (const UnusableTag& tag : track.unusable) ++seen_[tag.id].troubles[tag.why];
+}
+
+std::vector<std::string> PoseJudgement::doubts_about_unused() const {
+  std::vector<std::string> all;
+  for (const auto& [id, seen] : seen_) {
+    const std::size_t left_out = seen.frames - seen.used;
+    const auto tag = std::ranges::find(tracking_.tags, id, &set::Tag::id);
+    if (left_out <= seen.used || tag == tracking_.tags.end()) continue;
+    all.push_back(fmt::format("tag {} is in {} tracked {} and used for the camera in {}: it {}", id,
+                              seen.frames, seen.frames == 1 ? "frame" : "frames", seen.used,
+                              why_elsewhere(*tag, tracking_.tags, camera_.intrinsics, seen.views)));
+  }
+  return all;
+}
+
+std::string PoseJudgement::why_unusable(int id) const {
+  const auto seen = seen_.find(id);
+  if (seen == seen_.end() || seen->second.frames > 0) return "";
+  std::string why;
+  for (const auto& [trouble, frames] : seen->second.troubles)
+    add_to_list(why, fmt::format("{} in {} {}", trouble, frames, frames == 1 ? "frame" : "frames"),
+                "; ");
+  return why;
+}
+
+std::string PoseJudgement::doubt_about_residuals() const {
+  if (doubtful_ == 0 || double(doubtful_) < kDoubtfulShare * double(judged_)) return "";
+  return fmt::format(
+      "corners of {} of {} tracked frames are off by {:.2f} px where {:.2f} px is to be expected "
+      "(medians): {}",
+      doubtful_, tracked_, median_of(rms_px_), median_of(expected_px_),
+      cause_words(worst_, camera_.intrinsics, tracking_.family));
+}
+
+std::string PoseJudgement::doubt_about_lost() const {
+  if (lost_.empty()) return "";
+  const auto size = cause_by_factor(lost_, camera_.intrinsics, scale_sizes);
+  const auto focal = cause_by_factor(lost_, camera_.intrinsics, scale_focal_length);
+  const bool is_focal = focal && (!size || focal->rms_px < size->rms_px);
+  const auto& cause = is_focal ? focal : size;
+  if (!cause || !(cause->rms_px < kAgreesPx)) return "";
+  return fmt::format("tags disagree in {} of {} frames, and agree within {:.2f} px if {}", at_odds_,
+                     frames_, cause->rms_px,
+                     (is_focal ? focal_words : size_words)(lost_, tracking_.family, cause->value));
+}
+
+std::string PoseJudgement::doubt_about_doubles() const {
+  std::string text;
+  for (const auto& [id, count] : doubles_)
+    add_to_list(text, fmt::format("tag {} is there twice in {} {}", id, count,
+                                  count == 1 ? "frame" : "frames"));
+  if (text.empty()) return "";
+  return text +
+         ": printed twice, or shown on a screen; only one that is where the other tags have "
+         "it is used: remove or cover the other";
+}
+
+std::string PoseJudgement::doubt_about_none() const {
+  if (has_seen_a_tag_ || without_tags_.empty()) return "";
+  const std::string instead = other_tags(without_tags_, tracking_.family, camera_.response);
+  return instead.empty() ? "" : "no tag of " + tracking_.family + " in any picture: " + instead;
+}
+
+std::vector<std::string> PoseJudgement::doubts() const {
+  std::vector<std::string> all{doubt_about_none(), doubt_about_residuals(), doubt_about_lost(),
+                               doubt_about_doubles()};
+  for (std::string& doubt : doubts_about_unused()) all.push_back(std::move(doubt));
+  std::erase(all, "");
+  return all;
+}
+
+}  // namespace previz::tracking

@@ -1,0 +1,78 @@
+// Judges the tracking of a take by what its pictures show: residuals, tags that are not used, and
+// pictures without tags.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "daemon/set/set.hpp"
+#include "daemon/tracking/joint_pose.hpp"
+#include "daemon/tracking/tag_place.hpp"
+#include "daemon/tracking/tracker.hpp"
+#include "drivers/calibration.hpp"
+#include "drivers/frame.hpp"
+
+namespace previz::tracking {
+
+// A frame whose tags are looked at again.
+struct JudgedFrame {
+  std::vector<TagObservation> tags;
+  CameraFromWorld pose;  // if it was tracked
+  FittedPose fit;        // of all tags, by the picture's noise alone; if it was tracked
+};
+
+// Is given every frame of a take, or some of them, and keeps at most a few dozen. The frames of a
+// tracker that looks at no pictures have no tags, and are not judged.
+class PoseJudgement {
+ public:
+  PoseJudgement(const set::Tracking& tracking, const ObserverCalibration& camera);
+
+  void add(const FramePtr& frame, const Track& track);
+
+  // Returns what does not hold, in sentences of their own, with the likely cause of each and what
+  // to do; empty if all is well. Takes up to some seconds.
+  //   residuals  The corners of at least one in twenty tracked frames are farther off than the
+  //              noise of their picture leaves them in one picture of a million (chi-square of 8 n
+  //              - 6 degrees of freedom), and by more than kWorthAWordPx. The cause is the factor
+  //              of all sizes, the factor of the focal length, or the motion while rows are read
+  //              that takes most of it away.
+  //   tags       One that is in a picture twice; one that most tracked frames that show it cannot
+  //              use, and why (why_elsewhere()); all that disagree, if a factor of all sizes or of
+  //              the focal length makes them agree.
+  //   none       No picture shows a tag of the family: what they hold instead (other_tags()).
+  std::vector<std::string> doubts() const;
+
+  // Returns why the corners of a tag could be used in no tracked frame ("cut by the picture's
+  // border in 3 frames"); empty: they could be.
+  std::string why_unusable(int id) const;
+
+ private:
+  std::string doubt_about_residuals() const;
+  std::string doubt_about_lost() const;
+  std::string doubt_about_doubles() const;
+  std::string doubt_about_none() const;
+  std::vector<std::string> doubts_about_unused() const;
+
+  // A tag of the stage in the tracked frames.
+  struct Seen {
+    std::size_t frames = 0, used = 0;
+    std::vector<TagView> views;  // some of those that were not used
+    std::map<std::string, std::size_t> troubles;
+  };
+  void count(const Track& track, const std::vector<TagObservation>& tags);
+
+  set::Tracking tracking_;
+  ObserverCalibration camera_;
+  std::size_t frames_ = 0, tracked_ = 0, judged_ = 0, doubtful_ = 0, at_odds_ = 0;
+  std::vector<JudgedFrame> worst_;            // of the doubtful ones
+  std::vector<JudgedFrame> lost_;             // whose tags disagree
+  std::vector<double> rms_px_, expected_px_;  // of the doubtful ones
+  std::map<int, std::size_t> doubles_;        // frames in which a tag is more than once
+  std::map<int, Seen> seen_;
+  bool has_seen_a_tag_ = false;
+  std::vector<FramePtr> without_tags_;
+};
+
+}  // namespace previz::tracking
