@@ -61,5 +61,8 @@ std::unique_ptr<Footage> open_pictures(PictureSequence sequence, const ReadAs& r
 std::unique_ptr<Footage> open_pictures(std::vector<std::filesystem::path> files);
 std::unique_ptr<Footage> open_video(const std::filesystem::path& file, const ReadAs& read_as);
 std::unique_ptr<Footage> open_video(const std::filesystem::path& file);
+// One clip in several files, which follow one another without a gap.
+std::unique_ptr<Footage> open_videos(std::vector<std::filesystem::path> files,
+                                     const ReadAs& read_as);
 
 }  // namespace previz::exchange

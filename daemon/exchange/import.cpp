@@ -14,6 +14,8 @@
 #include "daemon/exchange/size_reason.hpp"
 #include "daemon/scene/assets.hpp"
 #include "daemon/set/problems.hpp"
+#include "daemon/tracking/pose_judgement.hpp"
+#include "daemon/tracking/trackers.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/nominal_rate.hpp"
@@ -76,22 +78,35 @@ struct Imported {
   std::uint64_t in_footage = 0;  // with those that are lost
   session::NominalRate rate;
   std::optional<session::Timecode> timecode;  // of the first of these frames
+  std::vector<FramePtr> to_judge;             // few
 };
+
+// A tag is looked for in one of so many frames, and in so many at most, which takes a fiftieth of
+// the time that importing them takes.
+constexpr std::uint64_t frames_for_a_judged = 100;
+constexpr std::size_t most_judged = 5;
 
 // Reads one camera's footage and writes it into the session.
 class FootageImport {
  public:
+  // The size in the set, unlike that in FRAMES.json, refuses nothing: the set may be replaced.
   FootageImport(const fs::path& description_file, const FootageDescription& footage,
-                std::optional<Size> calibrated, session::SessionWriter& writer)
-      : file_(description_file), footage_(footage), calibrated_(calibrated), writer_(writer) {}
+                std::optional<Size> calibrated, std::optional<Size> in_set,
+                session::SessionWriter& writer)
+      : file_(description_file),
+        footage_(footage),
+        calibrated_(calibrated),
+        in_set_(in_set),
+        writer_(writer) {}
 
   Imported run(std::vector<std::string>& notes) {
-    const auto pictures = footage_.video.empty()
+    const auto pictures = footage_.videos.empty()
                               ? open_pictures(footage_.pictures, footage_.read_as)
-                              : open_video(footage_.video, footage_.read_as);
+                              : open_videos(footage_.videos, footage_.read_as);
     std::vector<ImportedFrame> frames;
+    std::vector<FramePtr> to_judge;
     while (const auto picture = pictures->next()) {
-      check(*picture, *pictures);
+      check(*picture, *pictures, notes);
       const std::size_t i = picture->number;
       check_count(i, *picture);
       Frame frame;
@@ -106,6 +121,9 @@ class FootageImport {
       frame.height = picture->height;
       frame.bytes = picture->bytes;
       writer_.write(frame);
+      if (frames.size() % frames_for_a_judged == frames_for_a_judged / 2 &&
+          to_judge.size() < most_judged)
+        to_judge.push_back(std::make_shared<const Frame>(frame));
       frames.push_back({i, frame.timestamp_ns});
       if (picture->container_ns)
         farthest_ns_ = std::max(farthest_ns_, std::abs(static_cast<double>(*picture->container_ns) -
@@ -119,7 +137,7 @@ class FootageImport {
            " are described");
     for (const std::string& note : pictures->notes()) notes.push_back(note);
     note_replaced_times(notes);
-    Imported imported{std::move(frames), all, {}, {}};
+    Imported imported{std::move(frames), all, {}, {}, std::move(to_judge)};
     read_times(imported, *pictures, notes);
     return imported;
   }
@@ -132,8 +150,8 @@ class FootageImport {
           fmt::format("{}: {}.fps = {:g} takes the place of the times in {}, which are up to "
                       "{:.3g} s away: the "
                       "clip has another rate, or lacks frames; without fps its own times hold",
-                      file_.string(), footage_.source, footage_.fps, footage_.video.string(),
-                      farthest_ns_ / 1e9));
+                      file_.string(), footage_.source, footage_.fps,
+                      footage_.videos.front().string(), farthest_ns_ / 1e9));
   }
 
   // The rate and the timecode of what was imported.
@@ -172,15 +190,24 @@ class FootageImport {
                   file_.string() + " describes under " + footage_.source);
   }
 
-  void check(const Picture& picture, const Footage& pictures) {
-    if (calibrated_ &&
-        (picture.width != calibrated_->width || picture.height != calibrated_->height))
-      throw Error(picture.name + ": is " + std::to_string(picture.width) + "x" +
-                  std::to_string(picture.height) + "; " + file_.string() + ": " + footage_.source +
-                  ".intrinsics is for " + std::to_string(calibrated_->width) + "x" +
-                  std::to_string(calibrated_->height) +
-                  size_reason(picture.width, picture.height, calibrated_->width,
-                              calibrated_->height, pictures.shape()));
+  // Returns what is wrong with the picture's size, or "".
+  std::string misfit(const Picture& picture, const Footage& pictures, std::optional<Size> size,
+                     const std::string& where) const {
+    if (!size || (picture.width == size->width && picture.height == size->height)) return "";
+    return fmt::format(
+        "{}: is {}x{}; {}: {}.intrinsics is for {}x{}{}", picture.name, picture.width,
+        picture.height, where, footage_.source, size->width, size->height,
+        size_reason(picture.width, picture.height, size->width, size->height, pictures.shape()));
+  }
+
+  void check(const Picture& picture, const Footage& pictures, std::vector<std::string>& notes) {
+    if (const std::string fault = misfit(picture, pictures, calibrated_, file_.string());
+        !fault.empty())
+      throw Error(fault);
+    if (first_.empty() && !calibrated_)
+      if (const std::string fault = misfit(picture, pictures, in_set_, "the set file");
+          !fault.empty())
+        notes.push_back(fault);
     const std::string is = text(picture.format, picture.width, picture.height);
     if (first_.empty()) first_ = is;
     if (is != first_)
@@ -218,7 +245,7 @@ class FootageImport {
 
   const fs::path& file_;
   const FootageDescription& footage_;
-  std::optional<Size> calibrated_;
+  std::optional<Size> calibrated_, in_set_;
   session::SessionWriter& writer_;
   std::string first_;       // format and size of the first picture
   double farthest_ns_ = 0;  // of a frame's time from that in its container
@@ -260,6 +287,24 @@ std::uint64_t write_track(const ImportDescription& description, const fs::path& 
   return poses;
 }
 
+// Says what does not hold of the tags in these frames (tracking/pose_judgement.hpp).
+void judge_tracking(const ImportDescription& description, const std::vector<FramePtr>& frames,
+                    std::vector<std::string>& notes) {
+  if (!description.set || frames.empty()) return;
+  const set::Set& set = *description.set;
+  const std::optional<ObserverCalibration>& calibration =
+      set.observer.calibration ? set.observer.calibration : description.observer_calibration;
+  const Frame& first = *frames.front();
+  if (!calibration || !set.tracking.enabled || set.tracking.tags.empty() ||
+      calibration->intrinsics.width != first.width ||
+      calibration->intrinsics.height != first.height)
+    return;
+  const auto tracker = tracking::make_tracker(set, *calibration, nullptr);
+  tracking::PoseJudgement judgement(set.tracking, *calibration);
+  for (const FramePtr& frame : frames) judgement.add(frame, tracker->track(*frame));
+  for (const std::string& doubt : judgement.doubts()) notes.push_back("tracking: " + doubt);
+}
+
 session::SessionInfo info_of(const ImportDescription& description, const fs::path& target) {
   session::SessionInfo info;
   info.name = description.name.empty() ? target.filename().string() : description.name;
@@ -280,6 +325,7 @@ ImportReport import_session(const ImportOptions& options) {
   const ImportDescription description = read_description(options.description);
   const auto assets = description.set ? scene::assets_of(*description.set)
                                       : std::vector<std::pair<std::string, fs::path>>{};
+  const set::Set in_set = description.set.value_or(set::Set{});
   ImportReport report;
   const fs::path target = without_slash(fs::absolute(options.session));
   check_target(target);
@@ -290,17 +336,19 @@ ImportReport import_session(const ImportOptions& options) {
     for (const auto& [as_written, file] : assets) writer.add_asset(as_written, file);
     if (description.light)
       report.light_frames = FootageImport(options.description, *description.light,
-                                          size_of_pictures(description.light_calibration), writer)
+                                          size_of_pictures(description.light_calibration),
+                                          size_of_pictures(in_set.light_camera.calibration), writer)
                                 .run(report.notes)
                                 .frames.size();
-    const Imported observer =
-        FootageImport(options.description, description.observer,
-                      size_of_pictures(description.observer_calibration), writer)
-            .run(report.notes);
+    const Imported observer = FootageImport(options.description, description.observer,
+                                            size_of_pictures(description.observer_calibration),
+                                            size_of_pictures(in_set.observer.calibration), writer)
+                                  .run(report.notes);
     report.observer_frames = observer.frames.size();
     if (observer.timecode) writer.set_timecode(*observer.timecode);
     report.poses = write_track(description, options.description, observer, writer, report.notes);
     writer.close();
+    judge_tracking(description, observer.to_judge, report.notes);
   }
   report.assets = std::set<std::pair<std::string, fs::path>>(assets.begin(), assets.end()).size();
   report.bytes = size_of(draft.path());

@@ -23,17 +23,17 @@
 //                 upright as their EXIF data says. ICC profiles, PNG's cICP, gAMA and cHRM, TIFF's
 //                 chromaticities and EXIF's Adobe RGB are converted to sRGB's curve and Rec. 709's
 //                 primaries, in 16 bits.
-//   video         path of a video. Y'CbCr 4:2:2 in 8 bits, BT.709, limited range, and full grey are
-//                 kept as they are; everything else becomes RGB or grey, 8 bits, or 16 if it has
-//                 more than 8. Its tags are heeded: which side is up, the shape of a pixel (made
-//                 square), range, matrix, transfer and primaries. High dynamic range (HLG, PQ),
-//                 linear and logarithmic signals become sRGB's curve, wider primaries Rec. 709's,
-//                 in 16 bits; the curves of sRGB and television are kept. Colours that the frames
-//                 do not name are the container's; a video that does not say its colour matrix
-//                 counts as BT.709 from 720 lines on and as BT.601 below, as players do. Streams
-//                 without times (.h264, .hevc) need fps. What was found and what was assumed is
-//                 reported. A frame that cannot be decoded is lost: it is counted, and its number
-//                 is left free.
+//   video         path of a video, or a list of the files into which a camera divided one clip.
+//                 Y'CbCr 4:2:2 in 8 bits, BT.709, limited range, and full grey are kept as they
+//                 are; everything else becomes RGB or grey, 8 bits, or 16 if it has more than 8.
+//                 Its tags are heeded: which side is up, the shape of a pixel (made square), range,
+//                 matrix, transfer and primaries. High dynamic range (HLG, PQ), linear and
+//                 logarithmic signals become sRGB's curve, wider primaries Rec. 709's, in 16 bits;
+//                 the curves of sRGB and television are kept. Colours that the frames do not name
+//                 are the container's; a video that does not say its colour matrix counts as BT.709
+//                 from 720 lines on and as BT.601 below, as players do. Streams without times
+//                 (.h264, .hevc) need fps. What was found and what was assumed is reported. A frame
+//                 that cannot be decoded is lost: it is counted, and its number is left free.
 //   read_as       in place of tags that are wrong or lacking: {range: "full" or "limited", matrix
 //                 (of a video): "bt601", "bt709", "bt2020" or "smpte240m", transfer: "srgb",
 //                 "bt709", "hlg", "pq", "linear", "gamma22", "gamma28", "log100", "log316", or "as

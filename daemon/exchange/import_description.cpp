@@ -114,9 +114,15 @@ void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
   if (m.has("pictures") && m.has("video"))
     m.fail("video", "conflicts with pictures; give only one");
   if (m.has("video")) {
-    footage.video = camera.folder / m.read<std::string>("video");
-    if (std::error_code none; !fs::is_regular_file(footage.video, none))
-      m.fail("video", "names " + footage.video.string() + ", which is not a file");
+    const std::vector<std::string> names = m.value("video").is_array()
+                                               ? m.read_list<std::string>("video")
+                                               : std::vector{m.read<std::string>("video")};
+    if (names.empty()) m.fail("video", "is empty; at least one file is needed");
+    for (const std::string& name : names) {
+      footage.videos.push_back(camera.folder / name);
+      if (std::error_code none; !fs::is_regular_file(footage.videos.back(), none))
+        m.fail("video", "names " + footage.videos.back().string() + ", which is not a file");
+    }
   } else if (m.has("pictures") && m.value("pictures").is_string() &&
              is_video_name(m.read<std::string>("pictures"))) {
     m.fail("pictures", "is a video; use \"video\" instead of \"pictures\"");
@@ -137,7 +143,7 @@ void read_pictures(const CameraMembers& camera, FootageDescription& footage) {
     m.fail("pictures", "is missing; allowed: pictures, video, or csv with a column \"file\"");
   }
   footage.read_as = read_read_as(m);
-  if (footage.read_as.matrix && footage.video.empty())
+  if (footage.read_as.matrix && footage.videos.empty())
     m.fail("read_as", "has a matrix, which pictures do not have; remove it");
   for (const fs::path& picture : footage.pictures.files)
     if (std::error_code none; !fs::is_regular_file(picture, none))
@@ -149,7 +155,7 @@ void read_times(const CameraMembers& camera, FootageDescription& footage) {
   camera.exclude_both("timestamps_ns");
   const bool in_table = camera.in_table("timestamp_ns");
   const int ways = m.has("timestamps_ns") + m.has("fps") + in_table;
-  const bool is_in_video = ways == 0 && !footage.video.empty();  // as "container"
+  const bool is_in_video = ways == 0 && !footage.videos.empty();  // as "container"
   if (ways == 0 && !is_in_video)
     m.fail("fps",
            "is missing: the pictures have no times; allowed: fps, timestamps_ns, or "
@@ -168,7 +174,7 @@ void read_times(const CameraMembers& camera, FootageDescription& footage) {
   } else if (m.has("fps")) {
     footage.fps = m.read<double>("fps", plain.above(0, 1e6));
   } else if (!is_in_video && m.value("timestamps_ns").is_string()) {
-    if (m.read<std::string>("timestamps_ns") != "container" || footage.video.empty())
+    if (m.read<std::string>("timestamps_ns") != "container" || footage.videos.empty())
       m.fail("timestamps_ns", "must be a list, or \"container\" for a video");
   } else if (!is_in_video) {
     footage.timestamps_ns = m.read_list<std::int64_t>("timestamps_ns", not_negative);
@@ -259,7 +265,7 @@ void reorder(std::vector<Value>& values, const std::vector<std::size_t>& order) 
 
 void order_by_time(const Members& m, FootageDescription& footage) {
   const bool sort = m.has("sort_by_time") && m.read<bool>("sort_by_time");
-  if (sort && !footage.video.empty()) m.fail("sort_by_time", "is not possible for a video");
+  if (sort && !footage.videos.empty()) m.fail("sort_by_time", "is not possible for a video");
   auto& times = footage.timestamps_ns;
   if (sort) {
     std::vector<std::size_t> order(times.size());

@@ -23,7 +23,7 @@ inline constexpr std::int64_t latest_ns = std::numeric_limits<std::int64_t>::max
 struct FootageDescription {
   std::string source;        // "observer" or "light"
   PictureSequence pictures;  // without files: video
-  std::filesystem::path video;
+  std::vector<std::filesystem::path> videos;  // one clip
   ReadAs read_as;
   std::vector<std::int64_t> timestamps_ns;  // empty: fps, or the container's if that is 0
   double fps = 0;

@@ -204,4 +204,34 @@ TEST(ImportVideo, AnAVIFileWithoutAllTimesAsksForTheRate) {
   }
 }
 
+// A camera that begins a new file every few minutes: numbers, times and timecode go on.
+TEST(ImportVideo, AClipInSeveralFilesIsOne) {
+  Shoot shoot;
+  const std::array first_codes = {"10:00:00:00", "10:00:00:12", "10:00:00:24"};
+  std::vector<std::string> names;
+  for (int part = 0; part < 3; ++part) {
+    VideoForm form = form_of({"", "libx264", ".mov", {{"bf", "0"}}});
+    form.metadata = {{"timecode", first_codes[static_cast<std::size_t>(part)]}};
+    names.push_back(numbered("GX0", part + 1, "0042.mov"));
+    shoot.film(names.back(), form, numbered_frames(in_part * part, in_part), its_own_times);
+  }
+  shoot.json["observer"]["video"] = names;
+  const ImportReport report = shoot.import();
+  EXPECT_THAT(report.notes, Not(testing::Contains(HasSubstr("is missing, or their order"))));
+  expect_all_frames(shoot, 3 * in_part);
+  EXPECT_EQ(shoot.open()->records().back().timestamp_ns, (3 * in_part - 1) * 40'000'000);
+
+  // The last two in the wrong order.
+  std::swap(names[1], names[2]);
+  shoot.json["observer"]["video"] = names;
+  std::filesystem::remove_all(shoot.session());
+  EXPECT_THAT(shoot.import().notes,
+              testing::Contains(AllOf(
+                  HasSubstr("begins at timecode 10:00:00:24"), HasSubstr("ends at 10:00:00:12"),
+                  HasSubstr("a file between them is missing, or their order is another"))));
+  shoot.json["observer"]["video"] = Json::array();
+  std::filesystem::remove_all(shoot.session());
+  EXPECT_THAT(shoot.error(), HasSubstr("observer.video is empty"));
+}
+
 }  // namespace previz::exchange::import_joined_test

@@ -12,6 +12,7 @@
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/support/gltf_writer.hpp"
+#include "tests/support/import_fixture.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
@@ -149,6 +150,32 @@ TEST_F(UntrackedTake, SaysWhatDoesNotHold) {
   EXPECT_THAT(said_.str(), HasSubstr("warning: no tag of tag25h9 in any picture: the pictures hold "
                                      "tags of tag36h11: tag 3; write tracking.family"));
   EXPECT_THAT(said_.str(), Not(HasSubstr("tag 3: seen")));
+}
+
+// Importing looks at a frame of every hundred, from the 51st on.
+TEST_F(UntrackedTake, IsJudgedWhereItIsImported) {
+  session::Session session = session::open_session(session_);
+  const FramePtr frame = session::open_stream(session, "observer")->read(0);
+  const cv::Mat picture(height, width, frame->format == PixelFormat::gray8 ? CV_8UC1 : CV_8UC3,
+                        const_cast<std::uint8_t*>(frame->bytes.data()));
+  write_picture(directory_ / "a.png", picture);
+  session::replace_file(directory_ / "set.toml",
+                        std::string("[tracking]\nfamily = \"tag25h9\"\n") + set_text);
+  Json json = {{"set", "set.toml"},
+               {"observer",
+                {{"pictures", std::vector<std::string>(60, "a.png")},
+                 {"fps", 25},
+                 {"exposure", 1},
+                 {"intrinsics",
+                  {{"width", width},
+                   {"height", height},
+                   {"fx", 300},
+                   {"fy", 300},
+                   {"cx", 159.5},
+                   {"cy", 119.5}}}}}};
+  session::replace_file(directory_ / "FRAMES.json", json.dump());
+  EXPECT_THAT(import_session({directory_ / "FRAMES.json", directory_ / "take"}).notes,
+              testing::Contains(HasSubstr("no tag of tag25h9 in any picture: the pictures hold")));
 }
 
 // It was refused: "track.jsonl has no pose".
