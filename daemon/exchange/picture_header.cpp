@@ -144,7 +144,7 @@ std::optional<PictureSize> webp_size(std::string_view file) {
 
 // SMPTE ST 268: numbers are of the order in which the magic number stands.
 std::optional<PictureSize> dpx_size(std::string_view file) {
-  constexpr std::size_t header_bytes = 2048;
+  constexpr std::size_t header_bytes = 1664;  // file, image and orientation
   if (file.size() < header_bytes) return std::nullopt;
   const HeaderBytes bytes(file, file.starts_with('S'));
   return both(bytes.number(772, 4), bytes.number(776, 4));

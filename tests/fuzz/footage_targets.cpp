@@ -52,7 +52,7 @@ void picture(Bytes bytes) {
 constexpr Target own[] = {
     {"frames_json", "FRAMES.json", frames_json, mutate_json},
     {"frames_csv", "the table that FRAMES.json names", frames_csv},
-    {"picture", "a picture to import: PNG, JPEG or TIFF", picture},
+    {"picture", "a picture to import", picture},
 };
 
 }  // namespace footage_targets_cpp
