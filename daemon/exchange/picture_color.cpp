@@ -54,6 +54,7 @@ std::map<std::string_view, std::string_view> png_chunks(std::string_view file) {
 // The PNG's own order: cICP, iCCP, sRGB, gAMA with cHRM.
 ColorTag png_tag(std::string_view file) {
   constexpr std::size_t cicp_bytes = 4, gamma_bytes = 4, chromaticity_bytes = 32;
+  const std::string gamma_of_srgb("\0\0\xb1\x8f", gamma_bytes);  // 45455
   const auto chunks = png_chunks(file);
   const auto of = [&](const char* name, std::size_t bytes) {
     const auto found = chunks.find(name);
@@ -62,11 +63,11 @@ ColorTag png_tag(std::string_view file) {
   };
   if (const std::string cicp = of("cICP", cicp_bytes); !cicp.empty())
     return {ColorTag::Kind::cicp, cicp};
-  if (chunks.contains("iCCP")) return {};
+  if (chunks.contains("iCCP")) return {ColorTag::Kind::icc};  // packed: see color_tag_of()
   if (chunks.contains("sRGB")) return {ColorTag::Kind::srgb};
-  if (const std::string gamma = of("gAMA", gamma_bytes); !gamma.empty())
-    return {ColorTag::Kind::gamma, gamma + of("cHRM", chromaticity_bytes)};
-  return {};
+  const std::string gamma = of("gAMA", gamma_bytes), primaries = of("cHRM", chromaticity_bytes);
+  if (gamma.empty() && primaries.empty()) return {};
+  return {ColorTag::Kind::gamma, (gamma.empty() ? gamma_of_srgb : gamma) + primaries};
 }
 
 std::string exif_numbers(const Exiv2::ExifData& data, const char* key, std::size_t count) {
@@ -208,11 +209,12 @@ std::span<std::uint16_t> samples_of(cv::Mat& picture) {
 }  // namespace
 
 ColorTag color_tag_of(std::string_view content, Exiv2::Image& image) {
-  if (const ColorTag tag = png_tag(content); tag.kind != ColorTag::Kind::none) return tag;
+  const ColorTag png = png_tag(content);
+  if (png.kind != ColorTag::Kind::none && png.kind != ColorTag::Kind::icc) return png;
   if (image.iccProfileDefined()) {
     return {ColorTag::Kind::icc, text_of(image.iccProfile())};
   }
-  return exif_tag(image.exifData());
+  return png.kind == ColorTag::Kind::icc ? png : exif_tag(image.exifData());
 }
 
 // A transformation by the tables of a profile.

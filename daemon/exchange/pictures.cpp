@@ -45,7 +45,9 @@ struct Tags {
   ColorTag color;
 };
 
-Tags tags_of(const std::string& file, const std::string& content, bool is_turned) try {
+// Nothing where they are damaged; the picture may be whole.
+std::optional<Tags> tags_of(const std::string& file, const std::string& content,
+                            bool is_turned) try {
   const auto image = Exiv2::ImageFactory::open(file);
   image->readMetadata();
   Tags tags{{}, color_tag_of(content, *image)};
@@ -58,7 +60,7 @@ Tags tags_of(const std::string& file, const std::string& content, bool is_turned
     tags.orientation = exif_orientation(static_cast<int>(value)).value_or(Orientation{});
   return tags;
 } catch (const Exiv2::Error&) {
-  return {};  // damaged EXIF data says nothing; the picture may be whole
+  return std::nullopt;
 }
 
 // OpenCV before 4.13 takes planes of 16 bits for interleaved samples (its issue 29567).
@@ -165,7 +167,9 @@ class PictureFiles final : public Footage {
     const bool in_planes = is_tiff && has_deep_planes(content);
     cv::Mat image = decode(name, in_planes);
     // OpenCV turns TIFF itself.
-    const Tags tags = tags_of(name, content, is_tiff && !in_planes);
+    const auto found = tags_of(name, content, is_tiff && !in_planes);
+    if (!found) note(name, "has damaged metadata; it is used as upright, and as sRGB");
+    const Tags tags = found.value_or(Tags{});
     convert(image, tags.color, name);
     return shaped(picture_of(image, name), read_as_.orientation.value_or(tags.orientation));
   }

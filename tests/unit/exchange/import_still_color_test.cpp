@@ -290,6 +290,7 @@ TEST(ImportStills, OfPngsOwnChunksAreConverted) {
       {"linear.png", gama(1), [](double s) { return s; }, unit, "gAMA"},
       {"mac.png", gama(0.55556), [](double s) { return std::pow(s, 1 / 0.55556); }, unit, "gAMA"},
       {"p3.png", gama(0.45455) + chrm(p3), srgb, from_p3, "gAMA and cHRM"},
+      {"p3_alone.png", chrm(p3), srgb, from_p3, "cHRM"},
       {"linear709.png", chrm(rec709) + gama(1), [](double s) { return s; }, unit, "gAMA and cHRM"},
       {"hlg.png", chunk("cICP", std::string("\x09\x12\x00\x01", 4)), hlg, from_2020, "cICP"},
       {"cicp_p3.png", chunk("cICP", std::string("\x0c\x0d\x00\x01", 4)) + gama(1), srgb, from_p3,
@@ -361,6 +362,8 @@ TEST(ImportStills, WithColoursThatCannotBeConvertedAreRefusedByName) {
   EXPECT_THAT(refusal(iccp(profile_bytes(cmsCreateLab4Profile(nullptr)))),
               HasSubstr("is neither for RGB nor for grey; convert the picture to sRGB"));
   EXPECT_THAT(refusal(iccp("nonsense")), HasSubstr("its ICC profile is damaged"));
+  EXPECT_THAT(refusal(chunk("iCCP", std::string("a\0\0not packed", 13))),
+              HasSubstr("its ICC profile is damaged"));
   EXPECT_THAT(refusal(chunk("cICP", std::string("\x09\x12\x09\x01", 4))),
               HasSubstr("its cICP chunk"));
   EXPECT_THAT(refusal(chunk("cICP", std::string("\xf0\x0d\x00\x01", 4))),
