@@ -2,8 +2,8 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <ranges>
 #include <set>
+#include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -154,7 +154,8 @@ class VideoFile final : public Footage {
     if (!joints_.empty())
       notes.push_back(fmt::format(
           "{}: its times begin again at frame {}{}: recordings are joined; the times continue",
-          file_.string(), fmt::join(joints_ | std::views::take(named_joints), ", "),
+          file_.string(),
+          fmt::join(std::span(joints_).first(std::min(named_joints, joints_.size())), ", "),
           joints_.size() > named_joints ? fmt::format(" and {} more", joints_.size() - named_joints)
                                         : ""));
     for (unsigned i = 0; i < demuxer_->nb_streams; ++i)

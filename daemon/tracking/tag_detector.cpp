@@ -3,6 +3,7 @@
 #include <apriltag/apriltag.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <tuple>
 
@@ -99,6 +100,18 @@ struct TagDetector::Library {
     for (apriltag_detector_t* d : {detector, fast})
       apriltag_detector_add_family_bits(d, family.get(), std::clamp(settings.max_hamming, 0, 2));
     fast->nthreads = std::max(1, settings.threads);
+    if (fast->nthreads > 1) begin_threads();
+  }
+  // A thread of libapriltag's pool that begins while tasks are handed out reads their list while it
+  // is moved in memory (workerpool.c of 3.3), which ends the process. The pool begins with the
+  // first picture: here it is one whose tasks need no more than the list's first 8 places, and
+  // after it all threads wait for work.
+  void begin_threads() const {
+    constexpr int side = 8;
+    std::array<std::uint8_t, std::size_t{side} * side> black{};
+    image_u8_t picture{side, side, side, black.data()};
+    fast->quad_decimate = 1;
+    apriltag_detections_destroy(apriltag_detector_detect(fast, &picture));
   }
   ~Library() {
     apriltag_detector_destroy(detector);
