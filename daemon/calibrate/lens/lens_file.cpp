@@ -20,6 +20,7 @@ namespace lens_formats {
 namespace {
 
 constexpr std::size_t most_numbers = 64;
+constexpr double most_focal_px = 1e9;
 
 void add_numbers(const Tree& tree, const FilePlace& place, std::vector<double>& all) {
   if (all.size() >= most_numbers) fail_at(place, "has more than 64 numbers");
@@ -40,9 +41,11 @@ void add_numbers(const Tree& tree, const FilePlace& place, std::vector<double>& 
 
 void check_focal(const Focal& focal, const FilePlace& at) {
   for (const auto& [name, value] : {std::pair{"fx", focal.fx}, std::pair{"fy", focal.fy}})
-    if (!(value > 0))
-      fail_at(at, fmt::format("{} is {:g}; allowed: above 0; calibrate again, or correct the file",
-                              name, value));
+    if (!(value > 0 && value <= most_focal_px))
+      fail_at(at,
+              fmt::format(
+                  "{} is {:g}; allowed: above 0, to 1e9 px; calibrate again, or correct the file",
+                  name, value));
 }
 
 }  // namespace

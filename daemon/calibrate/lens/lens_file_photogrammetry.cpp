@@ -234,11 +234,13 @@ FileLens realsense_lens(const Tree& map, const Scope& scope) {
   for (const char* prefix : {"distortion.", "rs2_distortion_"})
     if (model.starts_with(prefix)) model.erase(0, std::string_view(prefix).size());
   const Size size = numbers.size("width", "height");
-  const bool is_plain = std::ranges::all_of(k, [](double value) { return value == 0; });
+  // Those of F-theta are not a pinhole's even if they are 0.
+  const bool is_plain = model.find("theta") == model.npos &&
+                        std::ranges::all_of(k, [](double value) { return value == 0; });
   const bool is_fisheye = model == "kannala_brandt4";
   if (!is_fisheye && !is_plain && model != "brown_conrady")
     fail_at(numbers.place("model"),
-            fmt::format("RealSense's \"{}\" with coefficients other than 0 is not supported (the "
+            fmt::format("RealSense's \"{}\" with such coefficients is not supported (the "
                         "inverse one leads from the distorted picture to the undistorted one, and "
                         "its numbers are not OpenCV's); allowed: brown_conrady, kannala_brandt4; "
                         "measure the lens with \"previzd calibrate observer\" from pictures of a "

@@ -47,11 +47,11 @@ void put_white_first(int columns, int rows, float square, cv::aruco::CharucoBoar
   for (int y = 0; y < rows; ++y)
     for (int x = y % 2; x < columns; x += 2, ++id)
       for (int i = 0; i < 4; ++i) {  // upper left, upper right, lower right, lower left
-        const bool is_right = i == 1 || i == 2, is_low = i >= 2;
+        const int left = i == 0 || i == 3 ? 1 : 0, above = i < 2 ? 1 : 0;
         const auto at = static_cast<std::size_t>(i);
         board.objPoints[std::size_t(id)][at] =
             first[at] + cv::Point3f(float(x) * square, float(y) * square, 0);
-        const int column = x - !is_right, row = y - !is_low;  // of the board's corner there
+        const int column = x - left, row = y - above;  // of the board's corner there
         if (column < 0 || row < 0 || column >= columns - 1 || row >= rows - 1) continue;
         const auto corner = std::size_t(row * (columns - 1) + column);
         board.nearestMarkerIdx[corner].push_back(id);

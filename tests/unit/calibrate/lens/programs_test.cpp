@@ -117,6 +117,8 @@ TEST(MetashapeFiles, WhatOpencvsLensLacksIsRefusedByName) {
               testing::Contains(HasSubstr("b2 is ignored: it moves the picture's edge by 0.036")));
   EXPECT_THAT(refusal(metashape("<fx>1500</fx><fy>1500</fy><cx>960</cx><cy>540</cy>")),
               HasSubstr("PhotoScan's form before 1.2"));
+  EXPECT_THAT(refusal(metashape("<f>1e308</f><b1>1e308</b1>")),
+              HasSubstr("fx is inf; allowed: above 0"));
   EXPECT_THAT(refusal(metashape("<f>nan</f>")), HasSubstr("f: \"nan\" is not a finite number"));
   EXPECT_THAT(refusal("<calibration><projection>frame</projection><f>1500</f></calibration>"),
               HasSubstr("width: is missing"));
@@ -187,7 +189,8 @@ TEST(RealsenseFiles, ForwardModelsAreRead) {
   expect_pinhole(lens_of(realsense("distortion.inverse_brown_conrady", "0, 0, 0, 0, 0")), plain);
   for (const char* model : {"distortion.inverse_brown_conrady", "Inverse Brown Conrady", "ftheta"})
     EXPECT_THAT(refusal(realsense(model, five)),
-                HasSubstr(std::string("model: RealSense's \"") + model + "\" with coefficients"));
+                HasSubstr(std::string("model: RealSense's \"") + model + "\" with such coefficients"));
+  EXPECT_THAT(refusal(realsense("F Theta", "0, 0, 0, 0, 0")), HasSubstr("RealSense's \"F Theta\""));
   const FileLens fisheye = lens_of(realsense("kannala_brandt4", "-0.02, 0.004, -0.003, 0.0005, 0"));
   EXPECT_EQ(std::get<FisheyeIntrinsics>(fisheye.lens).k[3], 0.0005);
 }
