@@ -25,7 +25,7 @@ std::string content_of_lens_file(const std::filesystem::path& file) {
     throw Error(file.string() + ": is a device or a pipe; give a file");
   const auto size = std::filesystem::file_size(file, error);
   if (!error && size > most_lens_file_bytes)
-    throw Error(file.string() + ": is larger than 1 MiB; it is not a calibration");
+    throw Error(file.string() + ": is larger than 1 MiB; give a file with the lens alone");
   return session::read_file(file);
 }
 

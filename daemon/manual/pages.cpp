@@ -75,7 +75,7 @@ previzd calibrate observer views --board aprilgrid:6x6:88mm:26.4mm --out lens.to
 previzd print board aprilgrid:6x6:40mm:12mm:kalibr --paper A3 --out board.pdf: Draws an AprilGrid as Kalibr prints it, which both programs find.
 previzd calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds its pose from the set's tags.
 previzd calibrate response bracket --camera observer --out response.toml: Measures the film camera's response curve, and from which code on it clips, from a folder of pictures of one view at several shutter times. The longest exposure should be two stops longer than a bright even area needs to become white.
-previzd calibrate from camchain.yaml --camera cam0 --out lens.toml: Takes a lens that Kalibr, OpenCV, ROS or COLMAP calibrated.
+previzd calibrate from camchain.yaml --camera cam0 --out lens.toml: Takes a lens that Kalibr, OpenCV, ROS, COLMAP, Metashape or another program calibrated.
 previzd calibrate from cameras.txt --as observer: Turns a fisheye lens that COLMAP calibrated into the film camera's lens, and says by how many pixels the two differ at worst.
 previzd calibrate tags walk --set desk.toml --size 80mm --write: Finds the tags' positions, from a walk past all of them with the film camera, and writes them to the set file.
 previzd model takes/12A_take003 --set desk.toml --write: Makes the phantom of the boxes that were marked on the rig while this take was recorded.
@@ -166,9 +166,9 @@ Printed tags can be removed from the picture, with their light, shadows and refl
 )"};
 
 const Chapter lenses_chapter{"LENSES OF OTHER PROGRAMS", R"(
-`previzd calibrate from FILE` recognises by their content: OpenCV's YAML, XML and JSON (4, 5 or 8 coefficients, or a fisheye's 4), ROS's camera_info (plumb_bob, rational_polynomial, equidistant), Kalibr's camchain (pinhole with radtan, equidistant or none), and COLMAP's cameras.txt (all models up to FULL_OPENCV and OPENCV_FISHEYE). The output says what is assumed or converted, such as COLMAP's pixel coordinates, which are counted from the corner of the first one and not from its centre.
+`previzd calibrate from FILE` recognises by their content: OpenCV's YAML, XML and JSON (4, 5 or 8 coefficients, or a fisheye's 4), ROS's camera_info (plumb_bob, rational_polynomial, equidistant), Kalibr's camchain (pinhole with radtan, equidistant or none), COLMAP's cameras.txt (all models up to FULL_OPENCV and OPENCV_FISHEYE), Metashape's camera XML (frame cameras), transforms.json of nerfstudio and instant-ngp (OPENCV and OPENCV_FISHEYE), and RealSense's intrinsics as JSON (all but inverse models). The output says what is assumed or converted, such as COLMAP's pixel coordinates, which are counted from the corner of the first one and not from its centre.
 A fisheye becomes the light camera's lens and a pinhole the film camera's, unless `--as` says otherwise: then the lens is fitted with the other model, and the largest difference over the picture is reported. More than 0.1 px needs `--force`.
-Not supported are thin prisms and tilted sensors, Kalibr's omni, eucm, ds and fov, COLMAP's FOV and THIN_PRISM_FISHEYE, Nuke's LensDistortion and the lenses of 3DEqualizer: calibrate with another model, or from pictures of a board.
+Not supported are thin prisms and tilted sensors, Kalibr's omni, eucm, ds and fov, COLMAP's FOV and THIN_PRISM_FISHEYE, Metashape's fisheyes, Nuke's LensDistortion and the lenses of 3DEqualizer, PFTrack and SynthEyes: calibrate with another model, or from pictures of a board. Files of RealityCapture, Meshroom, OpenSfM, OpenMVG, Pix4D and Lensfun, profiles of Adobe and the reports of Kalibr are refused by name, with the way to convert them and what their numbers mean.
 )"};
 
 const Chapter previzd_status{"EXIT STATUS", R"(

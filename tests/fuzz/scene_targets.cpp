@@ -178,7 +178,7 @@ constexpr Target own[] = {
     {"texture", "an image of a glTF file", texture},
     {"environment", "an environment: OpenEXR or Radiance .hdr", environment},
     {"png", "a plate as PNG", png},
-    {"lens_file", "a lens of OpenCV, ROS, Kalibr or COLMAP", lens_file},
+    {"lens_file", "a lens of another program", lens_file},
 };
 
 }  // namespace scene_targets_cpp

@@ -25,7 +25,9 @@ struct Board {
 // A board is written on a command line as follows; lengths end in mm, cm, m or in:
 //   chessboard:9x6:25mm                    inner corners, side of a square
 //   charuco:12x8:0.709in:0.551in:5x5_1000  squares, their side, side of a marker, dictionary
-//                                          (4x4, 5x5, 6x6 or 7x7 _50, _100, _250 or _1000)
+//                                          (4x4, 5x5, 6x6 or 7x7 _50, _100, _250 or _1000); one
+//                                          that begins with a white square, as OpenCV before 4.6
+//                                          prints an even number of rows, is found as well
 //   aprilgrid:6x6:88mm:26.4mm              tags, outer edge of the black border, gap between two;
 //                                          then, where they differ, :tag36h11 and :0 (first id);
 //                                          :kalibr prints Kalibr's form of tag36h11, which is

@@ -23,9 +23,10 @@ cv::Mat1b gray(const Frame& frame, const tracking::Photometry& photometry) {
 }
 
 // Returns half the window in which a corner is refined: as much of its four squares as holds no
-// other corner, at most 11 px. `ids` and `pixels` are as in BoardCorners; a row has `columns`
-// corners.
-int window_px(const std::vector<int>& ids, const std::vector<cv::Point2f>& pixels, int columns) {
+// other corner, `part` of a square, at most 11 px. `ids` and `pixels` are as in BoardCorners; a row
+// has `columns` corners.
+int window_px(const std::vector<int>& ids, const std::vector<cv::Point2f>& pixels, int columns,
+              double part) {
   double shortest = HUGE_VAL;
   for (std::size_t i = 0; i < ids.size(); ++i)
     for (std::size_t j = i + 1; j < ids.size(); ++j) {
@@ -33,12 +34,12 @@ int window_px(const std::vector<int>& ids, const std::vector<cv::Point2f>& pixel
       if (beside || ids[j] == ids[i] + columns)
         shortest = std::min(shortest, cv::norm(pixels[i] - pixels[j]));
     }
-  return std::clamp(int(0.4 * shortest), 2, 11);
+  return std::clamp(int(part * shortest), 2, 11);
 }
 
 BoardCorners sharpened(const cv::Mat1b& picture, std::vector<int> ids,
-                       std::vector<cv::Point2f> pixels, int columns) {
-  const int window = window_px(ids, pixels, columns);
+                       std::vector<cv::Point2f> pixels, int columns, double part = 0.4) {
+  const int window = window_px(ids, pixels, columns, part);
   const cv::TermCriteria until(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 50, 1e-4);
   cv::cornerSubPix(picture, pixels, {window, window}, {-1, -1}, until);
   BoardCorners corners{std::move(ids), {}};
@@ -74,28 +75,97 @@ class ChessboardFinder final : public BoardFinder {
 class CharucoFinder final : public BoardFinder {
  public:
   CharucoFinder(const Board& board, const ResponseCurve& response)
-      : columns_(board.columns - 1), dictionary_(markers_of(board)), photometry_(response) {
-    board_ = charuco_board(board.columns, board.rows, float(board.square_m), float(board.marker_m),
-                           dictionary_);
+      : columns_(board.columns - 1),
+        gap_(std::min(0.4, (board.square_m - board.marker_m) / (2 * board.square_m))),
+        dictionary_(markers_of(board)),
+        photometry_(response) {
+    for (const bool is_white_first : {false, true})
+      if (!is_white_first || board.rows % 2 == 0)
+        forms_.push_back({charuco_board(board.columns, board.rows, float(board.square_m),
+                                        float(board.marker_m), dictionary_, is_white_first),
+                          0});
   }
 
   BoardCorners find(const Frame& frame) override {
     const cv::Mat1b picture = gray(frame, photometry_);
-    std::vector<std::vector<cv::Point2f>> markers;
+    Corners markers;
     std::vector<int> marker_ids, ids;
     cv::aruco::detectMarkers(picture, dictionary_, markers, marker_ids);
     std::vector<cv::Point2f> pixels;
+    Form& form = form_of(markers, marker_ids);
     if (!marker_ids.empty())
-      cv::aruco::interpolateCornersCharuco(markers, marker_ids, picture, board_, pixels, ids);
+      cv::aruco::interpolateCornersCharuco(markers, marker_ids, picture, form.board, pixels, ids);
     // Fewer than four points do not give a pose.
     if (ids.size() < 4) return {};
-    return sharpened(picture, std::move(ids), std::move(pixels), columns_);
+    form.corners += ids.size();
+    return sharpened(picture, std::move(ids), std::move(pixels), columns_, gap_);
+  }
+
+  std::string form() const override {
+    if (forms_.size() < 2 || forms_[1].corners == 0) return "";
+    const std::size_t all = forms_[0].corners + forms_[1].corners;
+    std::string line =
+        "the board begins with a white square, as OpenCV before 4.6 prints an even number of rows";
+    if (forms_[1].corners < all)
+      line += "; " + std::to_string(forms_[0].corners) + " of " + std::to_string(all) +
+              " corners were found on one that begins with a black square";
+    return line;
   }
 
  private:
+  struct Form {
+    cv::Ptr<cv::aruco::CharucoBoard> board;
+    std::size_t corners = 0;  // found in this form so far
+  };
+  using Corners = std::vector<std::vector<cv::Point2f>>;
+
+  // Returns the form that has the markers beside each other as they are; the one that has shown
+  // most corners, where they do not tell: those of one row are the same in both.
+  Form& form_of(const Corners& markers, const std::vector<int>& ids) {
+    Form& likely = *std::ranges::max_element(forms_, {}, &Form::corners);
+    Form* best = &likely;
+    double least = HUGE_VAL, most = 0;
+    for (Form& form : forms_) {
+      const double off = distance_of(*form.board, markers, ids);
+      if (off < least) best = &form;
+      least = std::min(least, off);
+      most = std::max(most, off);
+    }
+    return least < 0.5 && most > 0.5 ? *best : likely;
+  }
+
+  // Returns by how much markers whose squares touch at a corner in this form are elsewhere, as the
+  // mean in squares: near 0 through any lens, and about 2 in the wrong form. None: 0.
+  static double distance_of(const cv::aruco::CharucoBoard& board, const Corners& markers,
+                            const std::vector<int>& ids) {
+    const auto& known = points_of(board);
+    double sum = 0;
+    int pairs = 0;
+    for (std::size_t i = 0; i < ids.size(); ++i)
+      for (std::size_t j = 0; j < ids.size(); ++j) {
+        if (std::max(ids[i], ids[j]) >= int(known.size())) continue;
+        const cv::Point3f step = known[std::size_t(ids[j])][0] - known[std::size_t(ids[i])][0];
+        const float right = step.x / board.getSquareLength(),
+                    down = step.y / board.getSquareLength();
+        if (std::lround(std::abs(right)) != 1 || std::lround(std::abs(down)) != 1) continue;
+        const auto& from = markers[i];
+        const auto& to = markers[j];
+        const float marker = 4 * board.getMarkerLength() / board.getSquareLength();
+        // One square to the right and down, between the two.
+        const cv::Point2f x =
+            (from[1] - from[0] + from[2] - from[3] + to[1] - to[0] + to[2] - to[3]) / marker;
+        const cv::Point2f y =
+            (from[3] - from[0] + from[2] - from[1] + to[3] - to[0] + to[2] - to[1]) / marker;
+        sum += cv::norm(to[0] - from[0] - right * x - down * y) / std::max(cv::norm(x), 1e-6);
+        ++pairs;
+      }
+    return pairs ? sum / pairs : 0;
+  }
+
   int columns_;
+  double gap_;  // between a corner and the markers beside it, in squares, at most 0.4
   cv::Ptr<cv::aruco::Dictionary> dictionary_;
-  cv::Ptr<cv::aruco::CharucoBoard> board_;
+  std::vector<Form> forms_;
   tracking::Photometry photometry_;
 };
 

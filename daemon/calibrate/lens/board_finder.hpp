@@ -29,13 +29,14 @@ class BoardFinder {
 
 // `response` is the camera's. Chessboards are found by cv::findChessboardCornersSB (Duda and Frese
 // 2018, "Accurate Detection and Localization of Checkerboard Corners for Calibration") and, if that
-// finds none, by cv::findChessboardCorners; charuco boards by cv::aruco; both are refined by
-// cv::cornerSubPix. An aprilgrid is found by this project's own tag corners, whose edges are
-// straight only through `lens`; if none is known yet, a lens without distortion is assumed. Of
-// tag36h11 the borders of one cell and of two (Kalibr's) are tried. Black squares in the gaps'
-// crossings (Kalibr's too) make a tag's corner a saddle point, which cv::cornerSubPix refines. A
-// finder tries the form that it has found first in the pictures that follow. Edges need the right
-// `response`: linear values that are read as sRGB move each by about half a pixel outwards.
+// finds none, by cv::findChessboardCorners; charuco boards by cv::aruco, of an even number of rows
+// those that begin with a black square and with a white one; both are refined by cv::cornerSubPix.
+// An aprilgrid is found by this project's own tag corners, whose edges are straight only through
+// `lens`; if none is known yet, a lens without distortion is assumed. Of tag36h11 the borders of
+// one cell and of two (Kalibr's) are tried. Black squares in the gaps' crossings (Kalibr's too)
+// make a tag's corner a saddle point, which cv::cornerSubPix refines. A finder tries the form that
+// it has found first in the pictures that follow. Edges need the right `response`: linear values
+// that are read as sRGB move each by about half a pixel outwards.
 using KnownLens = std::variant<std::monostate, PinholeIntrinsics, FisheyeIntrinsics>;
 std::unique_ptr<BoardFinder> make_board_finder(const Board& board, const ResponseCurve& response,
                                                const KnownLens& lens = {});

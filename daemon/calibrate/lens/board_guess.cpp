@@ -30,12 +30,18 @@ std::string chessboard_words(cv::Size corners, double square_m) {
   return fmt::format("chessboard:{}x{}:{:g}mm", corners.width, corners.height, 1000 * square_m);
 }
 
-// Returns the inner corners of the largest chessboard in the picture; none: 0x0.
+// Returns the inner corners of the largest chessboard in the picture; none: 0x0. With
+// CALIB_CB_NORMALIZE_IMAGE OpenCV loses soft boards with squares of 12 to 18 px, or finds a part of
+// them, and without it those that are lit unevenly.
 cv::Size largest_chessboard(const cv::Mat1b& picture) {
-  cv::Mat corners, meta;
-  const bool found = cv::findChessboardCornersSB(
-      picture, {3, 3}, corners, cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER, meta);
-  return found ? cv::Size(meta.cols, meta.rows) : cv::Size();
+  cv::Size largest;
+  for (const int flag : {int(cv::CALIB_CB_NORMALIZE_IMAGE), 0}) {
+    cv::Mat corners, meta;
+    if (cv::findChessboardCornersSB(picture, {3, 3}, corners, flag | cv::CALIB_CB_LARGER, meta) &&
+        meta.cols * meta.rows > largest.area())
+      largest = {meta.cols, meta.rows};
+  }
+  return largest;
 }
 
 std::string other_chessboard(const Pictures& pictures, const Board& board,

@@ -20,6 +20,7 @@ namespace lens_formats {
 namespace {
 
 constexpr std::size_t most_numbers = 64;
+constexpr double most_focal_px = 1e9;
 
 void add_numbers(const Tree& tree, const FilePlace& place, std::vector<double>& all) {
   if (all.size() >= most_numbers) fail_at(place, "has more than 64 numbers");
@@ -40,9 +41,11 @@ void add_numbers(const Tree& tree, const FilePlace& place, std::vector<double>& 
 
 void check_focal(const Focal& focal, const FilePlace& at) {
   for (const auto& [name, value] : {std::pair{"fx", focal.fx}, std::pair{"fy", focal.fy}})
-    if (!(value > 0))
-      fail_at(at, fmt::format("{} is {:g}; allowed: above 0; calibrate again, or correct the file",
-                              name, value));
+    if (!(value > 0 && value <= most_focal_px))
+      fail_at(at,
+              fmt::format(
+                  "{} is {:g}; allowed: above 0, to 1e9 px; calibrate again, or correct the file",
+                  name, value));
 }
 
 }  // namespace
@@ -123,7 +126,8 @@ FileCamera camera_of(const std::string& name, const std::function<FileLens()>& r
 namespace {
 
 constexpr const char* readable_formats =
-    "OpenCV's YAML, XML and JSON, ROS's camera_info, Kalibr's camchain, COLMAP's cameras.txt";
+    "OpenCV's YAML, XML and JSON, ROS's camera_info, Kalibr's camchain, COLMAP's cameras.txt, "
+    "Metashape's camera XML, nerfstudio's transforms.json, RealSense's JSON";
 
 template <typename Number>
 Number little_endian_at(std::string_view bytes, std::size_t at) {
@@ -157,28 +161,6 @@ void refuse_binary(std::string_view bytes, const FilePlace& at) {
                   readable_formats);
 }
 
-constexpr std::string_view nuke_node = "LensDistortion";
-
-// Their distortion is defined from the distorted picture to the undistorted one, in units of the
-// film back, which OpenCV's models do not express.
-void refuse_by_name(std::string_view text, const FilePlace& at) {
-  constexpr const char* instead =
-      "; export an OpenCV-like model from there, or measure the lens with \"previzd calibrate "
-      "observer\" from pictures of a chessboard";
-  for (const char* node :
-       {"LD_3DE", "LD_3DE4_", "3DE4 Radial", "3DE4 Anamorphic", "3DE Classic LD Model"})
-    if (text.find(node) != text.npos)
-      fail_at(at, std::string("is a lens of 3DEqualizer, which is not supported") + instead);
-  for (std::size_t at_node = text.find(nuke_node); at_node != text.npos;
-       at_node = text.find(nuke_node, at_node + 1)) {
-    const std::size_t next = text.find_first_not_of(" \t\r\n", at_node + nuke_node.size());
-    if ((at_node == 0 || text[at_node - 1] == '\n' || text[at_node - 1] == ' ') &&
-        next != text.npos && text[next] == '{')
-      fail_at(at,
-              std::string("is a LensDistortion node of Nuke, which is not supported") + instead);
-  }
-}
-
 LensFile read_tree(const Tree& tree, std::string_view text, const char* syntax,
                    const std::string& file) {
   LensFile read;
@@ -194,19 +176,29 @@ LensFile read_tree(const Tree& tree, std::string_view text, const char* syntax,
   return read;
 }
 
-LensFile read_text(std::string_view text, const std::string& file) {
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
-  if (first == text.npos) fail_at({file, 0, ""}, "is empty; export the calibration again");
-  if (lens_formats::is_colmap(text))
-    return {"COLMAP's cameras.txt", lens_formats::read_colmap(text, file), {}};
-  if (text[first] == '<') return read_tree(parse_xml(text, file), text, "XML", file);
-  if (text[first] == '{') return read_tree(parse_json(text, file), text, "JSON", file);
-  refuse_by_name(text, {file, 0, ""});
+LensFile read_syntax(std::string_view text, const std::string& file) {
+  const char first = text[text.find_first_not_of(" \t\r\n")];
+  if (first == '<') return read_tree(parse_xml(text, file), text, "XML", file);
+  if (first == '{') return read_tree(parse_json(text, file), text, "JSON", file);
   const YamlTree yaml = parse_yaml(text, file);
   LensFile read = read_tree(yaml.tree, text, "YAML", file);
   if (yaml.has_more)
     read.notes.push_back("the file has more than one YAML document; the first is used");
   return read;
+}
+
+LensFile read_text(std::string_view text, const std::string& file) {
+  if (text.find_first_not_of(" \t\r\n") == text.npos)
+    fail_at({file, 0, ""}, "is empty; export the calibration again");
+  if (lens_formats::is_colmap(text))
+    return {"COLMAP's cameras.txt", lens_formats::read_colmap(text, file), {}};
+  if (auto read = lens_formats::read_by_program(text, file)) return *std::move(read);
+  try {
+    return read_syntax(text, file);
+  } catch (const Error&) {
+    lens_formats::refuse_by_program(text, file);
+    throw;
+  }
 }
 
 std::string camera_list(const LensFile& read) {
@@ -232,7 +224,7 @@ std::optional<std::size_t> index_of(const LensFile& read, const std::string& cam
 LensFile read_lens_file(std::string_view bytes, const std::string& file) {
   if (bytes.empty()) fail_at({file, 0, ""}, "has 0 bytes; export the calibration again");
   if (bytes.size() > most_lens_file_bytes)
-    fail_at({file, 0, ""}, "is larger than 1 MiB; it is not a calibration");
+    fail_at({file, 0, ""}, "is larger than 1 MiB; give a file with the lens alone");
   refuse_binary(bytes, {file, 0, ""});
   if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
   return read_text(bytes, file);

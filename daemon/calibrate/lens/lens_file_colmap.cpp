@@ -40,9 +40,6 @@ constexpr std::array refused_models = {"FOV",
                                        "FISHEYE",
                                        "EQUIRECTANGULAR"};
 
-// COLMAP's (0,0) is the corner of the first pixel, whose centre is at (0.5, 0.5).
-constexpr double corner_to_centre_px = -0.5;
-
 struct Line {
   int number = 0;
   std::vector<std::string> words;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -46,6 +47,9 @@ FileLens pinhole_lens(const Focal& focal, const FilePlace& at, std::span<const d
 FileLens fisheye_lens(const Focal& focal, const FilePlace& at, std::span<const double> coefficients,
                       const FilePlace& of_coefficients, const Size& size);
 
+// Added to a principal point whose (0,0) is the corner of the first pixel, as COLMAP's.
+inline constexpr double corner_to_centre_px = -0.5;
+
 // Calls `read`; an Error becomes the camera's refusal.
 FileCamera camera_of(const std::string& name, const std::function<FileLens()>& read);
 
@@ -57,5 +61,15 @@ std::vector<FileCamera> read_opencv(const Tree& root, std::string_view text,
 bool is_ros(const Tree& root);
 bool is_colmap(std::string_view text);
 std::vector<FileCamera> read_colmap(std::string_view text, const std::string& file);
+
+// The readers of lens_file_programs.cpp's table. Each throws previz::Error if the file has no
+// camera.
+std::vector<FileCamera> read_metashape(std::string_view text, const std::string& file);
+std::vector<FileCamera> read_transforms(std::string_view text, const std::string& file);
+std::vector<FileCamera> read_realsense(std::string_view text, const std::string& file);
+// Reads the file of a program that the table knows by its content; of another, nothing.
+std::optional<LensFile> read_by_program(std::string_view text, const std::string& file);
+// Throws previz::Error with the way to convert if the table has words for this file's program.
+void refuse_by_program(std::string_view text, const std::string& file);
 
 }  // namespace previz::calibrate::lens_formats

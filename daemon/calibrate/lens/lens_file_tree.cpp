@@ -23,7 +23,8 @@ constexpr int most_values = 200'000;
 // Builds a tree from what a parser reports in the order of the file.
 class TreeBuilder {
  public:
-  explicit TreeBuilder(std::string file) : file_(std::move(file)) {}
+  explicit TreeBuilder(std::string file, bool may_repeat = false)
+      : file_(std::move(file)), may_repeat_(may_repeat) {}
 
   // A word, which in a map that waits for a key is the key.
   void word(int line, std::string text) {
@@ -44,6 +45,10 @@ class TreeBuilder {
 
   void key(int line, std::string text) {
     Open& map = open_.back();
+    if (may_repeat_) {
+      map.key = std::move(text);
+      return;
+    }
     if (std::ranges::find(map.tree.keys, text) != map.tree.keys.end())
       fail_at({file_, line, printable(text)}, "is given twice; remove one of the two");
     if (map.tree.keys.size() >= most_keys)
@@ -92,6 +97,7 @@ class TreeBuilder {
   }
 
   std::string file_;
+  bool may_repeat_ = false;  // keys, any number of them
   std::vector<Open> open_;
   Tree root_;
   int values_ = 0;
@@ -195,6 +201,28 @@ void add_element(const tinyxml2::XMLElement& element, TreeBuilder& builder) {
   builder.end();
 }
 
+// Adds an element under its name, with its attributes.
+void add_whole_element(const tinyxml2::XMLElement& element, TreeBuilder& builder) {
+  const int line = element.GetLineNum();
+  builder.key(line, element.Name());
+  if (element.GetText() && !element.FirstChildElement())
+    return add_words(element.GetText(), line, builder);
+  builder.begin(Tree::Kind::map, line);
+  for (const auto* attribute = element.FirstAttribute(); attribute; attribute = attribute->Next()) {
+    builder.key(line, attribute->Name());
+    builder.word(line, attribute->Value());
+  }
+  for (const auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement())
+    add_whole_element(*child, builder);
+  builder.end();
+}
+
+void parse(std::string_view text, const std::string& file, tinyxml2::XMLDocument& document) {
+  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
+    fail_at({file, document.ErrorLineNum(), ""},
+            fmt::format("is not valid XML: {}", printable(document.ErrorName())));
+}
+
 }  // namespace
 
 const Tree* Tree::find(std::string_view key) const {
@@ -236,11 +264,19 @@ Tree parse_json(std::string_view text, const std::string& file) {
 
 Tree parse_xml(std::string_view text, const std::string& file) {
   tinyxml2::XMLDocument document;
-  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
-    fail_at({file, document.ErrorLineNum(), ""},
-            fmt::format("is not valid XML: {}", printable(document.ErrorName())));
+  parse(text, file, document);
   TreeBuilder builder(file);
   if (const tinyxml2::XMLElement* root = document.RootElement()) add_element(*root, builder);
+  return builder.take();
+}
+
+Tree parse_whole_xml(std::string_view text, const std::string& file) {
+  tinyxml2::XMLDocument document;
+  parse(text, file, document);
+  TreeBuilder builder(file, true);
+  builder.begin(Tree::Kind::map, 1);
+  if (const tinyxml2::XMLElement* root = document.RootElement()) add_whole_element(*root, builder);
+  builder.end();
   return builder.take();
 }
 

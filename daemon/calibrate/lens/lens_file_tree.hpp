@@ -1,4 +1,4 @@
-// Reads YAML, JSON and XML as OpenCV, ROS and Kalibr write them into one tree of words, lists and
+// Reads YAML, JSON and XML as other programs write them into one tree of words, lists and
 // maps, within limits that hostile bytes cannot pass.
 #pragma once
 
@@ -13,10 +13,10 @@ struct Tree {
   Kind kind = Kind::nothing;
   int line = 0;                   // from 1; 0 where the parser does not know it
   std::string word;               // as it is written, without quotes
-  std::vector<std::string> keys;  // of a map: one for each child, none twice
+  std::vector<std::string> keys;  // of a map: one for each child, none twice but by parse_whole_xml
   std::vector<Tree> children;
 
-  // Returns the value of a map's key, or null.
+  // Returns the value of a map's (first such) key, or null.
   const Tree* find(std::string_view key) const;
 };
 
@@ -42,5 +42,8 @@ Tree parse_json(std::string_view text, const std::string& file);
 // The root element's content. An element that holds several words, or elements named "_", is a
 // list.
 Tree parse_xml(std::string_view text, const std::string& file);
+// The root element as the only key. Attributes are keys as well, but those of an element that has
+// text alone; keys may be there twice, and any number of them.
+Tree parse_whole_xml(std::string_view text, const std::string& file);
 
 }  // namespace previz::calibrate

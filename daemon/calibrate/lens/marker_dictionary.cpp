@@ -35,6 +35,31 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_by_name(const std::string& name) {
   throw Error("board: \"" + name + "\" is not a marker dictionary; known: " + names);
 }
 
+#if CV_VERSION_MINOR < 7
+// Moves the markers of a board with an even number of rows, on which as many squares are white with
+// either colour first. A corner's nearest markers are in the two white squares that it touches.
+void put_white_first(int columns, int rows, float square, cv::aruco::CharucoBoard& board) {
+  std::vector<cv::Point3f> first = board.objPoints[0];  // in the second square
+  for (cv::Point3f& corner : first) corner.x -= square;
+  for (auto* nearest : {&board.nearestMarkerIdx, &board.nearestMarkerCorners})
+    for (std::vector<int>& of_corner : *nearest) of_corner.clear();
+  int id = 0;
+  for (int y = 0; y < rows; ++y)
+    for (int x = y % 2; x < columns; x += 2, ++id)
+      for (int i = 0; i < 4; ++i) {  // upper left, upper right, lower right, lower left
+        const int left = i == 0 || i == 3 ? 1 : 0, above = i < 2 ? 1 : 0;
+        const auto at = static_cast<std::size_t>(i);
+        board.objPoints[std::size_t(id)][at] =
+            first[at] + cv::Point3f(float(x) * square, float(y) * square, 0);
+        const int column = x - left, row = y - above;  // of the board's corner there
+        if (column < 0 || row < 0 || column >= columns - 1 || row >= rows - 1) continue;
+        const auto corner = std::size_t(row * (columns - 1) + column);
+        board.nearestMarkerIdx[corner].push_back(id);
+        board.nearestMarkerCorners[corner].push_back(i);
+      }
+}
+#endif
+
 }  // namespace
 
 cv::Ptr<cv::aruco::Dictionary> markers_of(const Board& board) {
@@ -57,11 +82,24 @@ cv::Mat1b marker_picture(const cv::aruco::Dictionary& dictionary, int id, int ce
 }
 
 cv::Ptr<cv::aruco::CharucoBoard> charuco_board(int columns, int rows, float square, float marker,
-                                               const cv::Ptr<cv::aruco::Dictionary>& dictionary) {
+                                               const cv::Ptr<cv::aruco::Dictionary>& dictionary,
+                                               bool is_white_first) {
 #if CV_VERSION_MINOR >= 7
-  return cv::makePtr<cv::aruco::CharucoBoard>(cv::Size(columns, rows), square, marker, *dictionary);
+  auto board =
+      cv::makePtr<cv::aruco::CharucoBoard>(cv::Size(columns, rows), square, marker, *dictionary);
+  board->setLegacyPattern(is_white_first);
 #else
-  return cv::aruco::CharucoBoard::create(columns, rows, square, marker, dictionary);
+  auto board = cv::aruco::CharucoBoard::create(columns, rows, square, marker, dictionary);
+  if (is_white_first) put_white_first(columns, rows, square, *board);
+#endif
+  return board;
+}
+
+const std::vector<std::vector<cv::Point3f>>& points_of(const cv::aruco::CharucoBoard& board) {
+#if CV_VERSION_MINOR >= 7
+  return board.getObjPoints();
+#else
+  return board.objPoints;
 #endif
 }
 

@@ -63,7 +63,7 @@ glm::dvec2 seen(const glm::dvec3& point) {
 }
 
 // Squares with exact, box-filtered edges, slightly out of focus as a lens has them.
-Frame chessboard(int columns, int rows, double square_m) {
+Frame chessboard(int columns, int rows, double square_m, double blur_px = 0.7) {
   test::LinearPicture picture{width, height, std::vector<double>(width * height, 0.7)};
   for (int row = -1; row < rows; ++row)
     for (int column = -1; column < columns; ++column) {
@@ -74,7 +74,7 @@ Frame chessboard(int columns, int rows, double square_m) {
       test::add_polygon(picture, {corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1)}, -0.65);
     }
   cv::Mat1d pixels(height, width, picture.value.data());
-  cv::GaussianBlur(pixels, pixels, {}, 0.7);
+  cv::GaussianBlur(pixels, pixels, {}, blur_px);
   std::mt19937 random(1);
   return test::expose(picture, {.full_well_e = 20000, .response = {}}, random);
 }
@@ -190,6 +190,17 @@ TEST(OtherBoard, AChessboardIsCountedByItsInnerCorners) {
     EXPECT_EQ(other(picture, std::string("chessboard:") + named + ":25mm"), right) << named;
   EXPECT_EQ(other(picture, "chessboard:9x6:25mm"), "");
   EXPECT_EQ(other(picture, "chessboard:6x9:25mm"), "");
+}
+
+// Squares of 600 / 0.42 * 9.8 mm = 14 px and of 18 px, blurred as by a lens out of focus.
+TEST(OtherBoard, ASoftChessboardOfSmallSquaresIsCounted) {
+  for (const double square_m : {0.0098, 0.0126})
+    for (const double blur_px : {1.5, 2.5})
+      for (const char* named : {"10x7", "8x5", "4x3"})
+        EXPECT_THAT(other(chessboard(9, 6, square_m, blur_px),
+                          std::string("chessboard:") + named + ":10mm"),
+                    HasSubstr("a chessboard of 9x6 inner corners"))
+            << square_m << ' ' << blur_px << ' ' << named;
 }
 
 TEST(OtherBoard, MarkersAreNamedByTheirDictionary) {
