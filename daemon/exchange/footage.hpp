@@ -46,7 +46,7 @@ class Footage {
   virtual std::optional<FileTimecode> timecode() const { return std::nullopt; }
   // Returns why the pictures have the size that they have, if that is not plain, in plain words;
   // only after the first picture.
-  virtual std::vector<std::string> shape() const { return notes(); }
+  virtual std::vector<std::string> shape() const { return {}; }
   // Returns the conversions and what is lost in plain words; they are complete after the last
   // picture.
   virtual std::vector<std::string> notes() const { return {}; }

@@ -81,10 +81,9 @@ struct Imported {
   std::vector<FramePtr> to_judge;             // few
 };
 
-// A tag is looked for in one of so many frames, and in so many at most, which takes a fiftieth of
-// the time that importing them takes.
-constexpr std::uint64_t frames_for_a_judged = 100;
-constexpr std::size_t most_judged = 5;
+// Tags are looked for in this frame, and again each time that the take has become three times as
+// long, which takes a fiftieth of the time that importing takes.
+constexpr std::size_t first_judged = 50;
 
 // Reads one camera's footage and writes it into the session.
 class FootageImport {
@@ -105,6 +104,7 @@ class FootageImport {
                               : open_videos(footage_.videos, footage_.read_as);
     std::vector<ImportedFrame> frames;
     std::vector<FramePtr> to_judge;
+    std::size_t next_judged = first_judged;
     while (const auto picture = pictures->next()) {
       check(*picture, *pictures, notes);
       const std::size_t i = picture->number;
@@ -121,9 +121,10 @@ class FootageImport {
       frame.height = picture->height;
       frame.bytes = picture->bytes;
       writer_.write(frame);
-      if (frames.size() % frames_for_a_judged == frames_for_a_judged / 2 &&
-          to_judge.size() < most_judged)
+      if (frames.size() == next_judged) {
         to_judge.push_back(std::make_shared<const Frame>(frame));
+        next_judged *= 3;
+      }
       frames.push_back({i, frame.timestamp_ns});
       if (picture->container_ns)
         farthest_ns_ = std::max(farthest_ns_, std::abs(static_cast<double>(*picture->container_ns) -
@@ -212,7 +213,11 @@ class FootageImport {
     if (first_.empty()) first_ = is;
     if (is != first_)
       throw Error(picture.name + ": is " + is + "; all pictures of " + footage_.source +
-                  " must be " + first_ + " like the first");
+                  " must be " + first_ + " like the first" +
+                  (footage_.videos.empty()
+                       ? " (those whose colours are converted, by a profile or another tag, have "
+                         "16 bits: give all the same tag)"
+                       : ""));
   }
 
   std::int64_t time_of(std::size_t i, const Picture& picture,
@@ -280,10 +285,10 @@ std::uint64_t write_track(const ImportDescription& description, const fs::path& 
     writer.write(record);
   }
   if (const std::size_t unused = description.track.size() - poses)
-    notes.push_back(
-        file.string() + ": " + std::to_string(unused) +
-        (unused == 1 ? " pose belongs to a lost frame" : " poses belong to lost frames") +
-        ", and is skipped");
+    notes.push_back(file.string() + ": " + std::to_string(unused) +
+                    (unused == 1 ? " pose belongs to a lost frame and is skipped"
+                                 : " poses belong to lost frames and are skipped") +
+                    "; lost and missing frames count");
   return poses;
 }
 

@@ -9,7 +9,8 @@
 //   observer      the film camera's pictures (below); required
 //   light         the light camera's; may be left out
 //   track         list of {frame, world_from_camera, covariance?, tags?}: poses of the film camera
-//                 known from elsewhere. frame: position in `observer` from 0, increasing;
+//                 known from elsewhere. frame: position in `observer` from 0, increasing,
+//                 where frames that are lost or missing count;
 //                 world_from_camera: 4 rows of 4, rigid, metres, OpenCV axes, world Z up;
 //                 covariance: 36 numbers, row-major, rotation (rad) then translation (m), in the
 //                 camera frame, default 0 (exact). Frames that are not listed count as lost.

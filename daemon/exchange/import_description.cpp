@@ -217,10 +217,15 @@ std::size_t frame_count(const FootageDescription& footage) {
 }
 
 void check_length(const CameraMembers& camera, const std::string& key,
-                  const std::vector<double>& series, std::size_t frames) {
+                  const std::vector<double>& series, const FootageDescription& footage) {
+  const std::size_t frames = frame_count(footage);
+  const std::string& lost = footage.pictures.words;
   if (series.size() > 1 && frames > 0 && series.size() != frames)
-    camera.members.fail(key, "has " + std::to_string(series.size()) + " entries; there are " +
-                                 std::to_string(frames) + " frames");
+    camera.members.fail(
+        key,
+        "has " + std::to_string(series.size()) + " entries; there are " + std::to_string(frames) +
+            " frames" +
+            (lost.empty() ? "" : ", with those that are lost (" + lost + "): give each an entry"));
 }
 
 double at(const std::vector<double>& series, std::size_t i) {
@@ -231,10 +236,9 @@ void read_exposures(const CameraMembers& camera, double responsivity, FootageDes
   footage.exposure = read_series(camera, "exposure");
   footage.exposure_s = read_series(camera, "exposure_s");
   footage.gain = read_series(camera, "gain");
-  const std::size_t frames = frame_count(footage);
-  check_length(camera, "exposure", footage.exposure, frames);
-  check_length(camera, "exposure_s", footage.exposure_s, frames);
-  check_length(camera, "gain", footage.gain, frames);
+  check_length(camera, "exposure", footage.exposure, footage);
+  check_length(camera, "exposure_s", footage.exposure_s, footage);
+  check_length(camera, "gain", footage.gain, footage);
   if (!footage.exposure.empty()) return;
   if (footage.exposure_s.empty())
     camera.members.fail("exposure",

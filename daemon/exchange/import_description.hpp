@@ -21,8 +21,8 @@ inline constexpr std::int64_t latest_ns = std::numeric_limits<std::int64_t>::max
 
 // The frames of a camera. Lists have one entry a frame; `exposure` is resolved, never empty.
 struct FootageDescription {
-  std::string source;        // "observer" or "light"
-  PictureSequence pictures;  // without files: video
+  std::string source;                         // "observer" or "light"
+  PictureSequence pictures;                   // without files: video
   std::vector<std::filesystem::path> videos;  // one clip
   ReadAs read_as;
   std::vector<std::int64_t> timestamps_ns;  // empty: fps, or the container's if that is 0

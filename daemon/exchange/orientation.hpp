@@ -17,6 +17,7 @@ namespace previz::exchange {
 struct Orientation {
   int xx = 1, xy = 0, yx = 0, yy = 1;
 
+  Orientation inverse() const { return {xx, yx, xy, yy}; }
   bool is_upright() const { return *this == Orientation{}; }
   // "turned by 90 degrees clockwise", "mirrored left to right", ...
   std::string words() const;

@@ -79,7 +79,16 @@ std::string exif_numbers(const Exiv2::ExifData& data, const char* key, std::size
   return text;
 }
 
-ColorTag exif_tag(const Exiv2::ExifData& data) {
+Chromaticities chromaticities_in(const std::string& text) {
+  Chromaticities colors{};
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (std::size_t i = 0; i < 8 && at < end; ++i, ++at)
+    at = std::from_chars(at, end, colors[i / 2][i % 2]).ptr;
+  return colors;
+}
+
+ColorTag exif_tag(const Exiv2::ExifData& data, bool is_tiff) {
   // Exif 2.32, table 8; 2 is written by cameras though it is not there.
   constexpr std::int64_t srgb = 1, adobe = 2;
   const auto text_of = [&](const char* key) {
@@ -91,9 +100,12 @@ ColorTag exif_tag(const Exiv2::ExifData& data) {
   if (space == std::to_string(adobe) ||
       text_of("Exif.Iop.InteroperabilityIndex").starts_with("R03"))
     return {ColorTag::Kind::adobe};
-  const std::string white = exif_numbers(data, "Exif.Image.WhitePoint", 2);
+  if (is_tiff && !text_of("Exif.Image.TransferFunction").empty())
+    return {ColorTag::Kind::white, "curve"};
   const std::string primaries = exif_numbers(data, "Exif.Image.PrimaryChromaticities", 6);
-  if (!white.empty() && !primaries.empty()) return {ColorTag::Kind::white, primaries + white};
+  const std::string white = exif_numbers(data, "Exif.Image.WhitePoint", 2);
+  if (rec709_from(chromaticities_in(primaries + white)))
+    return {ColorTag::Kind::white, primaries + white};
   if (space == std::to_string(srgb)) return {ColorTag::Kind::srgb};
   return {};
 }
@@ -137,14 +149,10 @@ double power_of(double signal, double exponent) {
 
 // ---- ICC profiles
 
-struct CloseProfile {
-  void operator()(void* profile) const { cmsCloseProfile(profile); }
-};
 using Profile = std::shared_ptr<void>;
 
-Profile profile_of(const std::string& bytes) {
-  return {cmsOpenProfileFromMem(bytes.data(), static_cast<cmsUInt32Number>(bytes.size())),
-          [](void* profile) {
+Profile owned(cmsHPROFILE made) {
+  return {made, [](void* profile) {
             if (profile) cmsCloseProfile(profile);
           }};
 }
@@ -194,7 +202,7 @@ std::optional<ColorMeaning> meaning_of(const Profile& profile, bool is_of_grey) 
     meaning.light[c++] = *curve;
   }
   const auto colorants = colorants_of(profile);
-  const auto rec709 = colorants_of(Profile(cmsCreate_sRGBProfile(), CloseProfile{}));
+  const auto rec709 = colorants_of(owned(cmsCreate_sRGBProfile()));
   if (!colorants || !rec709) return std::nullopt;
   const cv::Matx33d matrix = rec709->inv() * *colorants;
   std::copy_n(matrix.val, meaning.rec709.size(), meaning.rec709.begin());
@@ -214,13 +222,15 @@ ColorTag color_tag_of(std::string_view content, Exiv2::Image& image) {
   if (image.iccProfileDefined()) {
     return {ColorTag::Kind::icc, text_of(image.iccProfile())};
   }
-  return png.kind == ColorTag::Kind::icc ? png : exif_tag(image.exifData());
+  return png.kind == ColorTag::Kind::icc
+             ? png
+             : exif_tag(image.exifData(), content.starts_with("II") || content.starts_with("MM"));
 }
 
 // A transformation by the tables of a profile.
 struct StillColors::Tables {
   Tables(const Profile& from) {
-    const Profile srgb(cmsCreate_sRGBProfile(), CloseProfile{});
+    const Profile srgb = owned(cmsCreate_sRGBProfile());
     transform = cmsCreateTransform(from.get(), TYPE_RGB_16, srgb.get(), TYPE_RGB_16,
                                    INTENT_RELATIVE_COLORIMETRIC,
                                    cmsFLAGS_NOCACHE | cmsFLAGS_HIGHRESPRECALC);
@@ -286,7 +296,8 @@ void StillColors::read_gamma(const std::string& bytes, const std::filesystem::pa
   constexpr double unit = 100'000, of_srgb = 0.45455, nearly = 5e-5;
   const double gamma = big_endian(bytes, 0) / unit;
   words_ = fmt::format("its gAMA chunk ({:g})", gamma);
-  if (!(gamma >= 0.05 && gamma <= 20)) refuse(file, words_ + " is no camera's");
+  if (!(gamma >= 0.05 && gamma <= 20))
+    refuse(file, words_ + " is out of range; allowed: 0.05 to 20");
   std::array<double, 9> matrix = unit_matrix;
   if (bytes.size() > 4) {
     words_ = fmt::format("its gAMA and cHRM chunks ({:g})", gamma);
@@ -298,25 +309,22 @@ void StillColors::read_gamma(const std::string& bytes, const std::filesystem::pa
     matrix = *from;
   }
   const bool is_srgb = std::abs(gamma - of_srgb) < nearly;
-  if (is_srgb) words_ += ", taken for the curve of sRGB";
+  if (is_srgb) words_ += ", used as the curve of sRGB";
   conversion_.emplace(meaning_of(
       [=](double s) { return is_srgb ? srgb_signal(s) : power_of(s, 1 / gamma); }, matrix));
 }
 
-// The curve is TIFF's TransferFunction; without it sRGB's is assumed.
+// The curve is sRGB's, as nothing else is said.
 void StillColors::read_white(const std::string& text, const std::filesystem::path& file) {
-  Chromaticities colors{};
-  const char* at = text.data();
-  for (std::size_t i = 0; i < 8; ++i, ++at)
-    at = std::from_chars(at, text.data() + text.size(), colors[i / 2][i % 2]).ptr;
   words_ = "its chromaticities";
-  const auto from = rec709_from(colors);
-  if (!from) refuse(file, words_ + " span no colours");
+  const auto from = rec709_from(chromaticities_in(text));
+  if (!from) refuse(file, "its TransferFunction cannot be converted");
   conversion_.emplace(meaning_of(srgb_signal, *from));
 }
 
 void StillColors::read_profile(const std::string& bytes, const std::filesystem::path& file) {
-  const Profile profile = profile_of(bytes);
+  const Profile profile =
+      owned(cmsOpenProfileFromMem(bytes.data(), static_cast<cmsUInt32Number>(bytes.size())));
   if (!profile) refuse(file, "its ICC profile is damaged");
   words_ = "its ICC profile \"" + description_of(profile) + '"';
   const cmsColorSpaceSignature space = cmsGetColorSpace(profile.get());

@@ -32,6 +32,7 @@ struct ColorTag {
   Kind kind = Kind::none;
   std::string bytes{};
 
+  bool has_primaries() const { return kind != Kind::gamma || bytes.size() > 4; }
   friend auto operator<=>(const ColorTag&, const ColorTag&) = default;
 };
 

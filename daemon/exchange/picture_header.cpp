@@ -75,12 +75,13 @@ enum Tag : std::uint64_t {
   compression = 259,
   photometric = 262,
   planar_configuration = 284,
+  sample_format = 339,
   sub_directories = 330,
   dng_version = 50706,
 };
 
-// The first value of each tag of a directory; nothing for a tag that is there twice, of which
-// libraries choose differently.
+// The first value of each tag of a directory, if it is of two or four bytes; nothing for a tag that
+// is there twice, of which libraries choose differently.
 using Directory = std::map<std::uint64_t, std::optional<std::uint64_t>>;
 
 HeaderBytes tiff_bytes(std::string_view file) {
@@ -101,7 +102,9 @@ Directory tiff_directory(const HeaderBytes& bytes, std::uint64_t at) {
     if ((*type == of_two_bytes || *type == of_four_bytes) &&
         bytes.number(entry + 4, 4).value_or(0) > 4 / size)
       place = bytes.number(place, 4).value_or(0);
-    const auto [known, is_new] = directory.try_emplace(*tag, bytes.number(place, size));
+    const bool is_number = *type == of_two_bytes || *type == of_four_bytes;
+    const auto [known, is_new] =
+        directory.try_emplace(*tag, is_number ? bytes.number(place, size) : std::nullopt);
     if (!is_new) known->second = std::nullopt;
   }
   return directory;
@@ -235,7 +238,8 @@ bool is_raw(std::string_view tiff) {
 
 // Returns why a TIFF cannot be a plate, or "".
 std::string tiff_fault(std::string_view tiff) {
-  constexpr std::uint64_t reduced = 1, white_is_zero = 0, palette = 3, cmyk = 5, lab = 8;
+  constexpr std::uint64_t reduced = 1, cmyk = 5, lab = 8, black_is_zero = 1, rgb = 2;
+  constexpr std::uint64_t whole_numbers = 1;
   if (is_raw(tiff)) return raw_photograph;
   const Directory first = first_directory(tiff);
   if (value_of(first, subfile_type).value_or(0) & reduced)
@@ -246,8 +250,11 @@ std::string tiff_fault(std::string_view tiff) {
   const bool is_deep = value_of(first, bits_per_sample).value_or(1) > 8;
   if (colors == cmyk) return "has the colours of print (CMYK); convert it to RGB";
   if (colors >= lab && colors <= lab + 2) return "has L*a*b* colours; convert it to RGB";
-  if (is_deep && (colors == white_is_zero || colors == palette))
-    return "has 16 bits with a palette, or with white as 0; save it as RGB or grey";
+  if (is_deep && colors != black_is_zero && colors != rgb)
+    return "has more than 8 bits, and is neither RGB nor grey with black as 0; save it as one of "
+           "these";
+  if (is_deep && value_of(first, sample_format).value_or(whole_numbers) != whole_numbers)
+    return "has samples that are no whole numbers from 0 on; save it as OpenEXR, or with 16 bits";
   return {};
 }
 

@@ -4,7 +4,9 @@
 #include <string.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <regex>
@@ -19,6 +21,8 @@ namespace fs = std::filesystem;
 
 // More than this of the numbers missing for each that is there, and they are not of frames.
 constexpr std::uint64_t most_missing_for_each = 100;
+// Numbers of as many digits are times: "20261129114510".
+constexpr std::uint64_t least_time = 100'000'000'000;
 // No file has a longer name; std::regex recurses.
 constexpr std::size_t longest_name = 255;
 
@@ -47,24 +51,35 @@ struct NumberPattern {
   std::optional<std::uint64_t> first, last;  // of a range
 };
 
-std::optional<NumberPattern> number_pattern(const std::string& name) {
-  static const std::regex form(
-      R"(^(.*?)(?:(\d+)-(\d+))?(?:%0([1-9])d|(%d)|(#+|@+)|\$F([1-9]?))(.*?)(?: +(\d+)-(\d+))?$)");
-  std::smatch found;
-  if (name.size() > longest_name || !std::regex_match(name, found, form)) return std::nullopt;
-  NumberPattern pattern{found[1], 1, false, found[8], {}, {}};
-  if (found[4].matched || found[7].length() > 0)
-    pattern.digits = number_of((found[4].matched ? found[4] : found[7]).str()).value_or(1);
-  else if (found[6].length() > 1)
-    pattern.digits = static_cast<std::size_t>(found[6].length());
-  else
-    pattern.any_padding = !found[5].matched;
-  for (const int at : {2, 9})
-    if (found[at].matched) {
-      pattern.first = number_of(found[at].str());
-      pattern.last = number_of(found[at + 1].str());
-    }
-  return pattern;
+// Returns what the name may mean, likelier first: a letter that marks a number may also be part of
+// a name.
+std::vector<NumberPattern> number_patterns(const std::string& name) {
+  static const std::array<std::regex, 2> forms = {
+      std::regex(R"(^(.*?)(?:(\d+)-(\d+))?(?:%0([1-9])d|(%d))(.*?)(?: +(\d+)-(\d+))?$)"),
+      std::regex(R"(^(.*?)(?:(\d+)-(\d+))?(?:\$F([1-9]?)|(#+|@+))(.*?)(?: +(\d+)-(\d+))?$)")};
+  std::vector<NumberPattern> patterns;
+  for (const std::regex& form : forms) {
+    std::smatch found;
+    if (name.size() > longest_name || !std::regex_match(name, found, form)) continue;
+    NumberPattern pattern{found[1], 1, false, found[6], {}, {}};
+    const std::string mark = found[5];
+    if (found[4].length() > 0)
+      pattern.digits = number_of(found[4].str()).value_or(1);
+    else if (mark != "%d")
+      pattern.digits = std::max<std::size_t>(1, mark.size());
+    pattern.any_padding = pattern.digits == 1 && mark != "%d";
+    for (const int at : {2, 7})
+      if (found[at].matched) {
+        pattern.first = number_of(found[at].str());
+        pattern.last = number_of(found[at + 1].str());
+      }
+    patterns.push_back(pattern);
+    if (!found[2].matched) continue;
+    pattern.before += found[2].str() + "-" + found[3].str();  // no range, but part of the name
+    pattern.first = pattern.last = std::nullopt;
+    patterns.push_back(pattern);
+  }
+  return patterns;
 }
 
 // A number that is written as the pattern has it, or with too few digits, as programs do that
@@ -112,14 +127,21 @@ std::string ranges_in_words(const std::vector<std::pair<std::uint64_t, std::uint
 
 using Numbered = std::map<std::uint64_t, std::string>;
 
+// Of two names of one number, one that has the pattern's digits goes before one that has fewer.
 Numbered numbered(const std::vector<std::string>& names, const NumberPattern& pattern,
                   const fs::path& path) {
+  const std::size_t whole = pattern.before.size() + pattern.digits + pattern.after.size();
   Numbered files;
-  for (const std::string& name : names)
-    if (const auto number = match(pattern, name))
-      if (const auto [known, is_new] = files.try_emplace(*number, name); !is_new)
-        throw Error(path.string() + ": the number " + std::to_string(*number) +
-                    " is there twice, " + known->second + " and " + name + "; remove one");
+  for (const std::string& name : names) {
+    const auto number = match(pattern, name);
+    if (!number) continue;
+    const auto [known, is_new] = files.try_emplace(*number, name);
+    if (is_new || (known->second.size() >= whole && name.size() < whole)) continue;
+    if (known->second.size() >= whole)
+      throw Error(path.string() + ": the number " + std::to_string(*number) + " is there twice, " +
+                  known->second + " and " + name + "; remove one");
+    known->second = name;
+  }
   return files;
 }
 
@@ -139,11 +161,11 @@ PictureSequence sequence_of(const Numbered& files, const NumberPattern& pattern,
   if (last >= next) holes.emplace_back(next, last);
   for (const auto& [from, to] : holes) sequence.missing += to - from + 1;
   if (sequence.missing == 0) return sequence;
-  if (sequence.missing / most_missing_for_each >= files.size()) {
+  if (sequence.missing / most_missing_for_each >= files.size() || last >= least_time) {
     sequence = whole_sequence(std::move(sequence.files));
     sequence.words = path.string() + ": the numbers in the names, " + std::to_string(first) +
                      " to " + std::to_string(last) +
-                     ", are not those of frames: the pictures are used one after the other";
+                     ", do not count frames: the pictures are used one after the other";
     return sequence;
   }
   sequence.words = path.string() + ": " + ranges_in_words(holes) +
@@ -165,25 +187,24 @@ PictureSequence picture_sequence(const fs::path& path) {
   const std::string name = path.filename().string();
   std::error_code none;
   if (fs::is_regular_file(path, none)) return whole_sequence({path});
-  std::optional<NumberPattern> pattern = number_pattern(name);
-  std::vector<std::string> names;
-  if (pattern) {
-    names = file_names(path.parent_path());
-  } else if (name.find_first_of("*?") != std::string::npos) {
-    for (const std::string& file : file_names(path.parent_path()))
-      if (::fnmatch(name.c_str(), file.c_str(), FNM_PERIOD) == 0) names.push_back(file);
+  const std::vector<std::string> all = file_names(path.parent_path());
+  if (name.find_first_of("*?") != std::string::npos) {
+    std::vector<std::string> names;
+    std::ranges::copy_if(all, std::back_inserter(names), [&](const std::string& file) {
+      return ::fnmatch(name.c_str(), file.c_str(), FNM_PERIOD) == 0;
+    });
     std::ranges::sort(names, [](const std::string& a, const std::string& b) {
       return ::strverscmp(a.c_str(), b.c_str()) < 0;
     });
-    if (names.size() > 1) pattern = common_pattern(names);
-  }
-  if (pattern) {
-    const Numbered files = numbered(names, *pattern, path);
-    if (!files.empty()) return sequence_of(files, *pattern, path);
-  } else if (!names.empty()) {
+    if (const auto pattern = names.size() > 1 ? common_pattern(names) : std::nullopt)
+      return sequence_of(numbered(names, *pattern, path), *pattern, path);
     std::vector<fs::path> files;
     for (const std::string& file : names) files.push_back(path.parent_path() / file);
-    return whole_sequence(std::move(files));
+    if (!files.empty()) return whole_sequence(std::move(files));
+  } else {
+    for (const NumberPattern& pattern : number_patterns(name))
+      if (const Numbered files = numbered(all, pattern, path); !files.empty())
+        return sequence_of(files, pattern, path);
   }
   throw Error(path.string() + ": file not found");
 }

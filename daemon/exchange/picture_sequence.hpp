@@ -14,7 +14,7 @@ struct PictureSequence {
   // count.
   std::vector<std::uint64_t> positions;
   std::uint64_t missing = 0;  // frames, also those of a range that are missing at its ends
-  std::string words;          // "plate.%04d.png: the pictures 1004 and 1005 are missing", or ""
+  std::string words;          // "plate.%04d.png: 1004, 1005 are missing: 2 frames are lost", or ""
 };
 
 // Returns the files that match, in the order of their numbers. A file name may hold
@@ -23,8 +23,9 @@ struct PictureSequence {
 //   $F or $F4     the same, as Houdini has it
 //   * and ?       anything, or one letter: the frame's number is what differs in the names
 // "plate.1001-1100####.png" and "plate.%04d.png 1001-1100" name a range. Any other name is a file.
-// Where names differ in more than one number, or nearly all numbers would be missing, as with times
-// in the names, they hold no numbers of frames and are taken one after the other. Throws
+// A name with * or ? holds no other mark, and %d goes before the others. Where names differ in more
+// than one number, or nearly all numbers would be missing, as with times in the names, they hold no
+// numbers of frames and are used one after the other. Throws
 // previz::Error if there is no such file, or a number is there twice.
 PictureSequence picture_sequence(const std::filesystem::path& pattern);
 

@@ -1,4 +1,6 @@
-#include <fmt/format.h>
+#include <ImfChannelList.h>
+#include <ImfHeader.h>
+#include <ImfInputFile.h>
 #include <tiffio.h>
 
 #include <algorithm>
@@ -41,17 +43,15 @@ PixelFormat format_of(const cv::Mat& image) {
 
 // What a picture's file says beside its samples.
 struct Tags {
-  Orientation orientation;
-  ColorTag color;
+  Orientation orientation{};
+  ColorTag color{};
 };
 
 // Nothing where they are damaged; the picture may be whole.
-std::optional<Tags> tags_of(const std::string& file, const std::string& content,
-                            bool is_turned) try {
+std::optional<Tags> tags_of(const std::string& file, const std::string& content) try {
   const auto image = Exiv2::ImageFactory::open(file);
   image->readMetadata();
   Tags tags{{}, color_tag_of(content, *image)};
-  if (is_turned) return tags;
   const Exiv2::ExifData& data = image->exifData();
   const auto found = data.findKey(Exiv2::ExifKey("Exif.Image.Orientation"));
   if (found == data.end() || found->count() == 0) return tags;
@@ -70,7 +70,8 @@ cv::Mat read_planes(const std::string& name) {
   std::uint16_t count = 0;
   if (!tiff || !TIFFGetField(tiff.get(), TIFFTAG_IMAGEWIDTH, &width) ||
       !TIFFGetField(tiff.get(), TIFFTAG_IMAGELENGTH, &height) ||
-      !TIFFGetField(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, &count) || count > 4)
+      !TIFFGetField(tiff.get(), TIFFTAG_SAMPLESPERPIXEL, &count) || count > 4 || height == 0 ||
+      width == 0 || width > most_pixels / height)
     return {};
   const bool is_tiled = TIFFIsTiled(tiff.get());
   columns = width;
@@ -131,12 +132,15 @@ class PictureFiles final : public Footage {
     std::vector<std::string> notes;
     if (!sequence_.words.empty()) notes.push_back(sequence_.words);
     for (const auto& [what, said] : said_)
+      notes.push_back(said.first + ": " + what +
+                      (said.count == 1 ? "" : " (" + std::to_string(said.count) + " pictures)"));
+    for (const auto& [tag, found] : colors_)
+      if (const double share = found.colors.clipped_share(); share > 0)
+        notes.push_back(found.first + ": " + clipping_words(share));
+    if (outside_ > 0)
       notes.push_back(
-          said.first + ": " + what +
-          (said.count == 1 ? "" : "; so are " + std::to_string(said.count) + " pictures"));
-    for (const auto& [tag, colors] : colors_) note_clipping(colors.clipped_share(), notes);
-    note_clipping(outside_ == 0 ? 0 : static_cast<double>(outside_) / static_cast<double>(samples_),
-                  notes);
+          sequence_.files.front().string() + ": " +
+          clipping_words(static_cast<double>(outside_) / static_cast<double>(samples_)));
     return notes;
   }
 
@@ -145,13 +149,6 @@ class PictureFiles final : public Footage {
     std::string first;  // picture
     std::size_t count = 0;
   };
-
-  void note_clipping(double share, std::vector<std::string>& notes) const {
-    if (share > 0)
-      notes.push_back(fmt::format(
-          "{}: {:.2g} % of the samples are outside of what Rec. 709 holds, and are clipped",
-          sequence_.files.front().string(), 100 * share));
-  }
 
   void note(const std::string& name, const std::string& what) {
     Said& said = said_[what];
@@ -166,16 +163,19 @@ class PictureFiles final : public Footage {
     const bool is_tiff = kind == PictureKind::tiff;
     const bool in_planes = is_tiff && has_deep_planes(content);
     cv::Mat image = decode(name, in_planes);
-    // OpenCV turns TIFF itself.
-    const auto found = tags_of(name, content, is_tiff && !in_planes);
+    const auto found = tags_of(name, content);
     if (!found) note(name, "has damaged metadata; it is used as upright, and as sRGB");
     const Tags tags = found.value_or(Tags{});
     convert(image, tags.color, name);
-    return shaped(picture_of(image, name), read_as_.orientation.value_or(tags.orientation));
+    Picture picture = picture_of(image, name);
+    if (!is_tiff || in_planes) return shaped(std::move(picture), tags.orientation);
+    // OpenCV has turned a TIFF itself.
+    if (read_as_.orientation) turn(picture, tags.orientation.inverse());
+    return shaped(std::move(picture), Orientation{});
   }
 
   // Returns grey, or red, green and blue, of 8 or 16 bits.
-  static cv::Mat decode(const std::string& name, bool has_deep_planes) {
+  static cv::Mat decode(const std::string& name, bool has_deep_planes) try {
     // UNCHANGED keeps the bit depth, and leaves EXIF's rotation to us: IMREAD_COLOR would turn it.
     cv::Mat image = has_deep_planes ? read_planes(name) : cv::imread(name, cv::IMREAD_UNCHANGED);
     if (image.empty()) throw Error(name + ": cannot be read as a picture; it is damaged");
@@ -189,18 +189,28 @@ class PictureFiles final : public Footage {
     if (image.channels() >= 3)
       cv::cvtColor(image, image, image.channels() == 4 ? cv::COLOR_BGRA2RGB : cv::COLOR_BGR2RGB);
     return image;
+  } catch (const cv::Exception& error) {
+    throw Error(name + ": cannot be read as a picture: " + error.err);
   }
 
   void convert(cv::Mat& image, const ColorTag& tag, const std::string& name) {
     if (read_as_.keeps_signal) return;
-    const bool is_said = read_as_.transfer || read_as_.primaries || read_as_.range;
-    const auto found = colors_.find(is_said ? ColorTag{} : tag);
-    StillColors& colors = found != colors_.end() ? found->second
-                                                 : colors_
-                                                       .emplace(is_said ? ColorTag{} : tag,
-                                                                is_said ? StillColors(read_as_)
-                                                                        : StillColors(tag, name))
-                                                       .first->second;
+    const bool is_said =
+        read_as_.transfer || read_as_.primaries || read_as_.range == AVCOL_RANGE_MPEG;
+    const bool is_whole = read_as_.transfer && (read_as_.primaries || !tag.has_primaries());
+    if (is_said && tag.kind != ColorTag::Kind::none && tag.kind != ColorTag::Kind::srgb &&
+        !is_whole)
+      throw Error(name + ": names its colours by " + StillColors(tag, name).words() +
+                  ", and read_as takes the place of all of it: give both \"transfer\" and "
+                  "\"primaries\" there");
+    const ColorTag key = is_said ? ColorTag{} : tag;
+    auto found = colors_.find(key);
+    if (found == colors_.end())
+      found =
+          colors_
+              .emplace(key, Found{name, is_said ? StillColors(read_as_) : StillColors(tag, name)})
+              .first;
+    StillColors& colors = found->second.colors;
     if (!colors.changes_anything()) return;
     colors.convert(image, name);
     note(name, "is converted to Rec. 709 under sRGB's curve, by " + colors.words());
@@ -227,7 +237,8 @@ class PictureFiles final : public Footage {
       note(name, "was written by FFmpeg, which calls every DPX linear; its curve is kept");
     else
       for (const std::string& what : video->notes())
-        note(name, what.substr(std::min(what.size(), name.size() + 2)));
+        note(name, what.ends_with("clipped") ? "has samples outside of what Rec. 709 holds"
+                                             : what.substr(std::min(what.size(), name.size() + 2)));
     picture->name = name;
     picture->container_ns.reset();
     return std::move(*picture);
@@ -235,23 +246,36 @@ class PictureFiles final : public Footage {
 
   // Scene light; the take holds it from 0 to 1 under sRGB's curve.
   Picture read_exr(const std::string& name) {
+    if (read_as_.transfer.value_or(AVCOL_TRC_LINEAR) != AVCOL_TRC_LINEAR || read_as_.range)
+      throw Error(name +
+                  ": is OpenEXR, which holds linear light of any range; read_as can name its "
+                  "primaries only");
     std::vector<std::string> oddities;
     const lighting::LinearPicture light = lighting::read_exr_picture(name, oddities);
-    if (!oddities.empty())
+    if (!oddities.empty() && !read_as_.primaries)
       throw Error(name + ": " + oddities.front() +
                   "; convert it (oiiotool IN --colorconvert ACEScg lin_rec709 -o OUT)");
+    const auto m = *rec709_from(read_as_.primaries.value_or(AVCOL_PRI_BT709));
     cv::Mat image(light.height, light.width, CV_16UC3);
     auto* sample = image.ptr<std::uint16_t>();
     for (const glm::vec3& radiance : light.radiance)
-      for (int c = 0; c < 3; ++c) {
-        const float value = radiance[c];
+      for (std::size_t row = 0; row < 9; row += 3) {
+        const double value =
+            m[row] * radiance.r + m[row + 1] * radiance.g + m[row + 2] * radiance.b;
         outside_ += !(value >= 0 && value <= 1);
         *sample++ = static_cast<std::uint16_t>(
-            std::lround(65535 * tracking::srgb_encode(value > 0 ? std::min(value, 1.0f) : 0)));
+            std::lround(65535 * tracking::srgb_encode(value > 0 ? std::min(value, 1.0) : 0)));
       }
     samples_ += 3 * light.radiance.size();
     note(name, "holds linear light, which is converted to sRGB's curve; 1 is white");
-    return shaped(picture_of(image, name), read_as_.orientation.value_or(Orientation{}));
+    Picture picture = picture_of(image, name);
+    const Imf::InputFile file(name.c_str());
+    if (file.header().channels().findChannel("A")) note(name, "its transparency is not used");
+    constexpr int parts = 10'000;
+    const double aspect = file.header().pixelAspectRatio();
+    if (!read_as_.pixel_aspect && aspect > 0.125 && aspect < 8)
+      make_square(picture, static_cast<int>(std::lround(aspect * parts)), parts);
+    return shaped(std::move(picture), Orientation{});
   }
 
   static Picture picture_of(cv::Mat& image, const std::string& name) {
@@ -261,9 +285,10 @@ class PictureFiles final : public Footage {
     return picture;
   }
 
+  // `orientation` is the file's.
   Picture shaped(Picture picture, const Orientation& orientation) {
     if (const auto& aspect = read_as_.pixel_aspect) make_square(picture, aspect->num, aspect->den);
-    turn(picture, orientation);
+    turn(picture, read_as_.orientation.value_or(orientation));
     if (!orientation.is_upright() && !read_as_.orientation) {
       const std::string what = "is " + orientation.words() + ", as its EXIF data says";
       turned_ = {picture.name + ": " + what};
@@ -275,7 +300,11 @@ class PictureFiles final : public Footage {
   PictureSequence sequence_;
   ReadAs read_as_;
   std::size_t index_ = 0;
-  std::map<ColorTag, StillColors> colors_;
+  struct Found {
+    std::string first;  // picture
+    StillColors colors;
+  };
+  std::map<ColorTag, Found> colors_;
   std::map<std::string, Said> said_;
   std::vector<std::string> turned_;          // the last picture that was
   std::uint64_t samples_ = 0, outside_ = 0;  // of OpenEXR

@@ -341,7 +341,7 @@ class VideoFile final : public Footage {
     if (is_bare_)
       throw Error(fmt::format(
           "{}: is a stream without times, and is damaged after {} frames ({}): which frames are "
-          "lost cannot be told; put it into a container that has times, such as .mkv or .mp4",
+          "lost is unknown; put it into a container that has times, such as .mkv or .mp4",
           file_.string(), shown_, why));
     if (!lost_.contains(sent_pts_)) lost_.add(sent_pts_);
     if (first_fault_.empty()) first_fault_ = why;

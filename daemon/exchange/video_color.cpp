@@ -1,5 +1,7 @@
 #include "daemon/exchange/video_color.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core/matx.hpp>
@@ -134,8 +136,10 @@ std::optional<std::array<double, 9>> rec709_from(const Chromaticities& from) {
       xyz_from(rec709).inv() * adapted(white, white_of(rec709)) * xyz_from(from);
   std::array<double, 9> rows{};
   std::copy_n(matrix.val, rows.size(), rows.begin());
-  // OpenCV's inverse of a singular matrix is zero, and a white without brightness is infinite.
-  if (!std::ranges::all_of(rows, [](double value) { return std::isfinite(value); }) ||
+  // OpenCV's inverse of a singular matrix is zero, and a white without brightness is infinite. No
+  // primaries that something was filmed with need a factor of ten.
+  constexpr double most_factor = 1000;
+  if (!std::ranges::all_of(rows, [](double value) { return std::abs(value) < most_factor; }) ||
       std::abs(cv::determinant(matrix)) < 1e-6)
     return std::nullopt;
   return rows;
@@ -210,7 +214,7 @@ void ColorConversion::convert(std::span<std::uint16_t> rgb) {
                                                 : c == 1 ? g
                                                          : b);
       clipped_ += light < under || light > over;
-      const float root = std::sqrt(std::clamp(light, 0.0f, 1.0f));
+      const float root = std::sqrt(light > 0 ? std::min(light, 1.0f) : 0);  // 0 for no number
       rgb[i + c] = signal_[static_cast<std::size_t>(std::lround(root * 65535))];
     }
   }
@@ -219,6 +223,11 @@ void ColorConversion::convert(std::span<std::uint16_t> rgb) {
 
 double ColorConversion::clipped_share() const {
   return samples_ == 0 ? 0 : static_cast<double>(clipped_) / static_cast<double>(samples_);
+}
+
+std::string clipping_words(double share) {
+  return fmt::format("{:.{}f} % of its samples are outside of what Rec. 709 holds, and are clipped",
+                     100 * share, share < 0.1 ? 2 : 0);
 }
 
 }  // namespace previz::exchange

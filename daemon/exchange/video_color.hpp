@@ -11,6 +11,7 @@ extern "C" {
 #include <functional>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace previz::exchange {
@@ -56,9 +57,9 @@ class ColorConversion {
   bool changes_anything() const { return changes_transfer_ || changes_primaries_ || limited_; }
   // Samples in the order red, green, blue, as many as there are.
   void convert(std::span<std::uint16_t> rgb);
-  // Returns the sample of one that has no colour; `limited` plays no part.
+  // Returns the sample of one that has no colour.
   std::uint16_t gray(std::uint16_t sample) const {
-    return changes_transfer_ ? gray_[sample] : sample;
+    return changes_transfer_ || limited_ ? gray_[sample] : sample;
   }
   // Share of the samples so far that were outside of what Rec. 709 in 0..1 holds by more than half
   // a step of 8 bits, and have been clipped.
@@ -74,5 +75,8 @@ class ColorConversion {
   std::vector<std::uint16_t> gray_;          // the signal of each sample
   std::uint64_t samples_ = 0, clipped_ = 0;
 };
+
+// "4.21 % of its samples are outside of what Rec. 709 holds, and are clipped"
+std::string clipping_words(double share);
 
 }  // namespace previz::exchange

@@ -100,9 +100,7 @@ VideoPictures::VideoPictures(const AVFrame& first, AVStream& stream, AVFormatCon
 std::vector<std::string> VideoPictures::notes() const {
   std::vector<std::string> notes = notes_;
   if (const double share = colors_.clipped_share(); share > 0)
-    notes.push_back(fmt::format(
-        "{}: {:.2g} % of its samples are outside of what Rec. 709 holds, and are clipped",
-        file_.string(), 100 * share));
+    notes.push_back(file_.string() + ": " + clipping_words(share));
   return notes;
 }
 

@@ -109,6 +109,16 @@ bool decoder_assumes_matrix(AVCodecID codec) {
   return codec == AV_CODEC_ID_MJPEG || codec == AV_CODEC_ID_VP8 || codec == AV_CODEC_ID_DNXHD;
 }
 
+// Numbers that H.273 reserves, as where a program wrote 0 for "unknown", say nothing.
+NamedColors without_reserved(NamedColors named) {
+  if (named.matrix == AVCOL_SPC_RESERVED) named.matrix = AVCOL_SPC_UNSPECIFIED;
+  if (named.transfer == AVCOL_TRC_RESERVED0 || named.transfer == AVCOL_TRC_RESERVED)
+    named.transfer = AVCOL_TRC_UNSPECIFIED;
+  if (named.primaries == AVCOL_PRI_RESERVED0 || named.primaries == AVCOL_PRI_RESERVED)
+    named.primaries = AVCOL_PRI_UNSPECIFIED;
+  return named;
+}
+
 // Reads the colours into `tags`, with the words for them.
 void read_colors(const AVFrame& frame, AVCodecID codec, const NamedColors& container,
                  const ReadAs& read_as, const std::filesystem::path& file, VideoTags& tags) {
@@ -116,10 +126,18 @@ void read_colors(const AVFrame& frame, AVCodecID codec, const NamedColors& conta
   const bool has_matrix = !is_rgb(format) && !is_gray(format);
   tags.words = name_of(av_get_pix_fmt_name(format));
 
-  AVColorSpace of_frame = tag_of(frame.colorspace, AVCOL_SPC_NB);
-  if (decoder_assumes_matrix(codec) && container.matrix != AVCOL_SPC_UNSPECIFIED)
+  const NamedColors own = without_reserved(
+      {tag_of(frame.color_range, AVCOL_RANGE_NB), tag_of(frame.colorspace, AVCOL_SPC_NB),
+       tag_of(frame.color_trc, AVCOL_TRC_NB), tag_of(frame.color_primaries, AVCOL_PRI_NB)});
+  AVColorSpace of_frame = own.matrix;
+  if (decoder_assumes_matrix(codec) && container.matrix != AVCOL_SPC_UNSPECIFIED &&
+      container.matrix != AVCOL_SPC_RGB)
     of_frame = AVCOL_SPC_UNSPECIFIED;
-  auto matrix = choose(read_as.matrix, of_frame, container.matrix, AVCOL_SPC_UNSPECIFIED,
+  // 0 is the matrix of RGB, and of whoever wrote 0 for "unknown".
+  if (has_matrix && of_frame == AVCOL_SPC_RGB) of_frame = AVCOL_SPC_UNSPECIFIED;
+  const AVColorSpace of_container =
+      has_matrix && container.matrix == AVCOL_SPC_RGB ? AVCOL_SPC_UNSPECIFIED : container.matrix;
+  auto matrix = choose(read_as.matrix, of_frame, of_container, AVCOL_SPC_UNSPECIFIED,
                        [](AVColorSpace tag) { return av_color_space_name(tag); });
   tags.matrix = matrix.tag == AVCOL_SPC_UNSPECIFIED ? usual_matrix(frame) : matrix.tag;
   if (has_matrix) {
@@ -129,17 +147,15 @@ void read_colors(const AVFrame& frame, AVCodecID codec, const NamedColors& conta
     tags.words += ", matrix " + name_of(av_color_space_name(tags.matrix)) + matrix.source;
   }
 
-  auto range = choose(
-      read_as.range,
-      has_range_in_its_name(format) ? AVCOL_RANGE_JPEG : tag_of(frame.color_range, AVCOL_RANGE_NB),
-      container.range, AVCOL_RANGE_UNSPECIFIED,
-      [](AVColorRange tag) { return tag == AVCOL_RANGE_JPEG ? "full" : "limited"; });
+  auto range = choose(read_as.range, has_range_in_its_name(format) ? AVCOL_RANGE_JPEG : own.range,
+                      container.range, AVCOL_RANGE_UNSPECIFIED, [](AVColorRange tag) {
+                        return tag == AVCOL_RANGE_JPEG ? "full" : "limited";
+                      });
   tags.full_range =
       range.tag == AVCOL_RANGE_UNSPECIFIED ? !has_matrix : range.tag == AVCOL_RANGE_JPEG;
   tags.words += (tags.full_range ? ", full range" : ", limited range") + range.source;
 
-  auto transfer = choose(read_as.transfer, tag_of(frame.color_trc, AVCOL_TRC_NB),
-                         container.transfer, AVCOL_TRC_UNSPECIFIED,
+  auto transfer = choose(read_as.transfer, own.transfer, container.transfer, AVCOL_TRC_UNSPECIFIED,
                          [](AVColorTransferCharacteristic t) { return av_color_transfer_name(t); });
   tags.transfer = read_as.keeps_signal ? AVCOL_TRC_UNSPECIFIED : transfer.tag;
   if (!keeps_signal(tags.transfer) && !light_of(tags.transfer, 0))
@@ -155,9 +171,9 @@ void read_colors(const AVFrame& frame, AVCodecID codec, const NamedColors& conta
         ", transfer " + name_of(av_color_transfer_name(tags.transfer)) + transfer.source +
         (keeps_signal(tags.transfer) ? " (kept: the response curve holds, or sRGB's)" : "");
 
-  auto primaries = choose(read_as.primaries, tag_of(frame.color_primaries, AVCOL_PRI_NB),
-                          container.primaries, AVCOL_PRI_UNSPECIFIED,
-                          [](AVColorPrimaries tag) { return av_color_primaries_name(tag); });
+  auto primaries =
+      choose(read_as.primaries, own.primaries, container.primaries, AVCOL_PRI_UNSPECIFIED,
+             [](AVColorPrimaries tag) { return av_color_primaries_name(tag); });
   tags.primaries = primaries.tag;
   if (!rec709_from(tags.primaries))
     refuse(file, "has the primaries " + name_of(av_color_primaries_name(tags.primaries)),
@@ -225,8 +241,9 @@ bool is_rgb(AVPixelFormat format) {
 }
 
 NamedColors named_colors(const AVCodecParameters& said) {
-  return {tag_of(said.color_range, AVCOL_RANGE_NB), tag_of(said.color_space, AVCOL_SPC_NB),
-          tag_of(said.color_trc, AVCOL_TRC_NB), tag_of(said.color_primaries, AVCOL_PRI_NB)};
+  return without_reserved(
+      {tag_of(said.color_range, AVCOL_RANGE_NB), tag_of(said.color_space, AVCOL_SPC_NB),
+       tag_of(said.color_trc, AVCOL_TRC_NB), tag_of(said.color_primaries, AVCOL_PRI_NB)});
 }
 
 VideoTags tags_of(const AVFrame& frame, AVStream& stream, AVFormatContext& context,

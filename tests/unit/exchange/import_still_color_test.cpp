@@ -58,7 +58,8 @@ std::array<double, 3> meant(const std::array<int, 3>& code, const Curve& curve, 
   return result;
 }
 
-// `step`: how far a code may be from what was written, as a JPEG's are.
+// Within half a code, and a quarter for the profiles' own rounding: their numbers have 16 bits
+// behind the point, and these matrices seven digits.
 void expect_meaning(Shoot& shoot, const std::string& name, const Curve& curve, const Matrix& matrix,
                     const std::string& note, double within = 0.75) {
   shoot.json["observer"]["pictures"] = {name};
@@ -156,6 +157,8 @@ struct TiffForm {
   std::uint32_t subfile = 0;
   std::string profile{};
   const char* mode = "wl";  // or "wb": the order of the bytes
+  std::uint16_t format = SAMPLEFORMAT_UINT, turned = ORIENTATION_TOPLEFT;
+  std::vector<float> primaries{};  // and white
 };
 
 // A TIFF of 16 bits, of red, green and blue, or with more channels.
@@ -172,6 +175,12 @@ void write_tiff(const std::filesystem::path& file, const cv::Mat& rgb, const Tif
   TIFFSetField(tiff.get(), TIFFTAG_PLANARCONFIG,
                form.planes ? PLANARCONFIG_SEPARATE : PLANARCONFIG_CONTIG);
   if (form.packing == COMPRESSION_LZW) TIFFSetField(tiff.get(), TIFFTAG_PREDICTOR, 2);
+  if (form.format != SAMPLEFORMAT_UINT) TIFFSetField(tiff.get(), TIFFTAG_SAMPLEFORMAT, form.format);
+  TIFFSetField(tiff.get(), TIFFTAG_ORIENTATION, form.turned);
+  if (!form.primaries.empty()) {
+    TIFFSetField(tiff.get(), TIFFTAG_PRIMARYCHROMATICITIES, form.primaries.data());
+    TIFFSetField(tiff.get(), TIFFTAG_WHITEPOINT, form.primaries.data() + 6);
+  }
   if (form.subfile != 0) TIFFSetField(tiff.get(), TIFFTAG_SUBFILETYPE, form.subfile);
   if (channels == 4) {
     const std::array<std::uint16_t, 1> alpha = {EXTRASAMPLE_UNASSALPHA};
@@ -250,7 +259,7 @@ TEST(ImportStills, OfIccProfilesAreConverted) {
 }
 
 // A profile may have tables in place of curves and a matrix. This one exchanges nothing but goes
-// through L*a*b*: half a code of rounding, and as much of its grid.
+// through L*a*b*: half a code of rounding, and a code of its grid of 49 points a side.
 TEST(ImportStills, OfIccProfilesWithTablesAreConverted) {
   Shoot shoot;
   const std::unique_ptr<void, Close> adobe(cmsOpenProfileFromMem(
@@ -322,6 +331,24 @@ TEST(ImportStills, OfExifsAdobeRgbAreConverted) {
   }
 }
 
+// TIFF 6.0, section 20. Those that nothing can be seen by are not believed.
+TEST(ImportStills, OfTiffsChromaticitiesAreConverted) {
+  Shoot shoot;
+  write_tiff(shoot.folder() / "p3.tif", in_rgb(patches(CV_16UC3)),
+             {.primaries = {0.680f, 0.320f, 0.265f, 0.690f, 0.150f, 0.060f, 0.3127f, 0.3290f}});
+  expect_meaning(
+      shoot, "p3.tif", [](double s) { return srgb_signal(s); }, from_p3, "its chromaticities");
+  const cv::Mat picture = noise_picture(5, CV_16UC3, 20, 10);
+  for (const std::vector<float>& primaries :
+       {std::vector<float>{0, 0, 1e-40f, 0, 0, 1e-40f, 0.3127f, 0.3290f},
+        std::vector<float>(8, 0)}) {
+    write_tiff(shoot.folder() / "a.tif", in_rgb(picture), {.primaries = primaries});
+    shoot.json["observer"]["pictures"] = {"a.tif"};
+    std::filesystem::remove_all(shoot.session());
+    EXPECT_EQ(shoot.first_frame()->bytes, frame_bytes_of(picture));
+  }
+}
+
 TEST(ImportStills, OfSrgbKeepTheirBits) {
   Shoot shoot;
   const std::array<double, 8> rec709 = {0.3127, 0.3290, 0.64, 0.33, 0.30, 0.60, 0.15, 0.06};
@@ -384,8 +411,42 @@ TEST(ImportStills, AreReadAsFramesJsonSays) {
   std::filesystem::remove_all(shoot.session());
   EXPECT_EQ(shoot.first_frame()->bytes, frame_bytes_of(patches()));
   std::filesystem::remove_all(shoot.session());
+  shoot.json["observer"]["read_as"] = {{"transfer", "linear"}};
+  insert(shoot.folder() / "a.png", chunk("cICP", std::string("\x0c\x0d\x00\x01", 4)));
+  EXPECT_THAT(shoot.error(), AllOf(HasSubstr("a.png: names its colours by its cICP chunk"),
+                                   HasSubstr("give both \"transfer\" and \"primaries\"")));
+  shoot.json["observer"]["read_as"] = {{"transfer", "linear"}, {"primaries", "bt709"}};
+  expect_meaning(
+      shoot, "a.png", [](double s) { return s; }, unit, "FRAMES.json");
+  std::filesystem::remove_all(shoot.session());
   shoot.json["observer"]["read_as"] = {{"matrix", "bt709"}};
   EXPECT_THAT(shoot.error(), HasSubstr("observer.read_as has a matrix"));
+}
+
+// 16 of 255 is black and 235 is white, of greys too.
+TEST(ImportStills, OfLimitedRangeAreReadAsFramesJsonSays) {
+  Shoot shoot;
+  shoot.json["observer"]["pictures"] = {"a.png"};
+  shoot.json["observer"]["read_as"] = {{"range", "limited"}};
+  for (const int type : {CV_8UC1, CV_8UC3})
+    for (const auto& [code, sample] : {std::pair{16, 0}, {235, 65535}}) {
+      write_picture(shoot.folder() / "a.png", cv::Mat(8, 8, type, cv::Scalar::all(code)));
+      std::filesystem::remove_all(shoot.session());
+      const FramePtr frame = shoot.first_frame();
+      EXPECT_EQ(reinterpret_cast<const std::uint16_t*>(frame->bytes.data())[0], sample) << type;
+    }
+}
+
+// OpenCV turns a TIFF itself, which what is said must replace.
+TEST(ImportStills, AreTurnedAsFramesJsonSays) {
+  Shoot shoot;
+  const cv::Mat picture = noise_picture(5, CV_16UC3, 20, 10);
+  write_tiff(shoot.folder() / "a.tif", in_rgb(picture), {.turned = ORIENTATION_RIGHTTOP});
+  shoot.json["observer"]["pictures"] = {"a.tif"};
+  EXPECT_EQ(shoot.first_frame()->width, 10);
+  shoot.json["observer"]["read_as"] = {{"rotation_deg", 0}};
+  std::filesystem::remove_all(shoot.session());
+  EXPECT_EQ(shoot.first_frame()->bytes, frame_bytes_of(picture));
 }
 
 // ---- other kinds
@@ -408,6 +469,19 @@ TEST(ImportStills, TiffOf16BitsWithPlanesIsRight) {
   write_tiff(shoot.folder() / "a.tif", opaque, {.planes = true});
   std::filesystem::remove_all(shoot.session());
   EXPECT_EQ(shoot.first_frame()->bytes, frame_bytes_of(picture));
+}
+
+TEST(ImportStills, TiffOfOtherSamplesIsRefused) {
+  Shoot shoot;
+  const cv::Mat picture = noise_picture(5, CV_16UC3, 20, 10);
+  shoot.json["observer"]["pictures"] = {"a.tif"};
+  for (const bool planes : {false, true}) {
+    write_tiff(shoot.folder() / "a.tif", picture,
+               {.planes = planes, .format = SAMPLEFORMAT_IEEEFP});
+    EXPECT_THAT(shoot.error(), HasSubstr("has samples that are no whole numbers"));
+    write_tiff(shoot.folder() / "a.tif", picture, {.planes = planes, .colors = PHOTOMETRIC_YCBCR});
+    EXPECT_THAT(shoot.error(), HasSubstr("is neither RGB nor grey with black as 0"));
+  }
 }
 
 TEST(ImportStills, ARawPhotographIsNeverItsThumbnail) {
@@ -464,14 +538,23 @@ TEST(ImportStills, OpenExrIsLight) {
   const ImportReport report = shoot.import();
   EXPECT_THAT(report.notes, testing::Contains(HasSubstr("holds linear light")));
   // 1 of 192 samples.
-  EXPECT_THAT(report.notes, testing::Contains(HasSubstr("0.52 % of the samples are outside")));
+  EXPECT_THAT(report.notes, testing::Contains(HasSubstr("0.52 % of its samples are outside")));
   const FramePtr frame = shoot.open()->read(0);
   ASSERT_EQ(frame->format, PixelFormat::rgb16);
   const auto* samples = reinterpret_cast<const std::uint16_t*>(frame->bytes.data());
   EXPECT_EQ(samples[0], 65535);
   EXPECT_EQ(samples[2], 0);
   for (const auto& [c, value] : {std::pair{0, 0.5}, {1, 0.18}, {2, 0.02}})
-    EXPECT_NEAR(samples[3 + c] / 257.0, encoded(value), 0.01);
+    EXPECT_NEAR(samples[3 + c] / 257.0, encoded(value), 0.01);  // a step of 16 bits is 1/257
+
+  shoot.json["observer"]["read_as"] = {{"primaries", "p3-d65"}};
+  std::filesystem::remove_all(shoot.session());
+  const FramePtr wide = shoot.first_frame();
+  const auto* converted = reinterpret_cast<const std::uint16_t*>(wide->bytes.data());
+  EXPECT_NEAR(converted[3] / 257.0, encoded(from_p3[0] * 0.5 + from_p3[1] * 0.18), 0.01);
+  shoot.json["observer"]["read_as"] = {{"transfer", "srgb"}};
+  std::filesystem::remove_all(shoot.session());
+  EXPECT_THAT(shoot.error(), HasSubstr("read_as can name its primaries only"));
 }
 
 }  // namespace previz::exchange::import_still_color_test

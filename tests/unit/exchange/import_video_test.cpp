@@ -167,6 +167,24 @@ TEST(ImportVideo, ACamerasLogarithmicCurveIsRefused) {
   EXPECT_EQ(commented.error(), "");
 }
 
+// Some programs write the number 0, which is the matrix of RGB and else reserved, for "unknown".
+TEST(ImportVideo, NoughtsInPlaceOfColoursSayNothing) {
+  Shoot shoot;
+  for (const char* encoder : {"ffv1", "prores"}) {
+    shoot.film("take.mov",
+               {.pixel_format = "yuv422p10le",
+                .width = 64,
+                .height = 48,
+                .encoder = encoder,
+                .matrix = AVCOL_SPC_RGB,
+                .transfer = AVCOL_TRC_RESERVED0,
+                .primaries = AVCOL_PRI_RESERVED0},
+               {Bytes(64 * 48 * 4, 2)});
+    std::filesystem::remove_all(shoot.session());
+    EXPECT_THAT(shoot.import().notes.at(0), HasSubstr("matrix smpte170m (assumed)")) << encoder;
+  }
+}
+
 TEST(ImportVideo, ReadAsIsCheckedMemberByMember) {
   Shoot shoot;
   const auto error_of = [&](const Json& read_as) {
