@@ -217,7 +217,7 @@ std::span<std::uint16_t> samples_of(cv::Mat& picture) {
 }  // namespace
 
 ColorTag color_tag_of(std::string_view content, Exiv2::Image& image) {
-  const ColorTag png = png_tag(content);
+  ColorTag png = png_tag(content);
   if (png.kind != ColorTag::Kind::none && png.kind != ColorTag::Kind::icc) return png;
   if (image.iccProfileDefined()) {
     return {ColorTag::Kind::icc, text_of(image.iccProfile())};

@@ -113,8 +113,8 @@ cv::Mat read_planes(const std::string& name) {
 
 class PictureFiles final : public Footage {
  public:
-  PictureFiles(PictureSequence sequence, ReadAs read_as)
-      : sequence_(std::move(sequence)), read_as_(std::move(read_as)) {}
+  PictureFiles(PictureSequence sequence, const ReadAs& read_as)
+      : sequence_(std::move(sequence)), read_as_(read_as) {}
 
   std::optional<Picture> next() override {
     if (index_ == sequence_.files.size()) return std::nullopt;

@@ -25,16 +25,16 @@ int number_of(const Frame& frame) {
   return static_cast<int>(std::lround((luma - 20) / 5));
 }
 
-struct Stream {
+struct StreamForm {
   const char *name, *encoder, *ending;
   std::map<std::string, std::string> options{};
 };
 
-std::ostream& operator<<(std::ostream& out, const Stream& stream) {
+std::ostream& operator<<(std::ostream& out, const StreamForm& stream) {
   return out << stream.name;
 }
 
-VideoForm form_of(const Stream& stream) {
+VideoForm form_of(const StreamForm& stream) {
   return {.pixel_format = "yuv420p",
           .width = 128,
           .height = 96,
@@ -47,7 +47,7 @@ void film_part(const Shoot& shoot, const std::string& name, int first, const Vid
 }
 
 // Writes so many recordings, and appends them as `cat` does.
-void film_parts(Shoot& shoot, const Stream& stream, int parts, const Json& more) {
+void film_parts(Shoot& shoot, const StreamForm& stream, int parts, const Json& more) {
   std::string joined;
   for (int part = 0; part < parts; ++part) {
     const std::string name = std::string("part") + stream.ending;
@@ -75,7 +75,7 @@ const Json a_rate = {{"fps", 25}};
 
 const std::map<std::string, std::string> plain_h264 = {{"bf", "0"}, {"g", "6"}, {"qp", "10"}},
                                          b_h264 = {{"bf", "2"}, {"g", "6"}, {"qp", "10"}};
-const Stream streams[] = {
+const StreamForm streams[] = {
     {"h264_ts", "libx264", ".ts", plain_h264},
     {"h264_b_ts", "libx264", ".ts", b_h264},
     {"h264_b_m2ts", "libx264", ".m2ts", b_h264},
@@ -87,7 +87,7 @@ const Stream streams[] = {
     {"mpeg2_mpg", "mpeg2video", ".mpg", {{"bf", "2"}, {"g", "6"}, {"b", "9000000"}}},
 };
 
-class ImportJoinedVideo : public testing::TestWithParam<Stream> {};
+class ImportJoinedVideo : public testing::TestWithParam<StreamForm> {};
 
 TEST_P(ImportJoinedVideo, ComesInWholeAndItsTimesContinue) {
   for (const Json& times : {its_own_times, a_rate}) {
@@ -111,7 +111,7 @@ INSTANTIATE_TEST_SUITE_P(Streams, ImportJoinedVideo, testing::ValuesIn(streams),
 // The second recording begins long before the first: libav takes its times for those of a clock
 // that ran over after 26 hours.
 TEST(ImportVideo, ARecordingOfEarlierTimesThatWasAppendedContinues) {
-  const Stream stream = streams[0];
+  const StreamForm stream = streams[0];
   Shoot shoot;
   std::string joined;
   for (const int part : {0, 1}) {
@@ -128,7 +128,7 @@ TEST(ImportVideo, ARecordingOfEarlierTimesThatWasAppendedContinues) {
 
 // What is lost in one part is counted once, though frames of the others have the same times.
 TEST(ImportVideo, AFrameThatIsLostInOnePartTakesNoneOfAnother) {
-  const Stream stream = streams[0];
+  const StreamForm stream = streams[0];
   Shoot shoot;
   std::string joined;
   for (int part = 0; part < 3; ++part) {
@@ -158,15 +158,15 @@ TEST(ImportVideo, AFrameThatIsLostInOnePartTakesNoneOfAnother) {
 
 // ------------------------------------------------------------ no times
 
-const Stream bare[] = {
+const StreamForm bare[] = {
     {"h264", "libx264", ".h264", plain_h264},
     {"h264_b", "libx264", ".h264", b_h264},
     {"hevc", "libx265", ".hevc", {{"x265-params", "log-level=none:pools=none:bframes=2:qp=10"}}}};
 
-class ImportBareVideo : public testing::TestWithParam<Stream> {};
+class ImportBareVideo : public testing::TestWithParam<StreamForm> {};
 
 TEST_P(ImportBareVideo, ComesInByTheRateThatIsGiven) {
-  const Stream& stream = GetParam();
+  const StreamForm& stream = GetParam();
   Shoot shoot;
   VideoForm form = form_of(stream);
   const std::string name = std::string("take") + stream.ending;
@@ -182,7 +182,7 @@ INSTANTIATE_TEST_SUITE_P(Streams, ImportBareVideo, testing::ValuesIn(bare),
                          [](const auto& stream) { return std::string(stream.param.name); });
 
 TEST(ImportVideo, ABareStreamThatIsDamagedIsRefused) {
-  const Stream stream = bare[0];
+  const StreamForm stream = bare[0];
   Shoot shoot;
   VideoForm form = form_of(stream);
   form.options["sc_threshold"] = "0";  // no further key frames, before which nothing can be missed
@@ -194,7 +194,7 @@ TEST(ImportVideo, ABareStreamThatIsDamagedIsRefused) {
 
 TEST(ImportVideo, AnAVIFileWithoutAllTimesAsksForTheRate) {
   for (const char* encoder : {"libx264", "mpeg4"}) {
-    const Stream stream{"", encoder, ".avi", {{"bf", "2"}, {"g", "6"}}};
+    const StreamForm stream{"", encoder, ".avi", {{"bf", "2"}, {"g", "6"}}};
     Shoot shoot;
     shoot.film("take.avi", form_of(stream), numbered_frames(0, in_part), its_own_times);
     EXPECT_THAT(shoot.error(), HasSubstr("give \"fps\""));

@@ -96,7 +96,7 @@ std::string profile_bytes(cmsHPROFILE made) {
 std::string rgb_profile(const cmsCIExyY& white, const cmsCIExyYTRIPLE& primaries, double gamma) {
   cmsToneCurve* curve = cmsBuildGamma(nullptr, gamma);
   std::array<cmsToneCurve*, 3> curves = {curve, curve, curve};
-  const std::string bytes = profile_bytes(cmsCreateRGBProfile(&white, &primaries, curves.data()));
+  std::string bytes = profile_bytes(cmsCreateRGBProfile(&white, &primaries, curves.data()));
   cmsFreeToneCurve(curve);
   return bytes;
 }

@@ -371,7 +371,7 @@ TEST_P(ImportVideoContainerColors, CountWhereTheFramesSayNothing) {
                       .height = height,
                       .encoder = wrapped.encoder,
                       .options = wrapped.options};
-    form.container = [&](AVCodecParameters& said) {
+    form.container = [matrix = matrix](AVCodecParameters& said) {
       said.color_space = matrix;
       said.color_trc = trc709;
       said.color_primaries = pri709;
