@@ -12,9 +12,11 @@
 #include <optional>
 #include <utility>
 
+#include "daemon/set/check.hpp"
 #include "daemon/tracking/other_tags.hpp"
 #include "daemon/tracking/pose_starts.hpp"
 #include "daemon/tracking/tag_family.hpp"
+#include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::tracking {
@@ -68,7 +70,7 @@ Cause mean_of(Cause all) {
 
 using Frames = std::vector<JudgedFrame>;
 // Changes what is believed about a frame by a factor.
-using Change = std::function<void(double factor, std::vector<TagObservation>&, PinholeIntrinsics&)>;
+using Change = void(double factor, std::vector<TagObservation>&, PinholeIntrinsics&);
 
 void scale_sizes(double factor, std::vector<TagObservation>& tags, PinholeIntrinsics& /*lens*/) {
   for (TagObservation& tag : tags) tag.size_m *= factor;
@@ -95,8 +97,8 @@ std::optional<FittedPose> best_fit(const std::vector<TagObservation>& tags,
 
 // Fits the frames under a change, and leaves their poses there: each from the pose that it has,
 // and, `anew` or if that leads nowhere, from all of its starts.
-std::optional<Cause> fit_changed(Frames& frames, const PinholeIntrinsics& lens,
-                                 const Change& change, double factor, bool anew = false) {
+std::optional<Cause> fit_changed(Frames& frames, const PinholeIntrinsics& lens, Change& change,
+                                 double factor, bool anew = false) {
   Cause cause;
   cause.unknowns = 1;
   cause.value = factor;
@@ -146,8 +148,8 @@ Frames scanned(const Frames& frames) {
 // Finds the factor between 0.4 and 2.5 that fits best: by a scan of few tags whose poses follow
 // the factor, then, with all, by halving the scan's step. Returns nothing if none is worth a word,
 // or once it has to stop.
-std::optional<Cause> cause_by_factor(Frames frames, const PinholeIntrinsics& lens,
-                                     const Change& change, const std::stop_token& stop) {
+std::optional<Cause> cause_by_factor(Frames frames, const PinholeIntrinsics& lens, Change& change,
+                                     const std::stop_token& stop) {
   constexpr double step = 0.025, finest = 2e-5, farthest = 0.9;  // of the factor's logarithm
   std::optional<Cause> best;
   double at = 0;
@@ -213,14 +215,14 @@ std::string size_words(const Frames& frames, const std::string& family, double f
          border_words(family, factor);
 }
 
-std::string focal_words(const Frames& /*frames*/, const std::string& /*family*/, double factor) {
+std::string focal_words(double factor) {
   return fmt::format(
       "the lens's fx and fy are {} too {}, as after a zoom or with another lens's file: calibrate "
       "the lens as it was",
       percent(std::abs(1 - 1 / factor)), factor > 1 ? "small" : "large");
 }
 
-std::string rows_words(const Frames& /*frames*/, const std::string& /*family*/, double moved_px) {
+std::string rows_words(double moved_px) {
   return fmt::format(
       "the rows of a picture do not fit one pose, as with a rolling shutter: the tags move by "
       "{:.1f} px while its height is read; move the camera more slowly, or use one with a global "
@@ -231,16 +233,16 @@ std::string rows_words(const Frames& /*frames*/, const std::string& /*family*/, 
 // Returns the likely cause of the frames' residuals.
 std::string cause_words(const Frames& frames, const PinholeIntrinsics& lens,
                         const std::string& family, const std::stop_token& stop) {
-  using Words = std::string (*)(const Frames&, const std::string&, double);
   Cause none;
   for (const JudgedFrame& frame : frames)
     add(none, frame.tags.size(), frame.fit.chi_square, frame.fit.degrees_of_freedom, 0);
-  std::vector<std::pair<Cause, Words>> causes;
-  const auto offer = [&](const std::optional<Cause>& cause, Words words) {
+  std::vector<std::pair<Cause, std::string>> causes;
+  const auto offer = [&](const std::optional<Cause>& cause, const auto& words) {
     if (cause && kLeastGain * cause->mean_square() < none.mean_square())
-      causes.emplace_back(*cause, words);
+      causes.emplace_back(*cause, words(cause->value));
   };
-  offer(cause_by_factor(frames, lens, scale_sizes, stop), size_words);
+  offer(cause_by_factor(frames, lens, scale_sizes, stop),
+        [&](double factor) { return size_words(frames, family, factor); });
   offer(cause_by_factor(frames, lens, scale_focal_length, stop), focal_words);
   const auto turning = cause_by_rows(frames, lens, false),
              moving = cause_by_rows(frames, lens, true);
@@ -251,10 +253,7 @@ std::string cause_words(const Frames& frames, const PinholeIntrinsics& lens,
   std::string text;
   for (const auto& [cause, words] : causes)
     if (cause.criterion() < causes.front().first.criterion() + kDecisive)
-      add_to_list(
-          text,
-          words(frames, family, cause.value) + fmt::format(" ({:.2f} px remain)", cause.rms_px),
-          "; or ");
+      add_to_list(text, fmt::format("{} ({:.2f} px remain)", words, cause.rms_px), "; or ");
   return text.empty() ? "the lens, the [[tag]] tables and how flat the tags are do not fit "
                         "together: `previzd calibrate tags` measures where the tags are"
                       : text;
@@ -355,8 +354,7 @@ std::string PoseJudgement::why_unusable(int id) const {
   if (seen == seen_.end() || seen->second.frames > 0) return "";
   std::string why;
   for (const auto& [trouble, frames] : seen->second.troubles)
-    add_to_list(why, fmt::format("{} in {} {}", trouble, frames, frames == 1 ? "frame" : "frames"),
-                "; ");
+    add_to_list(why, trouble + " in " + set::plural(frames, "frame"), "; ");
   return why;
 }
 
@@ -376,20 +374,10 @@ std::string PoseJudgement::doubt_about_lost(const std::stop_token& stop) const {
   const bool is_focal = focal && (!size || focal->rms_px < size->rms_px);
   const auto& cause = is_focal ? focal : size;
   if (!cause || !(cause->rms_px < kAgreesPx)) return "";
-  return fmt::format("tags disagree in {} of {} frames, and agree within {:.2f} px if {}", at_odds_,
-                     frames_, cause->rms_px,
-                     (is_focal ? focal_words : size_words)(lost_, tracking_.family, cause->value));
-}
-
-std::string PoseJudgement::doubt_about_doubles() const {
-  std::string text;
-  for (const auto& [id, count] : doubles_)
-    add_to_list(text, fmt::format("tag {} is there twice in {} {}", id, count,
-                                  count == 1 ? "frame" : "frames"));
-  if (text.empty()) return "";
-  return text +
-         ": printed twice, or shown on a screen; only one that is where the other tags have "
-         "it is used: remove or cover the other";
+  return fmt::format(
+      "tags disagree in {} of {} frames, and agree within {:.2f} px if {}", at_odds_, frames_,
+      cause->rms_px,
+      is_focal ? focal_words(cause->value) : size_words(lost_, tracking_.family, cause->value));
 }
 
 std::string PoseJudgement::doubt_about_none(const std::stop_token& stop) const {
@@ -399,8 +387,9 @@ std::string PoseJudgement::doubt_about_none(const std::stop_token& stop) const {
 }
 
 std::vector<std::string> PoseJudgement::doubts(const std::stop_token& stop) const {
-  std::vector<std::string> all{doubt_about_none(stop), doubt_about_residuals(stop),
-                               doubt_about_lost(stop), doubt_about_doubles()};
+  std::vector<std::string> all{
+      doubt_about_none(stop), doubt_about_residuals(stop), doubt_about_lost(stop),
+      doubles_in_words(doubles_, "frame", "only one that is where the other tags have it is used")};
   for (std::string& doubt : doubts_about_unused(stop)) all.push_back(std::move(doubt));
   std::erase(all, "");
   return stop.stop_requested() ? std::vector<std::string>{} : all;

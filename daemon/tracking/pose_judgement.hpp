@@ -53,7 +53,6 @@ class PoseJudgement {
  private:
   std::string doubt_about_residuals(const std::stop_token& stop) const;
   std::string doubt_about_lost(const std::stop_token& stop) const;
-  std::string doubt_about_doubles() const;
   std::string doubt_about_none(const std::stop_token& stop) const;
   std::vector<std::string> doubts_about_unused(const std::stop_token& stop) const;
 
