@@ -155,9 +155,9 @@ std::optional<Cause> cause_by_factor(Frames frames, const PinholeIntrinsics& len
   double at = 0;
   const auto look_at = [&](Frames& some, double exponent, bool anew = false) {
     if (std::abs(exponent) > farthest || stop.stop_requested()) return false;
-    auto cause = fit_changed(some, lens, change, std::exp(exponent), anew);
+    const auto cause = fit_changed(some, lens, change, std::exp(exponent), anew);
     if (!cause || (best && best->chi_square <= cause->chi_square)) return false;
-    best = std::move(cause);
+    best = cause;
     at = exponent;
     return true;
   };

@@ -308,9 +308,11 @@ TEST(PoseJudgement, SaysThatATagIsCutByTheBorder) {
 TEST(PoseJudgement, OfManyTagsTakesTwoSeconds) {
   TagScene believed = table();
   believed.tags.clear();
-  for (int i = 0; i < 60; ++i)
+  for (int i = 0; i < 60; ++i) {
+    const int column = i % 10, row = i / 10;
     believed.tags.push_back(
-        flat_tag(i, 0.04, {0.06 * (i % 10) - 0.27, 0.06 * (i / 10) - 0.15, 0}, 0.3 * i));
+        flat_tag(i, 0.04, {0.06 * column - 0.27, 0.06 * row - 0.15, 0}, 0.3 * i));
+  }
   for (const bool is_lost : {false, true}) {
     TagScene seen = believed;
     for (set::Tag& tag : seen.tags) tag.size_m *= is_lost ? 0.8 : 0.97;
