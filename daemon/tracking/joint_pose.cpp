@@ -14,9 +14,6 @@
 namespace previz::tracking {
 namespace {
 
-// Errors beside the picture's noise (lens model, response, print, map) are a further deviation of
-// every corner coordinate: at least this, more where the residuals require it.
-constexpr double kCornerFloorPx = 0.03;
 constexpr double kDecisiveDrop = 4;
 
 using Vector6 = cv::Matx<double, 6, 1>;

@@ -15,6 +15,10 @@
 
 namespace previz::tracking {
 
+// Errors beside the picture's noise (lens model, response, print, map) are a further deviation of
+// every corner coordinate: at least this, more where the residuals require it.
+inline constexpr double kCornerFloorPx = 0.03;
+
 struct FittedPose {
   CameraFromWorld pose;
   // Row-major 6x6, rotation (rad) then translation (m): the true world_from_camera is the

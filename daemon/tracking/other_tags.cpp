@@ -113,7 +113,8 @@ std::string kind_words(const TagKind& kind, const Sightings& seen, const std::st
 }  // namespace
 
 std::string other_tags(const std::vector<std::shared_ptr<const Frame>>& pictures,
-                       const std::string& family, const ResponseCurve& response) {
+                       const std::string& family, const ResponseCurve& response,
+                       const std::stop_token& stop) {
   AllFamilies detector;
   const Photometry photometry(response);
   std::map<TagKind, Sightings> seen;
@@ -121,8 +122,10 @@ std::string other_tags(const std::vector<std::shared_ptr<const Frame>>& pictures
     if (std::min(picture->width, picture->height) < kMinSearchedSide) continue;
     const auto frame = picture->bayer == BayerPattern::none ? picture : demosaiced(picture);
     const std::vector<std::uint8_t> gray = photometry.gray8(*frame);
-    for (const TagLook& look : tag_looks)
+    for (const TagLook& look : tag_looks) {
+      if (stop.stop_requested()) return "";
       detector.look_at(gray, frame->width, frame->height, look, seen);
+    }
   }
   seen.erase({family, tag_looks[0]});
   const auto most = std::ranges::max_element(

@@ -7,12 +7,16 @@
 #include <bit>
 #include <cmath>
 #include <functional>
+#include <glm/geometric.hpp>
 #include <iterator>
 #include <optional>
 #include <utility>
 
+#include "daemon/set/check.hpp"
 #include "daemon/tracking/other_tags.hpp"
+#include "daemon/tracking/pose_starts.hpp"
 #include "daemon/tracking/tag_family.hpp"
+#include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::tracking {
@@ -30,7 +34,8 @@ constexpr double kWorthAFactor = 0.004;
 constexpr double kAgreesPx = 0.5;      // of tags that disagreed before
 constexpr std::size_t kLeastTags = 3;  // of two, one that moved away looks like a factor of sizes
 constexpr double kSameFactor = 0.015;
-constexpr double kLeastVariancePx2 = 0.03 * 0.03;  // of a corner, as of a pose's fit
+// A factor is looked for in so much of the frames first.
+constexpr std::size_t kScannedFrames = 3, kScannedTags = 8;
 
 // Returns what a chi-square exceeds once in a million times (Wilson and Hilferty 1931).
 double rare_chi_square(int degrees) {
@@ -65,7 +70,7 @@ Cause mean_of(Cause all) {
 
 using Frames = std::vector<JudgedFrame>;
 // Changes what is believed about a frame by a factor.
-using Change = std::function<void(double factor, std::vector<TagObservation>&, PinholeIntrinsics&)>;
+using Change = void(double factor, std::vector<TagObservation>&, PinholeIntrinsics&);
 
 void scale_sizes(double factor, std::vector<TagObservation>& tags, PinholeIntrinsics& /*lens*/) {
   for (TagObservation& tag : tags) tag.size_m *= factor;
@@ -77,67 +82,99 @@ void scale_focal_length(double factor, std::vector<TagObservation>& /*tags*/,
   lens.fy *= factor;
 }
 
-// Returns the best pose of the frame under a change.
-std::optional<FittedPose> best_pose(const std::vector<TagObservation>& tags,
-                                    const PinholeIntrinsics& lens) {
-  const std::vector<FittedPose> poses = solve_joint_pose(tags, lens, {});
-  return poses.empty() ? std::nullopt : std::optional(poses.front());
+// Returns the best pose over all of the tags, from these starts.
+std::optional<FittedPose> best_fit(const std::vector<TagObservation>& tags,
+                                   const PinholeIntrinsics& lens,
+                                   const std::vector<CameraFromWorld>& starts) {
+  std::optional<FittedPose> best;
+  for (const CameraFromWorld& start : starts) {
+    auto fit = refitted_pose(tags, lens, start);
+    if (fit && std::isfinite(fit->rms_px) && !(best && best->chi_square <= fit->chi_square))
+      best = std::move(fit);
+  }
+  return best;
 }
 
-// Returns how badly the frames fit, with a loss that grows slowly, so that a scan finds its way.
-double misfit(const Frames& frames, const PinholeIntrinsics& lens, const Change& change,
-              double factor) {
-  constexpr double scale_px = 0.1, outside_px = 100;
-  double sum = 0;
-  for (const JudgedFrame& frame : frames) {
+// Fits the frames under a change, and leaves their poses there: each from the pose that it has,
+// and, `anew` or if that leads nowhere, from all of its starts.
+std::optional<Cause> fit_changed(Frames& frames, const PinholeIntrinsics& lens, Change& change,
+                                 double factor, bool anew = false) {
+  Cause cause;
+  cause.unknowns = 1;
+  cause.value = factor;
+  for (JudgedFrame& frame : frames) {
     std::vector<TagObservation> tags = frame.tags;
     PinholeIntrinsics changed = lens;
     change(factor, tags, changed);
-    const auto pose = best_pose(tags, changed);
-    for (const TagObservation& tag : tags) {
-      const double off = pose ? tag_error_px(tag, pose->pose, changed) : outside_px;
-      sum += std::log1p(std::pow(std::min(off, outside_px) / scale_px, 2));
+    auto fit = best_fit(tags, changed, {frame.pose});
+    if (anew || !fit) {
+      std::vector<CameraFromWorld> starts = pose_starts(tags, changed);
+      starts.push_back(frame.pose);
+      fit = best_fit(tags, changed, starts);
     }
-  }
-  return sum;
-}
-
-// Finds the factor between 0.4 and 2.5 that fits best: by a scan, then by halving its step.
-double best_factor(const Frames& frames, const PinholeIntrinsics& lens, const Change& change) {
-  constexpr double step = 0.025, finest = 2e-5;
-  double best = 0, least = misfit(frames, lens, change, 1);
-  const auto look_at = [&](double exponent) {
-    const double value = misfit(frames, lens, change, std::exp(exponent));
-    if (value >= least) return false;
-    least = value;
-    best = exponent;
-    return true;
-  };
-  for (int i = -36; i <= 36; ++i)
-    if (i != 0) look_at(i * step);
-  for (double by = step / 2; by > finest; by /= 2)
-    while (look_at(best - by) || look_at(best + by)) {
-    }
-  return std::exp(best);
-}
-
-std::optional<Cause> cause_by_factor(const Frames& frames, const PinholeIntrinsics& lens,
-                                     const Change& change) {
-  Cause cause;
-  cause.unknowns = 1;
-  cause.value = best_factor(frames, lens, change);
-  if (std::abs(cause.value - 1) < kWorthAFactor) return std::nullopt;
-  for (const JudgedFrame& frame : frames) {
-    std::vector<TagObservation> tags = frame.tags;
-    PinholeIntrinsics changed = lens;
-    change(cause.value, tags, changed);
-    const auto start = best_pose(tags, changed);
-    const auto fit = start ? refitted_pose(tags, changed, start->pose) : std::nullopt;
     if (!fit) return std::nullopt;
+    frame.pose = fit->pose;
     add(cause, tags.size(), fit->chi_square, fit->degrees_of_freedom, fit->rms_px);
   }
   --cause.degrees_of_freedom;
   return mean_of(cause);
+}
+
+// Returns some of the tags: each next one is as far as can be from those before it.
+std::vector<TagObservation> spread(const std::vector<TagObservation>& tags) {
+  std::vector<TagObservation> some;
+  std::vector<double> distances(tags.size(), HUGE_VAL);
+  for (std::size_t next = 0; some.size() < std::min(kScannedTags, tags.size());) {
+    some.push_back(tags[next]);
+    for (std::size_t i = 0; i < tags.size(); ++i)
+      distances[i] =
+          std::min(distances[i], glm::distance(tags[i].corners[0], tags[next].corners[0]));
+    next = std::size_t(std::ranges::max_element(distances) - distances.begin());
+  }
+  return some;
+}
+
+// Returns some of the frames, with some of their tags.
+Frames scanned(const Frames& frames) {
+  Frames some;
+  const std::size_t count = std::min(kScannedFrames, frames.size());
+  for (std::size_t i = 0; i < count; ++i) {
+    const JudgedFrame& frame = frames[i * frames.size() / count];
+    some.push_back({spread(frame.tags), frame.pose, {}});
+  }
+  return some;
+}
+
+// Finds the factor between 0.4 and 2.5 that fits best: by a scan of few tags whose poses follow
+// the factor, then, with all, by halving the scan's step. Returns nothing if none is worth a word,
+// or once it has to stop.
+std::optional<Cause> cause_by_factor(Frames frames, const PinholeIntrinsics& lens, Change& change,
+                                     const std::stop_token& stop) {
+  constexpr double step = 0.025, finest = 2e-5, farthest = 0.9;  // of the factor's logarithm
+  std::optional<Cause> best;
+  double at = 0;
+  const auto look_at = [&](Frames& some, double exponent, bool anew = false) {
+    if (std::abs(exponent) > farthest || stop.stop_requested()) return false;
+    const auto cause = fit_changed(some, lens, change, std::exp(exponent), anew);
+    if (!cause || (best && best->chi_square <= cause->chi_square)) return false;
+    best = cause;
+    at = exponent;
+    return true;
+  };
+  Frames few = scanned(frames);
+  look_at(few, 0, true);
+  for (const double way : {step, -step}) {
+    Frames following = few;
+    for (int i = 1; i * step <= farthest; ++i) look_at(following, i * way);
+  }
+  best.reset();
+  look_at(frames, at, true);
+  for (double by = step / 2; by > finest; by /= 2)
+    while (look_at(frames, at - by) || look_at(frames, at + by)) {
+    }
+  if (!best || stop.stop_requested() || std::abs(best->value - 1) < kWorthAFactor)
+    return std::nullopt;
+  return best;
 }
 
 std::optional<Cause> cause_by_rows(const Frames& frames, const PinholeIntrinsics& lens,
@@ -178,14 +215,14 @@ std::string size_words(const Frames& frames, const std::string& family, double f
          border_words(family, factor);
 }
 
-std::string focal_words(const Frames& /*frames*/, const std::string& /*family*/, double factor) {
+std::string focal_words(double factor) {
   return fmt::format(
       "the lens's fx and fy are {} too {}, as after a zoom or with another lens's file: calibrate "
       "the lens as it was",
       percent(std::abs(1 - 1 / factor)), factor > 1 ? "small" : "large");
 }
 
-std::string rows_words(const Frames& /*frames*/, const std::string& /*family*/, double moved_px) {
+std::string rows_words(double moved_px) {
   return fmt::format(
       "the rows of a picture do not fit one pose, as with a rolling shutter: the tags move by "
       "{:.1f} px while its height is read; move the camera more slowly, or use one with a global "
@@ -195,18 +232,18 @@ std::string rows_words(const Frames& /*frames*/, const std::string& /*family*/, 
 
 // Returns the likely cause of the frames' residuals.
 std::string cause_words(const Frames& frames, const PinholeIntrinsics& lens,
-                        const std::string& family) {
-  using Words = std::string (*)(const Frames&, const std::string&, double);
+                        const std::string& family, const std::stop_token& stop) {
   Cause none;
   for (const JudgedFrame& frame : frames)
     add(none, frame.tags.size(), frame.fit.chi_square, frame.fit.degrees_of_freedom, 0);
-  std::vector<std::pair<Cause, Words>> causes;
-  const auto offer = [&](const std::optional<Cause>& cause, Words words) {
+  std::vector<std::pair<Cause, std::string>> causes;
+  const auto offer = [&](const std::optional<Cause>& cause, const auto& words) {
     if (cause && kLeastGain * cause->mean_square() < none.mean_square())
-      causes.emplace_back(*cause, words);
+      causes.emplace_back(*cause, words(cause->value));
   };
-  offer(cause_by_factor(frames, lens, scale_sizes), size_words);
-  offer(cause_by_factor(frames, lens, scale_focal_length), focal_words);
+  offer(cause_by_factor(frames, lens, scale_sizes, stop),
+        [&](double factor) { return size_words(frames, family, factor); });
+  offer(cause_by_factor(frames, lens, scale_focal_length, stop), focal_words);
   const auto turning = cause_by_rows(frames, lens, false),
              moving = cause_by_rows(frames, lens, true);
   const bool also_moves =
@@ -216,10 +253,7 @@ std::string cause_words(const Frames& frames, const PinholeIntrinsics& lens,
   std::string text;
   for (const auto& [cause, words] : causes)
     if (cause.criterion() < causes.front().first.criterion() + kDecisive)
-      add_to_list(
-          text,
-          words(frames, family, cause.value) + fmt::format(" ({:.2f} px remain)", cause.rms_px),
-          "; or ");
+      add_to_list(text, fmt::format("{} ({:.2f} px remain)", words, cause.rms_px), "; or ");
   return text.empty() ? "the lens, the [[tag]] tables and how flat the tags are do not fit "
                         "together: `previzd calibrate tags` measures where the tags are"
                       : text;
@@ -294,16 +328,17 @@ void PoseJudgement::count(const Track& track, const std::vector<TagObservation>&
       continue;
     }
     if (seen.views.size() >= kMostKept) continue;
-    double variance = kLeastVariancePx2;
+    double variance = kCornerFloorPx * kCornerFloorPx;
     for (std::size_t i = 0; i < 8; ++i) variance += tag.covariance[9 * i] / 8;
     seen.views.push_back({camera_from_world(track.pose->world_from_camera), tag.corners, variance});
   }
   for (const UnusableTag& tag : track.unusable) ++seen_[tag.id].troubles[tag.why];
 }
 
-std::vector<std::string> PoseJudgement::doubts_about_unused() const {
+std::vector<std::string> PoseJudgement::doubts_about_unused(const std::stop_token& stop) const {
   std::vector<std::string> all;
   for (const auto& [id, seen] : seen_) {
+    if (stop.stop_requested()) break;
     const std::size_t left_out = seen.frames - seen.used;
     const auto tag = std::ranges::find(tracking_.tags, id, &set::Tag::id);
     if (left_out <= seen.used || tag == tracking_.tags.end()) continue;
@@ -319,55 +354,45 @@ std::string PoseJudgement::why_unusable(int id) const {
   if (seen == seen_.end() || seen->second.frames > 0) return "";
   std::string why;
   for (const auto& [trouble, frames] : seen->second.troubles)
-    add_to_list(why, fmt::format("{} in {} {}", trouble, frames, frames == 1 ? "frame" : "frames"),
-                "; ");
+    add_to_list(why, trouble + " in " + set::plural(frames, "frame"), "; ");
   return why;
 }
 
-std::string PoseJudgement::doubt_about_residuals() const {
+std::string PoseJudgement::doubt_about_residuals(const std::stop_token& stop) const {
   if (doubtful_ == 0 || double(doubtful_) < kDoubtfulShare * double(judged_)) return "";
   return fmt::format(
       "corners of {} of {} tracked frames are off by {:.2f} px where {:.2f} px is to be expected "
       "(medians): {}",
       doubtful_, tracked_, median_of(rms_px_), median_of(expected_px_),
-      cause_words(worst_, camera_.intrinsics, tracking_.family));
+      cause_words(worst_, camera_.intrinsics, tracking_.family, stop));
 }
 
-std::string PoseJudgement::doubt_about_lost() const {
+std::string PoseJudgement::doubt_about_lost(const std::stop_token& stop) const {
   if (lost_.empty()) return "";
-  const auto size = cause_by_factor(lost_, camera_.intrinsics, scale_sizes);
-  const auto focal = cause_by_factor(lost_, camera_.intrinsics, scale_focal_length);
+  const auto size = cause_by_factor(lost_, camera_.intrinsics, scale_sizes, stop);
+  const auto focal = cause_by_factor(lost_, camera_.intrinsics, scale_focal_length, stop);
   const bool is_focal = focal && (!size || focal->rms_px < size->rms_px);
   const auto& cause = is_focal ? focal : size;
   if (!cause || !(cause->rms_px < kAgreesPx)) return "";
-  return fmt::format("tags disagree in {} of {} frames, and agree within {:.2f} px if {}", at_odds_,
-                     frames_, cause->rms_px,
-                     (is_focal ? focal_words : size_words)(lost_, tracking_.family, cause->value));
+  return fmt::format(
+      "tags disagree in {} of {} frames, and agree within {:.2f} px if {}", at_odds_, frames_,
+      cause->rms_px,
+      is_focal ? focal_words(cause->value) : size_words(lost_, tracking_.family, cause->value));
 }
 
-std::string PoseJudgement::doubt_about_doubles() const {
-  std::string text;
-  for (const auto& [id, count] : doubles_)
-    add_to_list(text, fmt::format("tag {} is there twice in {} {}", id, count,
-                                  count == 1 ? "frame" : "frames"));
-  if (text.empty()) return "";
-  return text +
-         ": printed twice, or shown on a screen; only one that is where the other tags have "
-         "it is used: remove or cover the other";
-}
-
-std::string PoseJudgement::doubt_about_none() const {
+std::string PoseJudgement::doubt_about_none(const std::stop_token& stop) const {
   if (has_seen_a_tag_ || without_tags_.empty()) return "";
-  const std::string instead = other_tags(without_tags_, tracking_.family, camera_.response);
+  const std::string instead = other_tags(without_tags_, tracking_.family, camera_.response, stop);
   return instead.empty() ? "" : "no tag of " + tracking_.family + " in any picture: " + instead;
 }
 
-std::vector<std::string> PoseJudgement::doubts() const {
-  std::vector<std::string> all{doubt_about_none(), doubt_about_residuals(), doubt_about_lost(),
-                               doubt_about_doubles()};
-  for (std::string& doubt : doubts_about_unused()) all.push_back(std::move(doubt));
+std::vector<std::string> PoseJudgement::doubts(const std::stop_token& stop) const {
+  std::vector<std::string> all{
+      doubt_about_none(stop), doubt_about_residuals(stop), doubt_about_lost(stop),
+      doubles_in_words(doubles_, "frame", "only one that is where the other tags have it is used")};
+  for (std::string& doubt : doubts_about_unused(stop)) all.push_back(std::move(doubt));
   std::erase(all, "");
-  return all;
+  return stop.stop_requested() ? std::vector<std::string>{} : all;
 }
 
 }  // namespace previz::tracking

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <map>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,8 @@ class PoseJudgement {
   void add(const FramePtr& frame, const Track& track);
 
   // Returns what does not hold, in sentences of their own, with the likely cause of each and what
-  // to do; empty if all is well. Takes up to some seconds.
+  // to do; empty if all is well, or once `stop` is requested. Of tags on frames it takes up to 2 s
+  // (8 frames of 60 tags), of pictures without tags up to 5 s (other_tags()).
   //   residuals  The corners of at least one in twenty tracked frames are farther off than the
   //              noise of their picture leaves them in one picture of a million (chi-square of 8 n
   //              - 6 degrees of freedom), and by more than kWorthAWordPx. The cause is the factor
@@ -42,18 +44,17 @@ class PoseJudgement {
   //              use, and why (why_elsewhere()); all that disagree, if a factor of all sizes or of
   //              the focal length makes them agree.
   //   none       No picture shows a tag of the family: what they hold instead (other_tags()).
-  std::vector<std::string> doubts() const;
+  std::vector<std::string> doubts(const std::stop_token& stop = {}) const;
 
   // Returns why the corners of a tag could be used in no tracked frame ("cut by the picture's
   // border in 3 frames"); empty: they could be.
   std::string why_unusable(int id) const;
 
  private:
-  std::string doubt_about_residuals() const;
-  std::string doubt_about_lost() const;
-  std::string doubt_about_doubles() const;
-  std::string doubt_about_none() const;
-  std::vector<std::string> doubts_about_unused() const;
+  std::string doubt_about_residuals(const std::stop_token& stop) const;
+  std::string doubt_about_lost(const std::stop_token& stop) const;
+  std::string doubt_about_none(const std::stop_token& stop) const;
+  std::vector<std::string> doubts_about_unused(const std::stop_token& stop) const;
 
   // A tag of the stage in the tracked frames.
   struct Seen {

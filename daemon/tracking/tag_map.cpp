@@ -11,6 +11,7 @@
 #include <set>
 #include <utility>
 
+#include "daemon/set/check.hpp"
 #include "daemon/tracking/pose_starts.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
@@ -68,6 +69,16 @@ std::string tags_in_words(const std::vector<int>& ids) {
   for (std::size_t i = 0; i < ids.size(); ++i)
     text += (i == 0 ? "" : i + 1 == ids.size() ? " and " : ", ") + std::to_string(ids[i]);
   return (ids.size() == 1 ? "tag " : "tags ") + text;
+}
+
+std::string doubles_in_words(const std::map<int, std::size_t>& pictures, const std::string& picture,
+                             const std::string& what_is_done) {
+  std::string text;
+  for (const auto& [id, count] : pictures)
+    add_to_list(text, tags_in_words({id}) + " is there twice in " + set::plural(count, picture));
+  return text.empty() ? ""
+                      : text + ": printed twice, or shown on a screen; " + what_is_done +
+                            ": remove or cover the other";
 }
 
 TagMap::TagMap(const std::vector<set::Tag>& tags, const PinholeIntrinsics& lens,

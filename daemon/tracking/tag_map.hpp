@@ -2,6 +2,7 @@
 // a carrier, whose frame then stands for the world.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -19,6 +20,11 @@ namespace previz::tracking {
 
 // Returns words like "tags 3, 5 and 8".
 std::string tags_in_words(const std::vector<int>& ids);
+
+// Returns what to say of tags that are more than once in so many pictures each, by their id: what a
+// picture is called ("frame"), and what is done with those tags. Empty if there are none.
+std::string doubles_in_words(const std::map<int, std::size_t>& pictures, const std::string& picture,
+                             const std::string& what_is_done);
 
 // Remembers the last pose, which resolves what one picture leaves ambiguous.
 class TagMap {

@@ -24,7 +24,7 @@ BracketPicture picture_of(const NamedFrame& named, double exposure) {
   const Plate plate = to_plate(*named.frame);
   BracketPicture picture{named.name, exposure, plate.width, plate.height, {}};
   for (const std::uint16_t sample : plate.samples)
-    picture.rgb.push_back(std::uint8_t(plate.bits == 8 ? sample : sample >> 8));
+    picture.rgb.push_back(std::uint8_t(plate.bits == 8 ? sample : (sample + 128) / 257));
   return picture;
 }
 

@@ -13,7 +13,7 @@ struct BracketPicture {
   std::string name;
   double exposure = 0;  // any unit that is the same for all
   int width = 0, height = 0;
-  std::vector<std::uint8_t> rgb;  // 8 bits per sample; the upper 8 of deeper pictures
+  std::vector<std::uint8_t> rgb;  // codes of 8 bits, the nearest of deeper pictures
 };
 
 // Returns the pictures of a bracket, darkest first, no two of the same exposure (within 1 %). They

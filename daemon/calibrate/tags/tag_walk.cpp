@@ -48,7 +48,7 @@ struct SeenTag {
 
 // `doubles` counts the pictures in which a tag is more than once.
 std::vector<SeenTag> usable_tags(const std::vector<tracking::TagDetection>& detections,
-                                 const WalkOptions& options, std::map<int, int>& doubles) {
+                                 const WalkOptions& options, std::map<int, std::size_t>& doubles) {
   std::map<int, int> times;
   for (const tracking::TagDetection& tag : detections) ++times[tag.id];
   for (const auto& [id, count] : times)
@@ -129,7 +129,7 @@ TagWalk gather_walk(PictureSource& source, const PinholeIntrinsics& lens,
   tracking::TagDetector detector(options.detector, lens, response);
   TagWalk walk;
   std::vector<SeenTag> seen;
-  std::map<int, int> doubles;
+  std::map<int, std::size_t> doubles;
   std::vector<FramePtr> sampled;
   std::size_t index = 0, looked_at = 0;
   const std::size_t stride = stride_of(source, options);
@@ -148,11 +148,8 @@ TagWalk gather_walk(PictureSource& source, const PinholeIntrinsics& lens,
     }
     walk.pictures.push_back(picture->name);
   }
-  for (const auto& [id, pictures] : doubles)
-    report(
-        fmt::format("tag {} is there twice in {} of the pictures: printed twice, or shown on a "
-                    "screen; those pictures are used without it: remove or cover one of the two",
-                    id, pictures));
+  if (!doubles.empty())
+    report(tracking::doubles_in_words(doubles, "picture", "those pictures are used without it"));
   if (seen.empty())
     throw Error(nothing_seen(looked_at, sampled, response, options.detector.family));
   number_tags(seen, options.sizes, walk);

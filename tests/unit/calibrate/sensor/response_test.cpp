@@ -179,6 +179,24 @@ TEST_F(BracketFiles, ComeDarkestFirst) {
   EXPECT_EQ(bracket[0].rgb[2], 3);
 }
 
+// A curve's code c is 257 c of 16 bits, as lighting::Response reads them: the nearest one is off by
+// at most half a code.
+TEST_F(BracketFiles, Of16BitsAreTheNearestCodes) {
+  cv::Mat3w every(256, 256);
+  for (int i = 0; i < 65536; ++i) {
+    const auto sample = std::uint16_t(i);
+    every(i / 256, i % 256) = {sample, sample, sample};
+  }
+  for (const char* name : {"a.png", "b.png", "c.png"})
+    cv::imwrite((folder() / name).string(), every);
+  const auto bracket = read_bracket(folder(), "", list("a.png 1\nb.png 2\nc.png 4\n"));
+  ASSERT_EQ(bracket[0].rgb.size(), 3u * 65536);
+  double most = 0;
+  for (std::size_t i = 0; i < 65536; ++i)
+    most = std::max(most, std::abs(bracket[0].rgb[3 * i] - double(i) / 257));
+  EXPECT_LE(most, 0.5);
+}
+
 TEST_F(BracketFiles, EveryMistakeIsNamed) {
   EXPECT_THAT(problem("a.png 1\nb.png 2\n"), HasSubstr("no line for c.png"));
   EXPECT_THAT(problem("a.png 1\nb.png two\n"), HasSubstr(":2: \"two\" is not an exposure"));

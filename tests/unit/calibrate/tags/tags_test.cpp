@@ -419,7 +419,7 @@ TEST_F(TagCommand, NamesATagThatIsThereTwice) {
   }
   options.force = true;
   const std::string words = said();
-  EXPECT_THAT(words, HasSubstr("tag 2 is there twice in 2 of the pictures: printed twice"));
+  EXPECT_THAT(words, HasSubstr("tag 2 is there twice in 2 pictures: printed twice"));
   EXPECT_THAT(words, HasSubstr("tag 2: 12 pictures"));
   EXPECT_THAT(words, HasSubstr("tag 3: 14 pictures"));
 }
