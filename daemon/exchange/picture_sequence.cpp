@@ -79,6 +79,11 @@ std::vector<NumberPattern> number_patterns(const std::string& name) {
     pattern.first = pattern.last = std::nullopt;
     patterns.push_back(pattern);
   }
+  static const std::regex range(R"(^(.*?)[\[{](\d+)(?:-|\.\.)(\d+)[\]}](.*)$)");
+  std::smatch found;
+  if (name.size() <= longest_name && std::regex_match(name, found, range))
+    patterns.push_back({found[1], static_cast<std::size_t>(found[2].length()), false, found[4],
+                        number_of(found[2].str()), number_of(found[3].str())});
   return patterns;
 }
 

@@ -22,7 +22,8 @@ struct PictureSequence {
 //   #### or @@@@  the same, with as many digits; one of them: any number of digits
 //   $F or $F4     the same, as Houdini has it
 //   * and ?       anything, or one letter: the frame's number is what differs in the names
-// "plate.1001-1100####.png" and "plate.%04d.png 1001-1100" name a range. Any other name is a file.
+// "plate.1001-1100####.png", "plate.%04d.png 1001-1100", "plate.[1001-1100].png" and
+// "plate.{1001..1100}.png" name a range. Any other name is a file.
 // A name with * or ? holds no other mark, and %d goes before the others. Where names differ in more
 // than one number, or nearly all numbers would be missing, as with times in the names, they hold no
 // numbers of frames and are used one after the other. Throws

@@ -36,7 +36,8 @@ TEST(PictureSequence, AHoleIsLostFramesHoweverThePatternIsWritten) {
   for (const char* pattern :
        {"plate.%04d.png", "plate.%d.png", "plate.####.png", "plate.#.png", "plate.@@@@.png",
         "plate.@.png", "plate.$F4.png", "plate.$F.png", "plate.*.png", "plate.????.png",
-        "plate.%04d.png 1001-1005", "plate.1001-1005####.png"}) {
+        "plate.%04d.png 1001-1005", "plate.1001-1005####.png", "plate.[1001-1005].png",
+        "plate.{1001..1005}.png"}) {
     const PictureSequence found = with_holes.find(pattern);
     EXPECT_EQ(found.files.size(), 3u) << pattern;
     EXPECT_THAT(found.positions, ElementsAre(0, 1, 4)) << pattern;
