@@ -196,7 +196,8 @@ int track_take(const TrackOptions& options, std::ostream& out) {
   print_tags(frames, judgement, out);
   print_strangers(frames, take.set.tracking, out);
   print_reasons(frames, out);
-  for (const std::string& doubt : judgement.doubts(options.stop)) out << "warning: " << doubt << '\n';
+  for (const std::string& doubt : judgement.doubts(options.stop))
+    out << "warning: " << doubt << '\n';
   if (options.out) out << options.out->string() << std::endl;
   const bool found =
       std::ranges::any_of(frames, [](const auto& one) { return one.record.tracked; });

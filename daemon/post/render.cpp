@@ -296,7 +296,8 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
                     (to_do.size() == 1 ? "is" : "are") + " rendered here");
   }
   if (options.stop.stop_requested()) return;
-  for (const std::string& doubt : judgement.doubts(options.stop)) progress.note("tracking: " + doubt);
+  for (const std::string& doubt : judgement.doubts(options.stop))
+    progress.note("tracking: " + doubt);
 }
 
 void report_opened(const RenderDirectory& directory, const RenderReport& report,

@@ -21,7 +21,8 @@ void read(const std::filesystem::path& description) {
   for (const auto* footage : {&read.observer, read.light ? &*read.light : nullptr}) {
     if (!footage) continue;
     expect(!footage->exposure.empty(), "the exposure is resolved");
-    expect(footage->pictures.files.empty() != footage->videos.empty(), "there are pictures or a video");
+    expect(footage->pictures.files.empty() != footage->videos.empty(),
+           "there are pictures or a video");
   }
 }
 

@@ -98,9 +98,10 @@ TEST_P(CharucoForms, GiveTheLens) {
     View view{std::to_string(i), {}, corners.pixels};
     for (std::size_t j = 0; j < corners.ids.size(); ++j) {
       const int id = corners.ids[j], across = print.columns - 1;
+      const int column = id % across, row = id / across;
       view.points.push_back(board.points[std::size_t(id)]);
-      const cv::Vec3d at = map * cv::Vec3d(margin_px + (id % across + 1) * square_px - 0.5,
-                                           margin_px + (id / across + 1) * square_px - 0.5, 1);
+      const cv::Vec3d at = map * cv::Vec3d(margin_px + (column + 1) * square_px - 0.5,
+                                           margin_px + (row + 1) * square_px - 0.5, 1);
       largest_px =
           std::max(largest_px, glm::distance(corners.pixels[j], {at[0] / at[2], at[1] / at[2]}));
     }

@@ -188,8 +188,8 @@ TEST(RealsenseFiles, ForwardModelsAreRead) {
   plain.k1 = plain.k2 = plain.p1 = plain.p2 = plain.k3 = 0;
   expect_pinhole(lens_of(realsense("distortion.inverse_brown_conrady", "0, 0, 0, 0, 0")), plain);
   for (const char* model : {"distortion.inverse_brown_conrady", "Inverse Brown Conrady", "ftheta"})
-    EXPECT_THAT(refusal(realsense(model, five)),
-                HasSubstr(std::string("model: RealSense's \"") + model + "\" with such coefficients"));
+    EXPECT_THAT(refusal(realsense(model, five)), HasSubstr(std::string("model: RealSense's \"") +
+                                                           model + "\" with such coefficients"));
   EXPECT_THAT(refusal(realsense("F Theta", "0, 0, 0, 0, 0")), HasSubstr("RealSense's \"F Theta\""));
   const FileLens fisheye = lens_of(realsense("kannala_brandt4", "-0.02, 0.004, -0.003, 0.0005, 0"));
   EXPECT_EQ(std::get<FisheyeIntrinsics>(fisheye.lens).k[3], 0.0005);
