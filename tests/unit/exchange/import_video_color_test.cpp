@@ -428,9 +428,12 @@ TEST(ImportVideo, ColoursOfTheContainerAreNamedAsSuch) {
   };
   Shoot shoot;
   shoot.film("take.mov", form, {red_frame(prores, bt709, 32, 16)});
-  EXPECT_THAT(shoot.import().notes.at(0), AllOf(HasSubstr("matrix bt709 (from the container)"),
-                                                HasSubstr("transfer bt709 (from the container)"),
-                                                HasSubstr("primaries bt709 (from the container)")));
+  // Decoders of FFmpeg 7 put the container's colours into frames that have none of their own.
+  const std::string source = LIBAVCODEC_VERSION_MAJOR < 61 ? " (from the container)" : "";
+  EXPECT_THAT(
+      shoot.import().notes.at(0),
+      AllOf(HasSubstr("matrix bt709" + source), HasSubstr("transfer bt709" + source),
+            HasSubstr("primaries bt709" + source), Not(HasSubstr("primaries bt709 (assumed)"))));
 }
 
 TEST(ImportVideo, FramesThatDisagreeWithTheContainerCountAndItIsSaid) {
