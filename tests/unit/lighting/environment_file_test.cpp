@@ -205,4 +205,12 @@ TEST_F(LoadEnvironment, AHugeAttributeIsRefusedBeforeMemoryIsAskedFor) {
   EXPECT_THAT(refusal(), HasSubstr("its header is damaged"));
 }
 
+// And an attribute of another size than its type has, behind which OpenEXR reads on elsewhere.
+TEST_F(LoadEnvironment, AnAttributeOfAnotherSizeThanItsTypesIsRefused) {
+  const std::string name("pixelAspectRatio\0float\0", 23);
+  std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name
+                                        << std::string("\x08\0\0\0", 4) << std::string(64, '\0');
+  EXPECT_THAT(refusal(), HasSubstr("its header is damaged"));
+}
+
 }  // namespace previz::lighting::environment_file_test
