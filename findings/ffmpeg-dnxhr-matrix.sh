@@ -2,9 +2,9 @@
 # The frames of a DNxHR HQ clip of FFmpeg name the BT.709 matrix, whatever matrix its encoder was told.
 #
 # One would expect the matrix that the encoder is given to come back from the decoder, as with H.264,
-# or "unspecified", as with ProRes. FFmpeg's encoder writes nothing of it for 4:2:2 of 8 bits, and its
-# decoder reports bt709: for pictures that were coded by BT.601 (smpte170m) and BT.2020 alike. Red of a
-# BT.601 clip comes in 8.7 % too dark for whoever believes the frames.
+# or "unspecified", as with ProRes. For 4:2:2 of 8 bits the decoder reports bt709, also where the encoder
+# was told smpte170m or bt2020nc. Pure red that was coded by BT.601 (luma 0.299, red difference 0.5) is
+# 0.299 + 0.5 * 1.5748 = 1.086 for whoever decodes it by BT.709.
 # Seen with FFmpeg N-47683 of 2018 and ffprobe N-66595 of 2023 (npm @ffmpeg-installer/linux-x64 4.1.0,
 # @ffprobe-installer/linux-x64 5.2.0) on 2026-11-29. With Debian 12's FFmpeg 5.1.9 the container's colr
 # atom has the right matrix, which ffprobe prints for the stream, and frames still say bt709.

@@ -132,7 +132,7 @@ std::string ranges_in_words(const std::vector<std::pair<std::uint64_t, std::uint
 
 using Numbered = std::map<std::uint64_t, std::string>;
 
-// Of two names of one number, one that has the pattern's digits goes before one that has fewer.
+// Where two names have one number, one with the pattern's digits goes before one with fewer.
 Numbered numbered(const std::vector<std::string>& names, const NumberPattern& pattern,
                   const fs::path& path) {
   const std::size_t whole = pattern.before.size() + pattern.digits + pattern.after.size();

@@ -63,7 +63,7 @@ std::optional<Tags> tags_of(const std::string& file, const std::string& content)
   return std::nullopt;
 }
 
-// OpenCV before 4.13 takes planes of 16 bits for interleaved samples (its issue 29567).
+// OpenCV 4.6 takes planes of 16 bits for interleaved samples (its issue 29567).
 cv::Mat read_planes(const std::string& name) {
   const std::unique_ptr<TIFF, decltype(&TIFFClose)> tiff(TIFFOpen(name.c_str(), "r"), TIFFClose);
   std::uint32_t width = 0, height = 0, rows = 0, columns = 0;

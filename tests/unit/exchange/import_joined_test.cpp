@@ -126,7 +126,7 @@ TEST(ImportVideo, ARecordingOfEarlierTimesThatWasAppendedContinues) {
   expect_all_frames(shoot, 2 * in_part);
 }
 
-// What is lost in one part is counted once, though frames of the others have the same times.
+// A frame that is lost in one part counts once, though frames of the others have its time.
 TEST(ImportVideo, AFrameThatIsLostInOnePartTakesNoneOfAnother) {
   const StreamForm stream = streams[0];
   Shoot shoot;

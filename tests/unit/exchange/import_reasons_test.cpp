@@ -1,4 +1,4 @@
-// What is said of footage that does not fit or cannot be read: why, and what leads on.
+// Footage that does not fit or cannot be read is refused with the reason and what leads on.
 #include "drivers/av.hpp"
 #include "tests/support/import_fixture.hpp"
 

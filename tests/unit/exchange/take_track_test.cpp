@@ -139,7 +139,7 @@ TEST_F(UntrackedTake, PosesAreFoundWithoutRendering) {
   EXPECT_EQ(count, frames);
 }
 
-// What is judged is shown with the tracker's tests (PoseJudgement.*).
+// The tracker's tests show what is judged (PoseJudgement.*).
 TEST_F(UntrackedTake, SaysWhatDoesNotHold) {
   TrackOptions options;
   options.session = session_;

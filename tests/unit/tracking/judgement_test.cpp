@@ -251,7 +251,7 @@ TEST(PoseJudgement, NamesASizeByTheOuterEdge) {
   }
 }
 
-// What is done to one tag, and what is said of it.
+// A change to one tag, and the words for it.
 TEST(PoseJudgement, SaysWhyATagIsNotUsed) {
   const TagScene believed = wide_table();
   const auto doubt = [&](const std::function<void(std::vector<set::Tag>&)>& change) {
