@@ -7,12 +7,10 @@
 #include <array>
 #include <cctype>
 #include <cmath>
-#include <cstdlib>
-#include <fstream>
 #include <optional>
-#include <span>
 #include <utility>
 
+#include "daemon/scene/named_file.hpp"
 #include "daemon/scene/picture_bytes.hpp"
 #include "daemon/tracking/photometry.hpp"
 #include "drivers/error.hpp"
@@ -24,41 +22,6 @@ namespace {
 // All pictures of a scan together: 64 of 4096 x 4096.
 constexpr std::size_t most_texels = std::size_t{1} << 30;
 constexpr std::uintmax_t most_texture_bytes = std::uintmax_t{1} << 30;
-
-// Returns the path with %20 and the like decoded, as glTF writes it (RFC 3986, 2.1).
-std::string without_escapes(const std::string& path) {
-  std::string plain;
-  for (std::size_t i = 0; i < path.size(); ++i) {
-    const auto digit = [&](std::size_t k) {
-      return k < path.size() && std::isxdigit(static_cast<unsigned char>(path[k])) != 0;
-    };
-    if (path[i] == '%' && digit(i + 1) && digit(i + 2)) {
-      plain += static_cast<char>(std::strtol(path.substr(i + 1, 2).c_str(), nullptr, 16));
-      i += 2;
-    } else {
-      plain += path[i];
-    }
-  }
-  return plain;
-}
-
-bool leads_out(const std::filesystem::path& path) {
-  return path.is_absolute() || std::ranges::find(path, "..") != path.end();
-}
-
-// Returns where a texture may be: as written, if that is within the scan's folder, and beside the
-// scan, if the path is another computer's.
-std::vector<std::filesystem::path> candidates_for(const std::filesystem::path& scan,
-                                                  std::string path) {
-  std::ranges::replace(path, '\\', '/');
-  std::vector<std::filesystem::path> candidates;
-  for (const std::string& written : {path, without_escapes(path)}) {
-    const std::filesystem::path texture(written);
-    if (!leads_out(texture)) candidates.push_back(scan.parent_path() / texture);
-    candidates.push_back(scan.parent_path() / texture.filename());
-  }
-  return candidates;
-}
 
 std::uint8_t luma_of(const aiColor4D& colour, bool is_linear) {
   double luma = 0.2126 * static_cast<double>(colour.r) + 0.7152 * static_cast<double>(colour.g) +
@@ -165,14 +128,14 @@ std::vector<unsigned char> ColourReader::bytes_of(const std::string& path) const
     const auto* first = reinterpret_cast<const unsigned char*>(embedded->pcData);
     return {first, first + embedded->mWidth};
   }
-  for (const std::filesystem::path& file : candidates_for(file_, path)) {
+  if (const auto found = scene::find_named_file(file_, path, scene::names_in_scans)) {
     std::error_code ignored;
-    if (!std::filesystem::is_regular_file(file, ignored)) continue;
-    if (std::filesystem::file_size(file, ignored) > most_texture_bytes)
-      throw Error(file.string() + ": is larger than 1 GiB; export the scan with smaller textures");
-    std::ifstream in(file, std::ios::binary);
-    std::vector<unsigned char> bytes{std::istreambuf_iterator<char>(in), {}};
-    if (in.bad() || !in.is_open()) throw Error(file.string() + ": cannot be read");
+    if (std::filesystem::file_size(found->path, ignored) > most_texture_bytes)
+      throw Error(found->path.string() +
+                  ": is larger than 1 GiB; export the scan with smaller textures");
+    std::vector<unsigned char> bytes;
+    if (const std::string wrong = scene::read_regular_file(found->path, bytes); !wrong.empty())
+      throw Error(found->path.string() + ": cannot be read: " + wrong);
     return bytes;
   }
   throw Error(

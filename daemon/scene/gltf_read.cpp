@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fstream>
 #include <string_view>
 
 #include "daemon/scene/gltf_components.hpp"
 #include "daemon/scene/gltf_compression.hpp"
 #include "daemon/scene/gltf_extensions.hpp"
 #include "daemon/scene/gltf_json.hpp"
+#include "daemon/scene/named_file.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
@@ -26,21 +26,6 @@ std::string one_line(std::string text) {
   return set::printable(text);
 }
 
-// Reads a regular file of at most max_file_bytes; returns what is wrong, or "".
-std::string read_file(const fs::path& file, std::vector<unsigned char>& bytes) {
-  std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status)) return "file not found";
-  if (!fs::is_regular_file(status)) return "it is not a regular file";
-  const std::uint64_t size = fs::file_size(file, error);
-  if (error) return "its size cannot be read";
-  if (size > max_file_bytes) return "it is larger than 4 GiB";
-  std::ifstream stream(file, std::ios::binary);
-  bytes.resize(size);
-  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
-  return stream.good() || size == 0 ? "" : "it cannot be read";
-}
-
 // tinygltf looks for external files beside the glTF file, whose directory we give as absolute, and
 // then in the working directory, where no file may be taken from.
 bool file_exists(const std::string& path, void*) {
@@ -52,7 +37,7 @@ std::string same_path(const std::string& path, void*) {
 }
 bool read_whole_file(std::vector<unsigned char>* bytes, std::string* error, const std::string& path,
                      void*) {
-  const std::string wrong = read_file(path, *bytes);
+  const std::string wrong = read_regular_file(path, *bytes);
   if (!wrong.empty() && error) *error = wrong;
   return wrong.empty();
 }
@@ -140,7 +125,7 @@ std::vector<unsigned char> with_json(const std::vector<unsigned char>& bytes, st
 tinygltf::Model read_gltf(const fs::path& path, Notes& notes) {
   const std::string file = path.string();
   std::vector<unsigned char> bytes;
-  if (const std::string wrong = read_file(path, bytes); !wrong.empty())
+  if (const std::string wrong = read_regular_file(path, bytes); !wrong.empty())
     throw Error(file + ": cannot be opened: " + wrong);
 
   const bool is_binary = bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "daemon/scene/gltf_accessor.hpp"
@@ -38,6 +37,26 @@ std::vector<glm::vec4> linearise(const Sample* samples, std::size_t texels, Enco
 }
 
 }  // namespace
+
+EncodedImage encoded_image(const tinygltf::Model& model, int index, const std::string& file,
+                           NameRules) {
+  if (index < 0 || static_cast<std::size_t>(index) >= model.images.size())
+    throw Error(file + ": no image " + std::to_string(index));
+  const tinygltf::Image& image = model.images[static_cast<std::size_t>(index)];
+  EncodedImage encoded;
+  encoded.name = image.name.empty() ? image.uri : image.name;
+  encoded.where =
+      file + ": image " + std::to_string(index) +
+      (encoded.name.empty() ? std::string() : " \"" + set::printable(encoded.name) + "\"");
+  if (image.bufferView >= 0) {
+    const auto bytes = view_bytes(model, image.bufferView, encoded.where);
+    encoded.bytes.assign(bytes.begin(), bytes.end());
+  } else {
+    encoded.bytes = image.image;
+  }
+  if (encoded.bytes.empty()) throw Error(encoded.where + ": not found, or empty");
+  return encoded;
+}
 
 std::uint32_t GltfTextures::use(int index, Encoding encoding) {
   const std::string name = "texture " + std::to_string(index);
@@ -72,20 +91,16 @@ std::uint32_t GltfTextures::use(int index, Encoding encoding) {
 }
 
 Texture GltfTextures::decode(int index, Encoding encoding) {
-  const tinygltf::Image& image = model_.images[static_cast<std::size_t>(index)];
-  const std::string& given = image.name.empty() ? image.uri : image.name;
-  const std::string where = file_ + ": image " + std::to_string(index) +
-                            (given.empty() ? std::string() : " \"" + set::printable(given) + "\"");
-  const std::span<const unsigned char> bytes = image.bufferView >= 0
-                                                   ? view_bytes(model_, image.bufferView, where)
-                                                   : std::span<const unsigned char>(image.image);
-  if (bytes.empty()) throw Error(where + ": not found, or empty");
+  const EncodedImage image = encoded_image(model_, index, file_, names_in_objects);
+  const std::vector<unsigned char>& bytes = image.bytes;
+  const std::string& where = image.where;
+  if (!image.note.empty()) notes_.add(image.note);
   auto [width, height] = checked_picture_size(bytes, where);
   const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   budget_.add_texture(width, height, where);
 
   Texture texture;
-  texture.name = given.empty() ? "image " + std::to_string(index) : given;
+  texture.name = image.name.empty() ? "image " + std::to_string(index) : image.name;
   texture.width = width;
   texture.height = height;
   const int size = static_cast<int>(bytes.size());

@@ -8,11 +8,27 @@
 #include <optional>
 #include <string>
 #include <tuple>
+#include <vector>
 
 #include "daemon/scene/load_log.hpp"
+#include "daemon/scene/named_file.hpp"
 #include "daemon/scene/scene.hpp"
 
 namespace previz::scene {
+
+// A picture of a model as it is stored, PNG or JPEG.
+struct EncodedImage {
+  std::vector<unsigned char> bytes;  // at least one
+  std::string name;                  // the image's, or its file's; "" where it has none
+  std::string where;  // FILE: image 3 "NAME", as checked_picture_size() and others take it
+  std::string note;   // of a picture that is read from a file of another name; "" mostly
+};
+
+// Returns the picture of an image of a model that read_gltf() has read from `file`, be it in a
+// buffer view, in a data URI or in a file that the rules let it name. Throws previz::Error naming
+// file and image if it cannot be read.
+EncodedImage encoded_image(const tinygltf::Model& model, int image, const std::string& file,
+                           NameRules rules);
 
 // Holds the textures of one file, each decoded when first used.
 class GltfTextures {

@@ -1,0 +1,119 @@
+#include "daemon/scene/named_file.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <fstream>
+
+#include "daemon/scene/scene.hpp"
+#include "daemon/set/problems.hpp"
+
+namespace previz::scene {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Returns the name with %20 and the like decoded (RFC 3986, 2.1).
+std::string without_escapes(const std::string& name) {
+  std::string plain;
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    unsigned char decoded = 0;
+    const char* const digits = name.data() + i + 1;
+    if (name[i] == '%' && name.size() - i > 2 &&
+        std::from_chars(digits, digits + 2, decoded, 16).ptr == digits + 2) {
+      plain += static_cast<char>(decoded);
+      i += 2;
+    } else {
+      plain += name[i];
+    }
+  }
+  return plain;
+}
+
+bool leads_out(const fs::path& path, NameRules rules) {
+  return path.is_absolute() || (!rules.may_lead_up && std::ranges::find(path, "..") != path.end());
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_regular_file(path, ignored);
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return text;
+}
+
+// Appends the files below the folder whose path differs at most by the case of its letters.
+void append_alike(const fs::path& folder, fs::path::const_iterator part,
+                  const fs::path::const_iterator end, std::vector<fs::path>& alike) {
+  if (part == end) {
+    if (is_file(folder)) alike.push_back(folder);
+    return;
+  }
+  const fs::path wanted = *part++;
+  if (wanted == ".." || wanted == ".") return append_alike(folder / wanted, part, end, alike);
+  const std::string lower = lower_case(wanted.string());
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), last; !error && entry != last;
+       entry.increment(error))
+    if (lower_case(entry->path().filename().string()) == lower)
+      append_alike(entry->path(), part, end, alike);
+}
+
+}  // namespace
+
+std::optional<NamedFile> find_named_file(const fs::path& file, const std::string& name,
+                                         NameRules rules) {
+  std::vector<std::string> spellings{name, without_escapes(name)};
+  if (rules.is_uri) std::swap(spellings[0], spellings[1]);
+  for (std::size_t i = 0; i < 2; ++i) {
+    spellings.push_back(spellings[i]);
+    std::ranges::replace(spellings.back(), '\\', '/');
+  }
+  std::erase_if(spellings, [](const std::string& spelling) {
+    return spelling.empty() || spelling.find('\0') != std::string::npos;
+  });
+
+  const fs::path folder = file.parent_path();
+  std::vector<fs::path> names, bare_names;
+  for (const fs::path spelling : spellings) {
+    if (!leads_out(spelling, rules)) names.push_back(spelling);
+    bare_names.push_back(spelling.filename());
+  }
+  for (const fs::path& written : names)
+    if (is_file(folder / written)) return NamedFile{folder / written};
+  names.insert(names.end(), bare_names.begin(), bare_names.end());
+  for (const fs::path& bare : bare_names)
+    if (is_file(folder / bare)) return NamedFile{folder / bare, true};
+  for (const fs::path& written : names) {
+    std::vector<fs::path> alike;
+    append_alike(folder.empty() ? "." : folder, written.begin(), written.end(), alike);
+    if (alike.size() == 1) return NamedFile{alike[0], true};
+  }
+  return {};
+}
+
+std::string note_of_other_name(const NamedFile& found, const std::string& what,
+                               const std::string& name) {
+  if (!found.has_other_name) return "";
+  return what + " \"" + set::printable(name) + "\": is read from " +
+         set::printable(found.path.filename().string());
+}
+
+std::string read_regular_file(const fs::path& file, std::vector<unsigned char>& bytes) {
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (!fs::exists(status)) return "file not found";
+  if (!fs::is_regular_file(status)) return "it is not a regular file";
+  const std::uint64_t size = fs::file_size(file, error);
+  if (error) return "its size cannot be read";
+  if (size > max_file_bytes) return "it is larger than 4 GiB";
+  std::ifstream stream(file, std::ios::binary);
+  bytes.resize(size);
+  stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size));
+  return stream.good() || size == 0 ? "" : "it cannot be read";
+}
+
+}  // namespace previz::scene
