@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <glm/vec2.hpp>
 #include <map>
+#include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
-
-struct aiMesh;
-struct aiScene;
 
 namespace previz::model {
 
@@ -29,34 +29,30 @@ struct ScanColours {
   std::vector<int> sources;        // of each triangle
 };
 
-// Collects the colours of meshes while they are appended to one another.
-class ColourReader {
+// Reads the textures of a scan, each once.
+class ScanTextures {
  public:
   // `file` is the scan's; textures are in it, or in its folder. No path leads out of that folder.
-  ColourReader(const aiScene& scene, std::filesystem::path file);
+  explicit ScanTextures(std::filesystem::path file) : file_(std::move(file)) {}
 
-  // Appends the vertices of a mesh, and the sources of so many triangles. Throws previz::Error
-  // naming the scan and its texture: it is missing, is no PNG or JPEG, is damaged, is too large,
-  // or is moved, turned or scaled on its faces.
-  void append(const aiMesh& mesh, std::size_t triangles);
-  ScanColours take() { return std::move(colours_); }
+  // Both return the index of a picture. They throw previz::Error naming the scan and its texture:
+  // it is missing, is no PNG or JPEG, is damaged, or is too large together with the others.
+  int named(const std::string& written);  // a file, by the path that the scan has
+  int encoded(std::span<const unsigned char> bytes, const std::string& name);
+
+  // Returns where a file is that the scan names; nothing if it is not there. One that has another
+  // name is noted.
+  std::optional<std::filesystem::path> find(const std::string& written);
+
+  std::vector<ScanPicture> take() { return std::move(pictures_); }
+  const std::vector<std::string>& notes() const { return notes_; }
 
  private:
-  struct Material {
-    int source = colourless;
-    unsigned uv_channel = 0;
-  };
-  Material material_of(const aiMesh& mesh);
-  int picture(const std::string& path);
-  int decoded(const std::vector<unsigned char>& bytes, const std::string& name);
-  std::vector<unsigned char> bytes_of(const std::string& path) const;
-
-  const aiScene& scene_;
   std::filesystem::path file_;
-  bool is_linear_ = false;           // of vertex colours: glTF 2.0, 3.7.2
   std::map<std::string, int> used_;  // indices of pictures by their paths
   std::size_t texels_ = 0;
-  ScanColours colours_;
+  std::vector<ScanPicture> pictures_;
+  std::vector<std::string> notes_;
 };
 
 }  // namespace previz::model

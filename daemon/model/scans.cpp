@@ -35,11 +35,12 @@ glm::dvec3 world_place_of(const std::string& point, const Layout& layout, const 
   return model::place_of(shape, layout.places.at(point));
 }
 
-std::vector<PointPair> marked_pairs(const ScanPart& part, const Layout& layout,
-                                    const Shape& shape) {
+std::vector<PointPair> marked_pairs(const ScanPart& part, const ScanFile& file,
+                                    const Layout& layout, const Shape& shape) {
   std::vector<PointPair> points;
   for (const ScanPoint& point : part.points)
-    points.push_back({point.name, point.at, world_place_of(point.name, layout, shape)});
+    points.push_back(
+        {point.name, point.at - file.origin, world_place_of(point.name, layout, shape)});
   return points;
 }
 
@@ -120,25 +121,61 @@ void print_faults(const std::string& name, const MeshFaults& faults, std::ostrea
                name, faults.crowded_edges);
 }
 
+struct Bounds {
+  glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-low};
+};
+
+// In the file's coordinates.
+Bounds bounds_of(const ScanFile& file) {
+  Bounds bounds;
+  for (const glm::vec3& p : file.mesh.positions) {
+    bounds.low = glm::min(bounds.low, glm::dvec3(p) + file.origin);
+    bounds.high = glm::max(bounds.high, glm::dvec3(p) + file.origin);
+  }
+  return bounds;
+}
+
+// Shows coordinates to a thousandth of such a distance.
+std::string in_words(const glm::dvec3& p, double distance) {
+  const int digits =
+      distance > 0 ? std::clamp(3 - int(std::floor(std::log10(distance))), 0, 12) : 3;
+  return fmt::format("({:.{}f}, {:.{}f}, {:.{}f})", p.x, digits, p.y, digits, p.z, digits);
+}
+
+// A scan whose file keeps its coordinates in coarser steps has lost its shape.
+constexpr double most_step_m = 1e-3, most_step_fraction = 1e-5;
+constexpr double most_step_without_unit = 1e-4;  // as a fraction of the scan's diagonal
+
+void insist_on_fine_steps(const std::string& subject, const ScanPart& part, const ScanFile& file) {
+  const auto [low, high] = bounds_of(file);
+  const double diagonal = glm::distance(low, high);
+  const double unit_m = part.unit ? metres(*part.unit) : file.unit_m.value_or(0);
+  const double most = unit_m > 0 ? std::max(most_step_m / unit_m, most_step_fraction * diagonal)
+                                 : most_step_without_unit * diagonal;
+  if (file.step <= most) return;
+  throw Error(fmt::format(
+      "{}: {} keeps its coordinates in single precision, which as far from the origin as {} to {} "
+      "has steps of {:.2g} units, so that its surface is no longer smooth; subtract {} from its "
+      "coordinates in the program that made it before it is exported, or export it as OBJ, or as "
+      "PLY with coordinates of type double",
+      subject, part.file.filename().string(), in_words(low, diagonal), in_words(high, diagonal),
+      file.step, in_words(glm::round(0.5 * (low + high)), 1e4)));
+}
+
 // The mesh must have triangles; both are in the file's unit.
 void insist_on_surface(const std::string& subject, const ScanPart& part, const ScanFile& file) {
-  glm::dvec3 low(std::numeric_limits<double>::infinity()), high(-low);
-  for (const glm::vec3& p : file.mesh.positions) {
-    low = glm::min(low, glm::dvec3(p));
-    high = glm::max(high, glm::dvec3(p));
-  }
+  const auto [low, high] = bounds_of(file);
   const double diagonal = glm::distance(low, high);
   const SurfaceDistance surface(file.mesh.positions, file.mesh.indices);
   for (const ScanPoint& point : part.points) {
-    const double off = surface.from(glm::vec3(point.at), std::numeric_limits<double>::infinity());
+    const double off =
+        surface.from(glm::vec3(point.at - file.origin), std::numeric_limits<double>::infinity());
     if (off <= most_off_surface * diagonal) continue;
     throw Error(fmt::format(
         "{}: point \"{}\" is {:.4g} units from the surface, whose diagonal has {:.4g}; give its "
         "coordinates as the file has them, {} to {} along each axis: programs that show a scan may "
-        "change its unit and swap its axes",
-        subject, point.name, off, diagonal,
-        fmt::format("({:.4g}, {:.4g}, {:.4g})", low.x, low.y, low.z),
-        fmt::format("({:.4g}, {:.4g}, {:.4g})", high.x, high.y, high.z)));
+        "change its unit, swap its axes, and shift it (CloudCompare's global shift)",
+        subject, point.name, off, diagonal, in_words(low, diagonal), in_words(high, diagonal)));
   }
 }
 
@@ -170,8 +207,10 @@ ScanTags tags_on(const std::string& subject, const ScanPart& part, ScanFile& fil
                  const set::Tracking& tracking, std::ostream& out) {
   fmt::print(out, "looking for tags on scan {}\n", part.name);
   out.flush();
-  const ScanFile seen{with_faces_turned(file.mesh), file.unit_m, file.up,
-                      std::exchange(file.colours, {})};
+  ScanFile seen;
+  seen.mesh = with_faces_turned(file.mesh);
+  seen.unit_m = file.unit_m;
+  seen.colours = std::exchange(file.colours, {});
   ScanTags tags = find_scan_tags(fmt::format("{}, {}", subject, part.file.filename().string()),
                                  seen, tracking, part.unit ? metres(*part.unit) : seen.unit_m);
   for (const std::string& note : tags.notes)
@@ -187,7 +226,16 @@ std::vector<ReadScan> read_scans(const Parts& parts, const set::Tracking& tracki
   for (const ScanPart& part : parts.scans) {
     const bool is_by_tags = part.points.empty();
     const std::string subject = subject_of(parts, part);
+    std::error_code not_there;
+    const auto bytes = std::filesystem::file_size(part.file, not_there);
+    if (!not_there && bytes > 10'000'000) {  // takes seconds
+      fmt::print(out, "reading scan {}: {} MB\n", part.name, bytes / 1'000'000);
+      out.flush();
+    }
     ScanFile file = read_scan(part.file, is_by_tags ? Colouring::read : Colouring::ignored);
+    for (const std::string& note : file.notes)
+      fmt::print(out, "warning: scan {}: {}\n", part.name, note);
+    insist_on_fine_steps(subject, part, file);
     std::optional<ScanTags> tags;
     if (is_by_tags)
       tags = tags_on(subject, part, file, tracking, out);
@@ -205,7 +253,8 @@ std::vector<NamedMesh> place_scans(const Parts& parts, const Layout& layout, con
     const ScanPart& part = parts.scans[i];
     const auto& [file, tags] = scans[i];
     const std::string subject = subject_of(parts, part);
-    const std::vector<PointPair> points = tags ? tags->corners : marked_pairs(part, layout, shape);
+    const std::vector<PointPair> points =
+        tags ? tags->corners : marked_pairs(part, file, layout, shape);
     const ScanUnits units = units_of(subject, part, file, points);
     const Placement placed =
         place_scan(subject, points, units.unit_m, tags ? tags->grain * units.unit_m : 0);

@@ -98,6 +98,18 @@ AlphaMode alpha_mode(const std::string& mode, const std::string& what, Notes& no
 
 }  // namespace
 
+LookTexture look_texture(const tinygltf::Material& material, const std::string& what,
+                         Notes& notes) {
+  const TextureInfo infos[] = {
+      info_of(material.pbrMetallicRoughness.baseColorTexture),
+      info_of(extension(material.extensions, "KHR_materials_pbrSpecularGlossiness"),
+              "diffuseTexture"),
+      info_of(material.emissiveTexture)};
+  for (const TextureInfo& info : infos)
+    if (info.index >= 0) return {info.index, read_mapping(info, what, notes)};
+  return {};
+}
+
 UsedMaterial GltfMaterials::use(int index) {
   const auto [at, is_new] = used_.try_emplace(index);
   if (!is_new) return at->second;

@@ -24,6 +24,14 @@ struct UsedMaterial {
   std::vector<UvMapping> mappings;
 };
 
+// The texture that shows a surface as it looks in even light: that of the base colour, else of the
+// diffuse colour (KHR_materials_pbrSpecularGlossiness), else of the emission.
+struct LookTexture {
+  int texture = -1;  // -1: none
+  UvMapping mapping;
+};
+LookTexture look_texture(const tinygltf::Material& material, const std::string& what, Notes& notes);
+
 // Holds the materials of one file, each created when first used.
 class GltfMaterials {
  public:

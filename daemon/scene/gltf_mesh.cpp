@@ -266,9 +266,9 @@ bool keep_shape(Mesh& mesh, const std::string& what, Notes& notes) {
   return true;
 }
 
-std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& source,
-                              const std::string& where, const std::string& what, Notes& notes,
-                              Budget& budget) {
+std::optional<Mesh> read_shape(const tinygltf::Model& model, const MeshSource& source,
+                               const std::string& where, const std::string& what, Notes& notes,
+                               Budget& budget) {
   if (source.positions < 0) {
     notes.add(what + ": has no positions; skipped");
     return {};
@@ -295,6 +295,17 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
   if (!is_whole) throw Error(where + ": its attributes have different numbers of elements");
   if (std::ranges::all_of(mesh.colors, [](const glm::vec4& c) { return c == glm::vec4(1); }))
     mesh.colors.clear();  // they change nothing
+  return mesh;
+}
+
+std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& source,
+                              const std::string& where, const std::string& what, Notes& notes,
+                              Budget& budget) {
+  std::optional<Mesh> read = read_shape(model, source, where, what, notes, budget);
+  if (!read) return {};
+  Mesh& mesh = *read;
+  const std::uint64_t count = mesh.positions.size();
+  const std::uint64_t deformed = source.targets.size() + source.influences.size();
   read_undeformed(model, source, where, what, notes, mesh);
 
   drop_bad_triangles(mesh, what, notes);
@@ -313,11 +324,11 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
     }
     set_flat_normals(mesh);
   }
-  if (mesh.undeformed.is_empty()) return mesh;
+  if (mesh.undeformed.is_empty()) return read;
   mesh.undeformed.positions = mesh.positions;
   mesh.undeformed.normals = mesh.normals;
   mesh.undeformed.flat = source.normals < 0;
-  return mesh;
+  return read;
 }
 
 }  // namespace previz::scene

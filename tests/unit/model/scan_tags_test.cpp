@@ -131,6 +131,29 @@ TEST_F(ScanTags, OfAMirroredScanAreRefused) {
                                    "out"));
 }
 
+// Coordinates of UTM; those of the scan near the origin are rounded by as little.
+TEST_F(ScanTags, OfAScanInCoordinatesOfACountryAreAsNear) {
+  TaggedScan scan = textured_scan(faces_, texel_m);
+  scan.move(in_mm);
+  const glm::dvec3 far(446000500, 5418000250, 310750);  // mm
+  write_textured_obj(folder_ / "set.obj", scan, far);
+  EXPECT_LT(worst_of(placed(), textured_scan(faces_, texel_m)), texel_m);
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7 (12 corners), rms 0."));
+}
+
+// At 5418 km single precision has steps of 0.5 m.
+TEST_F(ScanTags, OfAScanThatLostItsShapeToSinglePrecisionAreNotLookedFor) {
+  TaggedScan scan = textured_scan(faces_, texel_m);
+  scan.move([](const glm::dvec3& p) { return p + glm::dvec3(446000.5, 5418000.25, 310.75); });
+  write_textured_glb(folder_ / "set.glb", scan);
+  parts_.scans[0].file = folder_ / "set.glb";
+  parts_.scans[0].unit.reset();
+  EXPECT_THAT(refusal(), HasSubstr("scan \"set\": set.glb keeps its coordinates in single "
+                                   "precision, which as far from the origin as (446000."));
+  EXPECT_THAT(refusal(), HasSubstr("has steps of 0.65 units"));
+  EXPECT_THAT(refusal(), HasSubstr("subtract (446001, 5418000, 311) from its coordinates"));
+}
+
 TEST_F(ScanTags, NeedColours) {
   write_obj(folder_ / "set.obj", lump(6), 1e-3);
   EXPECT_THAT(refusal(), HasSubstr("set.obj: has no points, and neither a texture nor colours"));
@@ -305,7 +328,7 @@ class GltfScanTags : public ScanTags {
 
 TEST_F(GltfScanTags, AreFoundInAPictureBesideIt) {
   write_changed([](GltfWriter::Json& json) { json["images"][0] = {{"uri", "the%20atlas.png"}}; });
-  EXPECT_THAT(refusal(), HasSubstr("is missing; put it beside the scan"));
+  EXPECT_THAT(refusal(), HasSubstr("image 0 \"the%20atlas.png\""));
   const std::vector<unsigned char> png = png_of(scan_);
   std::ofstream(folder_ / "the atlas.png", std::ios::binary)
       .write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
@@ -313,13 +336,16 @@ TEST_F(GltfScanTags, AreFoundInAPictureBesideIt) {
   EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
 }
 
-TEST_F(GltfScanTags, OfTransformedTexturesAreRefused) {
+// The transform takes back what was done to the coordinates (KHR_texture_transform).
+TEST_F(GltfScanTags, AreFoundInATransformedTexture) {
+  for (glm::vec2& uv : scan_.uvs) uv = {2 * uv.x - 0.25f, uv.y};
   write_changed([](GltfWriter::Json& json) {
     json["extensionsUsed"] = GltfWriter::Json::array({"KHR_texture_transform"});
     json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"] = {
-        {"KHR_texture_transform", {{"offset", {0.25, 0}}}}};
+        {"KHR_texture_transform", {{"offset", {0.125, 0}}, {"scale", {0.5, 1}}}}};
   });
-  EXPECT_THAT(refusal(), HasSubstr("is moved, turned or scaled on its faces"));
+  placed();
+  EXPECT_THAT(report_, HasSubstr("placed by tags 3, 5 and 7"));
 }
 
 // The last face has no tag; a picture repeats itself beyond its borders.

@@ -180,11 +180,15 @@ std::vector<unsigned char> png_of(const TaggedScan& scan) {
   return png(scan.width, scan.height, rgba);
 }
 
-void write_textured_obj(const std::filesystem::path& file, const TaggedScan& scan) {
+void write_textured_obj(const std::filesystem::path& file, const TaggedScan& scan,
+                        const glm::dvec3& offset) {
   const std::string name = file.stem().string();
   std::ofstream out(file);
   out << "mtllib " << name << ".mtl\nusemtl atlas\n";
-  for (const glm::vec3& p : scan.positions) out << fmt::format("v {} {} {}\n", p.x, p.y, p.z);
+  for (const glm::vec3& near : scan.positions) {
+    const glm::dvec3 p = glm::dvec3(near) + offset;
+    out << fmt::format("v {} {} {}\n", p.x, p.y, p.z);
+  }
   for (const glm::vec2& uv : scan.uvs) out << fmt::format("vt {} {}\n", uv.x, uv.y);
   for (std::size_t i = 0; i < scan.indices.size(); i += 3)
     out << fmt::format("f {0}/{0} {1}/{1} {2}/{2}\n", scan.indices[i] + 1, scan.indices[i + 1] + 1,

@@ -43,8 +43,9 @@ TaggedScan textured_scan(const std::vector<TaggedFace>& faces, double pixel_m);
 // Colours the vertices of a grid on each face.
 TaggedScan vertex_coloured_scan(const std::vector<TaggedFace>& faces, double step_m);
 
-// Writes NAME.obj, NAME.mtl and NAME.png.
-void write_textured_obj(const std::filesystem::path& file, const TaggedScan& scan);
+// Writes NAME.obj, whose coordinates are so far from the scan's, NAME.mtl and NAME.png.
+void write_textured_obj(const std::filesystem::path& file, const TaggedScan& scan,
+                        const glm::dvec3& offset = glm::dvec3(0));
 // The texture is in the file, binary or text as its name says.
 void write_textured_glb(const std::filesystem::path& file, const TaggedScan& scan);
 void write_coloured_glb(const std::filesystem::path& file, const TaggedScan& scan);

@@ -1,0 +1,80 @@
+#include "daemon/model/scan_text.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+
+#include "drivers/error.hpp"
+
+namespace previz::model {
+namespace {
+
+constexpr std::string_view white = " \t\v\f\r\n";
+constexpr std::uintmax_t most_bytes = std::uintmax_t{1} << 34;
+
+}  // namespace
+
+std::string scan_bytes(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (!error && size > most_bytes)
+    throw Error(file.string() + ": is larger than 16 GiB; export less of the scan");
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes(error ? 0 : size, '\0');
+  in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (error || !in) throw Error(file.string() + ": cannot be read");
+  return bytes;
+}
+
+std::string_view next_line(std::string_view& text) {
+  const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
+  const std::string_view line = text.substr(0, end);
+  const std::size_t skipped = text.substr(end).starts_with("\r\n") ? 2 : 1;
+  text.remove_prefix(std::min(end + skipped, text.size()));
+  return line;
+}
+
+std::string_view next_word(std::string_view& line) {
+  line.remove_prefix(std::min(line.find_first_not_of(white), line.size()));
+  const std::string_view word = line.substr(0, line.find_first_of(white));
+  line.remove_prefix(word.size());
+  return word;
+}
+
+std::string_view trimmed(std::string_view line) {
+  line.remove_prefix(std::min(line.find_first_not_of(white), line.size()));
+  return line.substr(0, line.find_last_not_of(white) + 1);
+}
+
+std::string in_lower_case(std::string_view text) {
+  std::string lower(text);
+  std::ranges::transform(lower, lower.begin(),
+                         [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
+  return lower;
+}
+
+std::optional<double> number_in(std::string_view word) {
+  std::array<char, 64> with_point{};
+  if (const std::size_t comma = word.find(','); comma < word.size() && word.size() < 64) {
+    std::ranges::copy(word, with_point.begin());
+    with_point[comma] = '.';
+    word = {with_point.data(), word.size()};
+  }
+  if (word.starts_with('+')) word.remove_prefix(1);
+  if (word.find('#') != std::string_view::npos) return std::numeric_limits<double>::quiet_NaN();
+  double number = 0;
+  const auto read = std::from_chars(word.data(), word.data() + word.size(), number);
+  if (read.ec == std::errc::result_out_of_range)
+    return word.find_first_of("eE") != std::string_view::npos &&
+                   word.find("e-") == std::string_view::npos &&
+                   word.find("E-") == std::string_view::npos
+               ? std::numeric_limits<double>::infinity()
+               : 0.0;
+  if (read.ec != std::errc()) return {};
+  return number;
+}
+
+}  // namespace previz::model
