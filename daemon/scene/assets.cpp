@@ -5,6 +5,9 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 
+#include "daemon/scene/gltf_text.hpp"
+#include "daemon/scene/gltf_uri.hpp"
+#include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::scene {
@@ -37,14 +40,13 @@ std::string gltf_json(const std::filesystem::path& file) {
 }
 
 void check_self_contained(const std::filesystem::path& file) {
-  const nlohmann::json gltf = nlohmann::json::parse(gltf_json(file), nullptr, false);
-  if (!gltf.is_object()) throw Error(file.string() + ": is not a glTF file");
+  const nlohmann::json gltf = parsed_json(gltf_json(file), file.string()).root;
   for (const char* kind : {"buffers", "images"}) {
     if (!gltf.contains(kind) || !gltf[kind].is_array()) continue;
     for (const nlohmann::json& item : gltf[kind]) {
       const std::string uri = item.is_object() ? item.value("uri", "") : "";
-      if (!uri.empty() && !uri.starts_with("data:"))
-        throw Error(file.string() + ": needs " + uri +
+      if (!uri.empty() && !is_data_uri(uri))
+        throw Error(file.string() + ": needs " + set::one_line(uri) +
                     " beside it; a session holds single files: export the scene as one .glb");
     }
   }

@@ -106,14 +106,14 @@ void describe_objects(const set::Set& set, const Scene& scene, std::ostream& out
     out << "  " << object.name << ": " << set::name_of(object.presence) << ", "
         << plural(triangles[i], "triangle") << " in " << plural(instances[i], "instance")
         << ", from " << object.file_as_written;
-    if (!object.variant.empty()) out << ", variant \"" << set::printable(object.variant) << '"';
+    if (!object.variant.empty()) out << ", variant \"" << set::one_line(object.variant) << '"';
     out << '\n';
     const Variants* variants = variants_of(scene, i);
     if (!variants) continue;
     out << "    its variants, for the buttons:";
     const char* separator = " ";
     for (const std::string& name : variants->names) {
-      out << separator << '"' << set::printable(name) << '"';
+      out << separator << '"' << set::one_line(name) << '"';
       separator = ", ";
     }
     out << '\n';

@@ -150,7 +150,7 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
   }
   keep_looks(object_index);
   if (!played && !model.animations.empty())
-    notes.add("object \"" + set::printable(object.name) + "\" plays none of its " +
+    notes.add("object \"" + set::one_line(object.name) + "\" plays none of its " +
               std::to_string(model.animations.size()) + " animations");
   if (played) {
     animation.object = object_index;
@@ -160,7 +160,7 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
     scene.animations.push_back(std::move(animation));
   }
   if (scene.instances.size() + scene.lights.size() == before)
-    notes.add("object \"" + set::printable(object.name) + "\" has nothing visible in it");
+    notes.add("object \"" + set::one_line(object.name) + "\" has nothing visible in it");
 }
 
 void GltfFile::Loader::add_mesh(const PlacedNode& placed, const MeshUse& use) {
@@ -170,8 +170,8 @@ void GltfFile::Loader::add_mesh(const PlacedNode& placed, const MeshUse& use) {
     notes.add("mesh " + std::to_string(index) + ": has no primitives; skipped");
   for (std::size_t i = 0; i < mesh.primitives.size(); ++i) {
     const tinygltf::Primitive& primitive = mesh.primitives[i];
-    const std::string what = "mesh " + std::to_string(index) + " \"" + set::printable(mesh.name) +
-                             "\", primitive " + std::to_string(i);
+    const std::string what = numbered("mesh", static_cast<std::size_t>(index), mesh.name) +
+                             ", primitive " + std::to_string(i);
     if (primitive.mode >= 0 && primitive.mode < TINYGLTF_MODE_TRIANGLES) {
       notes.add(what + ": points and lines are not supported; skipped");
       continue;
@@ -351,7 +351,7 @@ void GltfFile::Loader::add_light(const PlacedNode& placed, const glm::dmat4& wor
     light.inner_cone_rad =
         within(given.spot.innerConeAngle, 0, light.outer_cone_rad, what + "'s inner cone", notes);
   } else {
-    notes.add(what + " is of the unknown type \"" + set::printable(given.type) + "\"; skipped");
+    notes.add(what + " is of the unknown type \"" + set::one_line(given.type) + "\"; skipped");
     return;
   }
   const std::vector<double> color =

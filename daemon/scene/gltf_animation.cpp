@@ -21,9 +21,7 @@ std::size_t place(int index) {
 
 // Returns "animation 3", or "animation 3 "walk"" where it has a name.
 std::string label(const tinygltf::Model& model, std::size_t index) {
-  const std::string& name = model.animations[index].name;
-  return "animation " + std::to_string(index) +
-         (name.empty() ? "" : " \"" + set::printable(name) + "\"");
+  return numbered("animation", index, model.animations[index].name);
 }
 
 // Returns the duration of an animation in words; files that are wrong have none.
@@ -50,7 +48,7 @@ std::string list_of_animations(const tinygltf::Model& model) {
     const tinygltf::Animation& animation = model.animations[i];
     list += (i > 0 ? ", " : "") + std::to_string(i) +
             (animation.name.empty() ? " without a name"
-                                    : " \"" + set::printable(animation.name) + "\"") +
+                                    : " \"" + set::one_line(animation.name) + "\"") +
             " (" + duration_of(model, animation) + ")";
   }
   if (count > most_listed) list += " and " + std::to_string(count - most_listed) + " more";
@@ -75,8 +73,8 @@ std::vector<std::size_t> chosen_animations(const tinygltf::Model& model, const s
   std::vector<std::string> names;
   for (const tinygltf::Animation& animation : all) names.push_back(animation.name);
   const std::string near = set::nearest(which, names);
-  throw Error(file + ": has no animation \"" + set::printable(which) + "\"" +
-              (near.empty() ? "" : "; did you mean \"" + set::printable(near) + "\"?") + "; " +
+  throw Error(file + ": has no animation \"" + set::one_line(which) + "\"" +
+              (near.empty() ? "" : "; did you mean \"" + set::one_line(near) + "\"?") + "; " +
               list_of_animations(model));
 }
 
@@ -86,7 +84,7 @@ Interpolation interpolation_of(const tinygltf::AnimationSampler& sampler,
   if (sampler.interpolation == "CUBICSPLINE") return Interpolation::cubic_spline;
   if (sampler.interpolation == "LINEAR" || sampler.interpolation.empty())
     return Interpolation::linear;
-  throw Error(where + ": interpolation \"" + set::printable(sampler.interpolation) +
+  throw Error(where + ": interpolation \"" + set::one_line(sampler.interpolation) +
               "\" is not one of glTF's");
 }
 
@@ -195,7 +193,7 @@ void GltfAnimation::read_channel(std::size_t index, const tinygltf::AnimationCha
   const bool is_weights = given.target_path == "weights";
   if (!channel && !is_weights)
     return notes_.add(label(model_, index) + ": its channels of \"" +
-                      set::printable(given.target_path) + "\" are not played");
+                      set::one_line(given.target_path) + "\" are not played");
   if (given.sampler < 0 || place(given.sampler) >= animation.samplers.size())
     throw Error(where + ": no sampler " + std::to_string(given.sampler));
   const tinygltf::AnimationSampler& sampler = animation.samplers[place(given.sampler)];

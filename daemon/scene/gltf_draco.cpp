@@ -29,7 +29,7 @@ constexpr const char* remedy = "; export the file again, or without compression"
 
 // Returns what the library says, without its full stop.
 std::string in_words(const draco::Status& status) {
-  std::string words = set::printable(status.error_msg_string());
+  std::string words = set::one_line(status.error_msg_string());
   if (words.ends_with('.')) words.pop_back();
   return words;
 }

@@ -67,9 +67,12 @@ std::string materials_with(const std::string& extension, const tinygltf::Model& 
   constexpr std::size_t most_named = 3;
   std::string materials;
   std::size_t count = 0;
-  for (const tinygltf::Material& material : model.materials) {
+  for (std::size_t i = 0; i < model.materials.size(); ++i) {
+    const tinygltf::Material& material = model.materials[i];
     if (!material.extensions.contains(extension) || ++count > most_named) continue;
-    materials += (count > 1 ? ", \"" : "\"") + set::printable(material.name) + '"';
+    materials += count > 1 ? ", " : "";
+    materials += material.name.empty() ? "number " + std::to_string(i)
+                                       : '"' + set::one_line(material.name) + '"';
   }
   if (count > most_named) materials += " and " + std::to_string(count - most_named) + " more";
   return count > 0 ? " (materials: " + materials + ")" : "";
@@ -86,7 +89,7 @@ void check_required_extensions(const nlohmann::json& root, const std::string& fi
     const std::optional<Extension> known = find(name);
     if (known && known->support != Support::refused) continue;
     std::string message =
-        file + ": requires the extension \"" + set::printable(name) + "\", which is not supported";
+        file + ": requires the extension \"" + set::one_line(name) + "\", which is not supported";
     message.append("; ").append(known ? known->text : "export the file without it");
     throw Error(message);
   }
@@ -101,7 +104,7 @@ void note_extensions(const tinygltf::Model& model, Notes& notes) {
   for (const std::string& name : used) {
     const std::optional<Extension> known = find(name);
     if (known && known->support == Support::read) continue;
-    std::string note = "the extension \"" + set::printable(name) + '"';
+    std::string note = "the extension \"" + set::one_line(name) + '"';
     note += required.contains(name) ? ", which the file requires, is not supported; ignored"
                                     : " is not supported; ignored";
     if (known && known->support == Support::ignored) note.append(": ").append(known->text);

@@ -15,8 +15,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int max_json_depth = 128;
-
 constexpr std::uint64_t largest_int = std::numeric_limits<int>::max();  // of tinygltf's indices
 constexpr std::uint64_t largest_size = 1ull
                                        << 53;  // up to here JSON's numbers are exact everywhere
@@ -90,52 +88,6 @@ constexpr WholeNumber whole_numbers[] = {
     {"materials/*/**Texture/index"},
     {"materials/*/**Texture/texCoord"}};
 
-int nesting_depth(std::string_view json) {
-  int depth = 0, deepest = 0;
-  bool in_string = false;
-  for (std::size_t i = 0; i < json.size(); ++i) {
-    const char c = json[i];
-    if (in_string) {
-      if (c == '\\') ++i;
-      if (c == '"') in_string = false;
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '{' || c == '[') {
-      deepest = std::max(deepest, ++depth);
-    } else if (c == '}' || c == ']') {
-      --depth;
-    }
-  }
-  return deepest;
-}
-
-Json parsed(std::string_view text, const std::string& file) {
-  if (nesting_depth(text) > max_json_depth)
-    throw Error(file + ": its JSON is nested more than " + std::to_string(max_json_depth) +
-                " levels deep");
-  try {
-    Json root = Json::parse(text);
-    if (root.is_object()) return root;
-  } catch (const Json::exception& error) {
-    throw Error(file + ": is not a valid glTF file: " + set::printable(error.what()));
-  }
-  throw Error(file + ": is not a valid glTF file: its JSON is not an object");
-}
-
-// Where the walk through the tree is; it is put into words only for a message.
-struct Place {
-  const Place* above;
-  std::string key;        // of a member; empty: an element
-  std::size_t index = 0;  // of an element
-};
-
-std::string in_words(const Place* place) {
-  if (!place) return "";
-  std::string words = in_words(place->above);
-  if (place->key.empty()) return words + "[" + std::to_string(place->index) + "]";
-  return words + (words.empty() ? "" : ".") + set::printable(place->key);
-}
-
 class WholeNumberCheck {
  public:
   WholeNumberCheck(GltfJson& json, const std::string& file) : json_(json), file_(file) {}
@@ -148,7 +100,7 @@ class WholeNumberCheck {
   }
 
  private:
-  void walk(Json& value, std::string_view path, const Place* place) {
+  void walk(Json& value, std::string_view path, const JsonPlace* place) {
     if (path.empty()) return check(value, place);
     const std::size_t slash = path.find('/');
     const std::string_view name = path.substr(0, slash);
@@ -158,7 +110,7 @@ class WholeNumberCheck {
     if (value.is_array() && name == "*") {
       std::size_t index = 0;
       for (Json& element : value) {
-        const Place at{place, "", index++};
+        const JsonPlace at{place, "", index++};
         walk(element, rest, &at);
       }
     } else if (value.is_object() && name == "*") {
@@ -170,22 +122,22 @@ class WholeNumberCheck {
     }
   }
 
-  void step(Json& member, const std::string& key, std::string_view rest, const Place* place) {
-    const Place at{place, key};
+  void step(Json& member, const std::string& key, std::string_view rest, const JsonPlace* place) {
+    const JsonPlace at{place, key};
     walk(member, rest, &at);
   }
 
-  void search(Json& value, std::string_view ending, std::string_view rest, const Place* place) {
+  void search(Json& value, std::string_view ending, std::string_view rest, const JsonPlace* place) {
     if (!value.is_object()) return;
     for (auto member = value.begin(); member != value.end(); ++member) {
       if (member.key() == "extras") continue;
-      const Place at{place, member.key()};
+      const JsonPlace at{place, member.key()};
       if (member.key().ends_with(ending)) walk(*member, rest, &at);
       search(*member, ending, rest, &at);
     }
   }
 
-  void check(Json& value, const Place* place) {
+  void check(Json& value, const JsonPlace* place) {
     if (value.is_number_unsigned() && value.get<std::uint64_t>() <= largest_) return;
     if (value.is_number()) {
       const auto number = value.get<double>();
@@ -198,7 +150,7 @@ class WholeNumberCheck {
     constexpr std::size_t most_shown = 40;
     std::string shown = value.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (shown.size() > most_shown) shown = shown.substr(0, most_shown) + "...";
-    throw Error(file_ + ": " + in_words(place) + " is " + set::printable(shown) +
+    throw Error(file_ + ": " + in_words(place) + " is " + set::one_line(shown) +
                 "; it must be a whole number from 0 to " + std::to_string(largest_) +
                 "; export the file again, or correct it there");
   }
@@ -246,7 +198,7 @@ void check_version(const Json& root, const std::string& file) {
   if (version_of(version).major != 2) refuse_version(version, file);
   const std::string least = text_of(asset, "minVersion");
   if (!least.empty() && version_of(least) > Version{2, 0})
-    throw Error(file + ": asks for a reader of glTF " + set::printable(least) +
+    throw Error(file + ": asks for a reader of glTF " + set::one_line(least) +
                 " (asset.minVersion); previzd reads glTF 2.0: export the file as glTF 2.0");
 }
 
@@ -254,7 +206,7 @@ void check_version(const Json& root, const std::string& file) {
 
 void refuse_version(const std::string& version, const std::string& file) {
   const std::string what =
-      file + ": is glTF " + set::printable(version) + "; previzd reads glTF 2.0: ";
+      file + ": is glTF " + set::one_line(version) + "; previzd reads glTF 2.0: ";
   if (version_of(version) > Version{1, 0}) throw Error(what + "export it again as glTF 2.0");
   throw Error(what +
               "convert it with \"gltf-pipeline -i OLD -o NEW\", or import it in a program that "
@@ -262,7 +214,7 @@ void refuse_version(const std::string& version, const std::string& file) {
 }
 
 GltfJson checked_json(std::string_view text, const std::string& file) {
-  GltfJson json{parsed(text, file)};
+  GltfJson json = parsed_json(text, file);
   check_version(json.root, file);
   check_required_extensions(json.root, file);
   WholeNumberCheck(json, file).run();

@@ -2,16 +2,12 @@
 // what it does not expect.
 #pragma once
 
-#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
-namespace previz::scene {
+#include "daemon/scene/gltf_text.hpp"
 
-struct GltfJson {
-  nlohmann::json root;
-  bool is_changed = false;  // tinygltf is to read `root`, not the text of the file
-};
+namespace previz::scene {
 
 // Parses the JSON. It is of glTF 2.0, requires no extension that is refused
 // (daemon/scene/gltf_extensions.hpp), and every number of it that is an index, an offset, a count

@@ -92,7 +92,7 @@ AlphaMode alpha_mode(const std::string& mode, const std::string& what, Notes& no
   if (mode == "MASK") return AlphaMode::mask;
   if (mode == "BLEND") return AlphaMode::blend;
   if (mode != "OPAQUE")
-    notes.add(what + ": alphaMode \"" + set::printable(mode) + "\" is unknown; OPAQUE used");
+    notes.add(what + ": alphaMode \"" + set::one_line(mode) + "\" is unknown; OPAQUE used");
   return AlphaMode::opaque;
 }
 
@@ -122,9 +122,9 @@ UsedMaterial GltfMaterials::use(int index) {
   if (static_cast<std::size_t>(index) >= model_.materials.size())
     throw Error(file_ + ": a primitive uses material " + std::to_string(index) +
                 ", which does not exist");
-  const tinygltf::Material& given = model_.materials[static_cast<std::size_t>(index)];
-  at->second =
-      read(given, "material " + std::to_string(index) + " \"" + set::printable(given.name) + "\"");
+  const auto number = static_cast<std::size_t>(index);
+  const tinygltf::Material& given = model_.materials[number];
+  at->second = read(given, numbered("material", number, given.name));
   return at->second;
 }
 

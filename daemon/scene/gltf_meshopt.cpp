@@ -60,7 +60,7 @@ void check(const Encoded& encoded, const std::string& where) {
   const std::uint64_t stride = encoded.stride;
   const bool is_vertices = encoded.mode == "ATTRIBUTES";
   if (!is_vertices && encoded.mode != "TRIANGLES" && encoded.mode != "INDICES")
-    throw Error(where + ": its mode \"" + set::printable(encoded.mode) +
+    throw Error(where + ": its mode \"" + set::one_line(encoded.mode) +
                 "\" is not ATTRIBUTES, TRIANGLES or INDICES");
   const bool fits =
       is_vertices ? stride > 0 && stride <= 256 && stride % 4 == 0 : stride == 2 || stride == 4;
@@ -73,7 +73,7 @@ void check(const Encoded& encoded, const std::string& where) {
        ((encoded.filter == "OCTAHEDRAL" && (stride == 4 || stride == 8)) ||
         (encoded.filter == "QUATERNION" && stride == 8) || encoded.filter == "EXPONENTIAL"));
   if (!is_filter_sound)
-    throw Error(where + ": its filter \"" + set::printable(encoded.filter) +
+    throw Error(where + ": its filter \"" + set::one_line(encoded.filter) +
                 "\" is not supported with a stride of " + std::to_string(stride) +
                 " bytes in mode " + encoded.mode +
                 "; export the file with EXT_meshopt_compression, or without compression");

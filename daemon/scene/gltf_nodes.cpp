@@ -136,9 +136,8 @@ glm::dmat4 FileNodes::file_from_node(int node) {
 }
 
 std::string node_name(const tinygltf::Model& model, int node) {
-  const std::string& name = model.nodes[static_cast<std::size_t>(node)].name;
-  return "node " + std::to_string(node) +
-         (name.empty() ? std::string() : " \"" + set::printable(name) + "\"");
+  const auto index = static_cast<std::size_t>(node);
+  return numbered("node", index, model.nodes[index].name);
 }
 
 std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
@@ -184,9 +183,8 @@ std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
   for (const std::string& name : names) {
     if (known.contains(name)) continue;
     const std::string near = set::nearest(name, {known.begin(), known.end()});
-    throw Error(
-        file + ": has no node \"" + set::printable(name) + "\"" +
-        (near.empty() ? std::string() : "; did you mean \"" + set::printable(near) + "\"?"));
+    throw Error(file + ": has no node \"" + set::one_line(name) + "\"" +
+                (near.empty() ? std::string() : "; did you mean \"" + set::one_line(near) + "\"?"));
   }
   return placed;
 }

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cstring>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include "daemon/scene/gltf_components.hpp"
 #include "daemon/scene/gltf_compression.hpp"
 #include "daemon/scene/gltf_extensions.hpp"
 #include "daemon/scene/gltf_json.hpp"
+#include "daemon/scene/gltf_uri.hpp"
 #include "daemon/scene/named_file.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/problems.hpp"
@@ -19,11 +22,11 @@ namespace {
 namespace fs = std::filesystem;
 
 // Joins the lines of a tinygltf message.
-std::string one_line(std::string text) {
+std::string joined(std::string text) {
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
   for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;)
     text.replace(at, 1, "; ");
-  return set::printable(text);
+  return set::one_line(text);
 }
 
 // tinygltf looks for external files beside the glTF file, whose directory we give as absolute, and
@@ -65,11 +68,10 @@ void read_by_own_functions(Reader& reader) {
   reader.SetFsCallbacks(files);
 }
 
-// tinygltf does not check the pointer of images in a buffer view, which are therefore decoded
-// later.
+// Images are decoded later: tinygltf does not check the pointer of those in a buffer view, and has
+// no URIs of others.
 bool keep_encoded(tinygltf::Image* image, int, std::string*, std::string*, int, int,
-                  const unsigned char* bytes, int size, void*) {
-  if (image->bufferView < 0 && size > 0) image->image.assign(bytes, bytes + size);
+                  const unsigned char*, int, void*) {
   image->as_is = true;
   return true;
 }
@@ -122,7 +124,7 @@ std::vector<unsigned char> with_json(const std::vector<unsigned char>& bytes, st
 
 }  // namespace
 
-tinygltf::Model read_gltf(const fs::path& path, Notes& notes) {
+tinygltf::Model read_gltf(const fs::path& path, Notes& notes, NameRules rules) {
   const std::string file = path.string();
   std::vector<unsigned char> bytes;
   if (const std::string wrong = read_regular_file(path, bytes); !wrong.empty())
@@ -133,6 +135,9 @@ tinygltf::Model read_gltf(const fs::path& path, Notes& notes) {
       is_binary ? binary_json(bytes, file)
                 : std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   GltfJson json = checked_json(text, file);
+  for (const std::string& note : json.notes) notes.add(note);
+  mend_buffer_uris(json, path, rules, notes);
+  std::vector<std::string> image_uris = take_out_image_uris(json);
   const TakenOut taken_out = take_out_compression(json, is_binary);
   if (json.is_changed) {
     const std::string changed = json.root.dump();
@@ -157,10 +162,11 @@ tinygltf::Model read_gltf(const fs::path& path, Notes& notes) {
   } catch (const std::exception& error) {
     errors += error.what();
   }
-  if (!read) throw Error(file + ": is not a valid glTF file: " + one_line(errors));
+  if (!read) throw Error(file + ": is not a valid glTF file: " + joined(errors));
+  put_back(std::move(image_uris), model);
   decompress(model, taken_out, file);
-  if (!errors.empty()) notes.add(one_line(errors));
-  if (!warnings.empty()) notes.add(one_line(warnings));
+  if (!errors.empty()) notes.add(joined(errors));
+  if (!warnings.empty()) notes.add(joined(warnings));
   note_extensions(model, notes);
   note_component_types(model, notes);
   return model;

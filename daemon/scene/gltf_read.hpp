@@ -9,12 +9,15 @@
 #include <string>
 
 #include "daemon/scene/load_log.hpp"
+#include "daemon/scene/named_file.hpp"
 
 namespace previz::scene {
 
-// Image::image holds the encoded bytes of images that are not in a buffer view; it is empty if the
-// image's file cannot be read. Throws previz::Error naming the file. An unknown extension is an
+// Images are not read: encoded_image() (daemon/scene/gltf_texture.hpp) does that, of a buffer view
+// or of Image::uri, as the file has it. The rules are for the names of buffers' files. Throws
+// previz::Error naming the file. An unknown extension is an
 // error if it is required and a note if it is only used.
-tinygltf::Model read_gltf(const std::filesystem::path& file, Notes& notes);
+tinygltf::Model read_gltf(const std::filesystem::path& file, Notes& notes,
+                          NameRules rules = names_in_objects);
 
 }  // namespace previz::scene

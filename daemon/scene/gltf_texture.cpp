@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/scene/gltf_accessor.hpp"
+#include "daemon/scene/gltf_uri.hpp"
 #include "daemon/scene/picture_bytes.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
@@ -39,22 +40,29 @@ std::vector<glm::vec4> linearise(const Sample* samples, std::size_t texels, Enco
 }  // namespace
 
 EncodedImage encoded_image(const tinygltf::Model& model, int index, const std::string& file,
-                           NameRules) {
+                           NameRules rules) {
   if (index < 0 || static_cast<std::size_t>(index) >= model.images.size())
     throw Error(file + ": no image " + std::to_string(index));
   const tinygltf::Image& image = model.images[static_cast<std::size_t>(index)];
+  const bool is_data = is_data_uri(image.uri);
   EncodedImage encoded;
-  encoded.name = image.name.empty() ? image.uri : image.name;
-  encoded.where =
-      file + ": image " + std::to_string(index) +
-      (encoded.name.empty() ? std::string() : " \"" + set::printable(encoded.name) + "\"");
+  encoded.name = image.name.empty() && !is_data ? image.uri : image.name;
+  encoded.where = file + ": " + numbered("image", static_cast<std::size_t>(index), encoded.name);
   if (image.bufferView >= 0) {
     const auto bytes = view_bytes(model, image.bufferView, encoded.where);
     encoded.bytes.assign(bytes.begin(), bytes.end());
+  } else if (is_data) {
+    encoded.bytes = data_of(image.uri, encoded.where);
   } else {
-    encoded.bytes = image.image;
+    const std::string its_file =
+        image.name.empty() ? ": " : ": its file \"" + set::one_line(image.uri) + "\" is ";
+    const auto found = find_named_file(file, image.uri, rules);
+    if (!found) throw Error(encoded.where + its_file + "not found; put it beside the file");
+    if (const std::string wrong = read_regular_file(found->path, encoded.bytes); !wrong.empty())
+      throw Error(encoded.where + ": cannot be opened: " + wrong);
+    encoded.note = note_of_other_name(*found, "texture", image.uri);
   }
-  if (encoded.bytes.empty()) throw Error(encoded.where + ": not found, or empty");
+  if (encoded.bytes.empty()) throw Error(encoded.where + ": is empty; export the file again");
   return encoded;
 }
 

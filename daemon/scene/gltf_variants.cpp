@@ -41,7 +41,8 @@ GltfVariants::GltfVariants(const tinygltf::Model& model, std::string file, Notes
     if (is_taken()) {
       for (std::size_t number = i + 1; is_taken(); ++number)
         name = "variant " + std::to_string(number);
-      notes.add("variant " + std::to_string(i) + " has no unique name; called \"" + name + "\"");
+      notes.add("variant " + std::to_string(i) + " has no unique name; called \"" +
+                set::one_line(name) + "\"");
     }
     names_.push_back(name);
   }
@@ -53,8 +54,8 @@ std::size_t GltfVariants::look_of(const std::string& name) const {
   if (found != names_.end()) return 1 + static_cast<std::size_t>(found - names_.begin());
   std::string known;
   for (const std::string& other : names_)
-    known += (known.empty() ? "it has \"" : ", \"") + set::printable(other) + '"';
-  throw Error(file_ + ": no variant \"" + set::printable(name) + "\"; " +
+    known += (known.empty() ? "it has \"" : ", \"") + set::one_line(other) + '"';
+  throw Error(file_ + ": no variant \"" + set::one_line(name) + "\"; " +
               (known.empty() ? "it has none" : known));
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/scene/gltf.hpp"
+#include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::scene {
@@ -20,8 +21,9 @@ void apply(const set::Surface& surface, const std::string& set_file, Scene& scen
   for (Instance& instance : scene.instances) {
     if ((instance.presence & world_real) == 0) continue;
     const std::string name = scene.materials[instance.material].name;
-    if (known.find('"' + name + '"') == std::string::npos)
-      known += (known.empty() ? "\"" : ", \"") + name + '"';
+    const std::string quoted = '"' + set::one_line(name) + '"';
+    if (!name.empty() && known.find(quoted) == std::string::npos)
+      known += (known.empty() ? "" : ", ") + quoted;
     if (name != surface.material) continue;
     const auto entry = recoloured.try_emplace(instance.material, scene.materials.size()).first;
     if (entry->second == scene.materials.size()) {
@@ -32,7 +34,7 @@ void apply(const set::Surface& surface, const std::string& set_file, Scene& scen
   }
   if (recoloured.empty())
     throw Error(set_file + ": surface.material: no real object has a material \"" +
-                surface.material + "\"; there are " + (known.empty() ? "none" : known));
+                surface.material + "\"; there are " + (known.empty() ? "none with a name" : known));
 }
 
 }  // namespace

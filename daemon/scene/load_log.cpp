@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "daemon/scene/scene.hpp"
+#include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::scene {
@@ -32,6 +33,11 @@ std::vector<std::string> Notes::lines() const {
     lines.push_back(file_ + ": " + what +
                     (times > 1 ? " (" + std::to_string(times) + " times)" : ""));
   return lines;
+}
+
+std::string numbered(const std::string& kind, std::size_t index, const std::string& name) {
+  std::string text = kind + ' ' + std::to_string(index);
+  return name.empty() ? text : text + " \"" + set::one_line(name) + '"';
 }
 
 void Budget::add_vertices(std::uint64_t count, const std::string& where) {

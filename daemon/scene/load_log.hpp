@@ -23,6 +23,9 @@ class Notes {
   std::unordered_map<std::string, std::size_t> place_;
 };
 
+// Returns what a message calls a part of a file: `material 3 "glass"`; "material 3" without a name.
+std::string numbered(const std::string& kind, std::size_t index, const std::string& name);
+
 // Counts against scene.hpp's limits; call before allocating. `where` begins the message of the
 // previz::Error, which says which limit would be passed.
 class Budget {

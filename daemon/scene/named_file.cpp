@@ -13,23 +13,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Returns the name with %20 and the like decoded (RFC 3986, 2.1).
-std::string without_escapes(const std::string& name) {
-  std::string plain;
-  for (std::size_t i = 0; i < name.size(); ++i) {
-    unsigned char decoded = 0;
-    const char* const digits = name.data() + i + 1;
-    if (name[i] == '%' && name.size() - i > 2 &&
-        std::from_chars(digits, digits + 2, decoded, 16).ptr == digits + 2) {
-      plain += static_cast<char>(decoded);
-      i += 2;
-    } else {
-      plain += name[i];
-    }
-  }
-  return plain;
-}
-
 bool leads_out(const fs::path& path, NameRules rules) {
   return path.is_absolute() || (!rules.may_lead_up && std::ranges::find(path, "..") != path.end());
 }
@@ -95,11 +78,27 @@ std::optional<NamedFile> find_named_file(const fs::path& file, const std::string
   return {};
 }
 
+std::string without_escapes(const std::string& text) {
+  std::string plain;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    unsigned char decoded = 0;
+    const char* const digits = text.data() + i + 1;
+    if (text[i] == '%' && text.size() - i > 2 &&
+        std::from_chars(digits, digits + 2, decoded, 16).ptr == digits + 2) {
+      plain += static_cast<char>(decoded);
+      i += 2;
+    } else {
+      plain += text[i];
+    }
+  }
+  return plain;
+}
+
 std::string note_of_other_name(const NamedFile& found, const std::string& what,
                                const std::string& name) {
   if (!found.has_other_name) return "";
-  return what + " \"" + set::printable(name) + "\": is read from " +
-         set::printable(found.path.filename().string());
+  return what + " \"" + set::one_line(name) + "\": is read from " +
+         set::one_line(found.path.filename().string());
 }
 
 std::string read_regular_file(const fs::path& file, std::vector<unsigned char>& bytes) {

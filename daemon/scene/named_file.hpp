@@ -33,6 +33,9 @@ std::optional<NamedFile> find_named_file(const std::filesystem::path& file, cons
 std::string note_of_other_name(const NamedFile& found, const std::string& what,
                                const std::string& name);
 
+// Returns text with %20 and the like decoded (RFC 3986, 2.1); a % that begins no such code stays.
+std::string without_escapes(const std::string& text);
+
 // Reads a regular file of at most max_file_bytes; returns what is wrong, or "".
 std::string read_regular_file(const std::filesystem::path& file, std::vector<unsigned char>& bytes);
 

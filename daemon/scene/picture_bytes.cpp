@@ -40,7 +40,7 @@ void require_chunks(std::span<const unsigned char> png, const std::string& where
     if (name == "IEND") return;
     const std::size_t left = png.size() - at - head;
     if (left < checksum || length > left - checksum)
-      throw Error(where + ": is cut short: its chunk " + set::printable(name) + " says " +
+      throw Error(where + ": is cut short: its chunk " + set::one_line(name) + " says " +
                   std::to_string(length) + " bytes, and " + std::to_string(left) + " are left");
     at += head + length + checksum;
   }

@@ -46,7 +46,7 @@ void play(const Scene& scene, const Animation& animation, double time_s, Placeme
     placement.shapes[i] = shape_at_rest(deformation);
     Instance& instance = placement.instances[deformation.instance];
     instance.presence = 0;
-    placement.unknown.push_back("\"" + set::printable(instance.name) +
+    placement.unknown.push_back("\"" + set::one_line(instance.name) +
                                 "\" cannot be shown at some times of its animation: "
                                 "its joints or targets move vertices beyond 1e15; it is hidden "
                                 "then");
@@ -114,7 +114,7 @@ Placement place(const Scene& scene, const set::Set& set, const session::SceneSta
     if (variants && show_variant(*variants, variant, placement.instances)) continue;
     if (!variants && variant.empty() && found != set.objects.end()) continue;
     placement.unknown.push_back("object \"" + name + "\" was shown in variant \"" +
-                                set::printable(variant) + "\", which it does not have");
+                                set::one_line(variant) + "\", which it does not have");
   }
   // The set's own lamps are the last of the scene's.
   const std::size_t first = scene.lights.size() - set.lights.size();

@@ -11,6 +11,7 @@
 
 namespace previz::set {
 
+using previz::one_line;
 using previz::printable;
 
 class Problems {

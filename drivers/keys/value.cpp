@@ -23,6 +23,19 @@ std::string printable(const std::string& text) {
   return out;
 }
 
+std::string one_line(const std::string& text) {
+  constexpr std::size_t longest = 100, at_end = 30;
+  std::string line = printable(text);
+  if (line.size() <= longest) return line;
+  const auto is_within_letter = [&](std::size_t at) {
+    return (static_cast<unsigned char>(line[at]) & 0xc0) == 0x80;
+  };
+  std::size_t cut = longest - at_end - 3, rest = line.size() - at_end;
+  while (cut > 0 && is_within_letter(cut)) --cut;
+  while (rest < line.size() && is_within_letter(rest)) ++rest;
+  return line.substr(0, cut) + "..." + line.substr(rest);
+}
+
 namespace codec {
 namespace {
 

@@ -39,6 +39,10 @@ struct Value {
 // Returns `text` with control characters as \n, \t or \u00XX.
 std::string printable(const std::string& text);
 
+// Returns printable text of at most 100 bytes, for a message: what is longer is cut in the middle,
+// where "..." stands.
+std::string one_line(const std::string& text);
+
 // Thrown by Codec::read, caught where the key is known.
 struct Misread {
   Position at;

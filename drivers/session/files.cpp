@@ -12,6 +12,7 @@
 #include <cstring>
 #include <iterator>
 #include <memory>
+#include <stdexcept>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -207,6 +208,24 @@ std::string base64(std::span<const std::byte> bytes) {
                   reinterpret_cast<const unsigned char*>(bytes.data()),
                   static_cast<int>(bytes.size()));
   return text;
+}
+
+std::string from_base64(const std::string& text) {
+  constexpr std::size_t piece = 1u << 24;  // letters, of which four are three bytes
+  std::string bytes(text.size() / 4 * 3, '\0');
+  for (std::size_t at = 0; at < text.size(); at += piece) {
+    const std::size_t count = std::min(piece, text.size() - at);
+    if (EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()) + at / 4 * 3,
+                        reinterpret_cast<const unsigned char*>(text.data()) + at,
+                        static_cast<int>(count)) != static_cast<int>(count / 4 * 3) ||
+        count % 4 != 0)
+      throw std::invalid_argument("not base64");
+  }
+  // EVP_DecodeBlock counts the bytes that the padding stands for.
+  std::size_t padding = 0;
+  while (padding < 2 && padding < text.size() && text[text.size() - 1 - padding] == '=') ++padding;
+  bytes.resize(bytes.size() - padding);
+  return bytes;
 }
 
 }  // namespace previz::session

@@ -93,5 +93,7 @@ class Sha256 {
 std::string sha256_of(const std::filesystem::path& file, const std::stop_token& stop = {});
 // Base64 with padding, on one line (RFC 4648).
 std::string base64(std::span<const std::byte> bytes);
+// Returns the bytes of what base64() writes. Throws std::invalid_argument if it is nothing such.
+std::string from_base64(const std::string& text);
 
 }  // namespace previz::session

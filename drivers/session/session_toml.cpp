@@ -1,7 +1,5 @@
 #include "drivers/session/session_toml.hpp"
 
-#include <openssl/evp.h>
-
 #include <toml++/toml.h>
 #include <algorithm>
 #include <array>
@@ -55,19 +53,6 @@ std::string quote(std::string_view text) {
       quoted += c;
   }
   return quoted + '"';
-}
-
-std::string from_base64(const std::string& text) {
-  std::string bytes(text.size() / 4 * 3, '\0');
-  const int size = EVP_DecodeBlock(reinterpret_cast<unsigned char*>(bytes.data()),
-                                   reinterpret_cast<const unsigned char*>(text.data()),
-                                   static_cast<int>(text.size()));
-  if (size < 0) throw std::invalid_argument("not base64");
-  // EVP_DecodeBlock counts the bytes that the padding stands for.
-  std::size_t padding = 0;
-  while (padding < 2 && padding < text.size() && text[text.size() - 1 - padding] == '=') ++padding;
-  bytes.resize(static_cast<std::size_t>(size) - padding);
-  return bytes;
 }
 
 bool reads_back(const std::string& assignment, const std::string& text) {

@@ -405,7 +405,7 @@ TEST_F(GltfMaterials, Reads16BitPng) {
 TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
   use_image({{"uri", "lost.png"}});
   const std::string file = (directory / "test.gltf").string();
-  EXPECT_EQ(error(), file + ": image 0 \"lost.png\": not found, or empty");
+  EXPECT_EQ(error(), file + ": image 0 \"lost.png\": not found; put it beside the file");
   EXPECT_EQ(error_with("/images/0", {{"name", "text"}, {"uri", "data:text/plain;base64,bm8hIQ=="}}),
             file + ": image 0 \"text\": is neither PNG nor JPEG; export it as PNG or JPEG");
   std::vector<unsigned char> broken = png(2, 1, two_texels);

@@ -1,0 +1,13 @@
+// Names what a file is that is no glTF, and says how an object is made of it.
+#pragma once
+
+#include <span>
+#include <string>
+
+namespace previz::scene {
+
+// Throws previz::Error, "FILE: is an OBJ file; ...", if the bytes are of a known format other than
+// glTF or of none, and the file's ending is that of a known one. Returns if neither says anything.
+void refuse_other_format(std::span<const unsigned char> bytes, const std::string& file);
+
+}  // namespace previz::scene
