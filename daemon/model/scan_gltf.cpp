@@ -26,7 +26,7 @@ class GltfScanReader {
       : path_(path.string()),
         textures_(textures),
         about_looks_(path_),
-        model_(scene::read_gltf(path, about_looks_)),
+        model_(scene::read_gltf(path, about_looks_, names_in_gltf)),
         notes_(path_) {}
 
   FoundSurface read(ScanFile& file) {
