@@ -158,8 +158,10 @@ bool has_like_halves(const LinearPicture& picture, bool beside) {
     for (const glm::vec3& mean :
          reduced(half, std::min(width, 16), std::min(height, 8), [](int, int) {
            return 1.0;
-         }).radiance)
-      blocks.push_back(mean.r + mean.g + mean.b);
+         }).radiance) {
+      const float light = mean.r + mean.g + mean.b;
+      blocks.push_back(std::isfinite(light) ? light : 0);
+    }
     return blocks;
   };
   const std::vector<float> one = blocks_at(0, 0);
@@ -191,7 +193,7 @@ bool is_latitude_longitude(const LinearPicture& picture) {
 std::string shape_words(const LinearPicture& picture) {
   const std::int64_t width = picture.width, height = picture.height;
   const bool is_beside = width == 4 * height, is_above = width == height;
-  if ((is_beside || is_above) && has_like_halves(picture, is_beside))
+  if ((is_beside || (is_above && height > 1)) && has_like_halves(picture, is_beside))
     return fmt::format(
         ". It looks like a stereo picture, two views {} each other; use one of them: oiiotool IN "
         "--cut {}x{}+0+0 -o OUT.exr",
@@ -223,14 +225,14 @@ const CubeCross* known_cross(const std::filesystem::path& path, const LinearPict
 }
 
 // An environment covers the sphere whatever its pixels' aspect is.
-void note_aspect(const std::filesystem::path& path, const LinearPicture& picture,
+void note_aspect(const std::filesystem::path& path, const LinearPicture& picture, bool is_cross,
                  std::vector<std::string>& notes) {
+  const bool is_square = is_cross || picture.width == 2 * std::int64_t{picture.height};
   if (std::abs(picture.pixel_aspect - 1) > 1e-3f)
-    notes.push_back(
-        fmt::format("{}: has {}x{} pixels that are {:.4g} times as wide as high; it is read as {}",
-                    path.string(), picture.width, picture.height, picture.pixel_aspect,
-                    picture.width == 2 * std::int64_t{picture.height} ? "if they were square"
-                                                                      : "twice as wide as high"));
+    notes.push_back(fmt::format(
+        "{}: has {}x{} pixels that are {:.4g} times as wide as high; it is {}", path.string(),
+        picture.width, picture.height, picture.pixel_aspect,
+        is_square ? "used as if they were square" : "stretched to be twice as wide as high"));
 }
 
 // A map that is this many times as coarse as the picture is made of a coarser picture, which has
@@ -292,7 +294,7 @@ Lighting load_environment(const set::Lighting& settings) {
   std::vector<std::string>& notes = lighting.report.notes;
   LinearPicture picture = read_linear_picture(path, notes);
   const CubeCross* cross = known_cross(path, picture);
-  note_aspect(path, picture, notes);
+  note_aspect(path, picture, cross != nullptr, notes);
   const int face_pixels = cross ? picture.height / cross->rows : 0;
   repair(picture,
          {.wraps = cross == nullptr,

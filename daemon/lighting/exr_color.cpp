@@ -134,14 +134,16 @@ Said named(const std::string& attribute, const std::string& value,
   return {fmt::format("{} \"{}\"", attribute, value), found->space};
 }
 
+std::optional<ColorMatrix> matrix_of(const Space& space) {
+  return space.kind == Space::Kind::xyz ? rec709_from_xyz(space.primaries[3])
+                                        : rec709_from(space.primaries);
+}
+
 bool same_primaries(const Space& a, const Space& b) {
-  const auto from = [](const Space& space) {
-    return space.kind == Space::Kind::xyz ? rec709_from_xyz(space.primaries[3])
-                                          : rec709_from(space.primaries);
-  };
-  const auto one = from(a), other = from(b);
+  constexpr double digits = 0.01;
+  const auto one = matrix_of(a), other = matrix_of(b);
   return one && other && std::ranges::equal(*one, *other, [](double x, double y) {
-           return std::abs(x - y) < 0.01;
+           return std::abs(x - y) < digits;
          });
 }
 
@@ -152,7 +154,8 @@ Space chromaticities_in(const Imf::Header& header) {
               "linear light of other primaries",
               {xy(found.red), xy(found.green), xy(found.blue), xy(found.white)}};
   for (const Name& name : space_names)
-    if (name.space.kind == Space::Kind::rgb && same_primaries(name.space, space))
+    if (name.space.kind == Space::Kind::rgb && same_primaries(name.space, space) &&
+        name.space.is_rec709() == space.is_rec709())
       space.words = name.space.words;
   return space;
 }
@@ -177,48 +180,51 @@ std::vector<Said> said_by(const Imf::Header& header, const std::filesystem::path
   return said;
 }
 
+// Returns what counts for X, Y and Z, whose white an attribute may name.
+Said said_by_xyz(const Said* first) {
+  if (first == nullptr) return {"its channels X, Y and Z", xyz_d65};
+  if (first->space.kind == Space::Kind::xyz) return *first;
+  return {"its channels X, Y and Z", {Space::Kind::xyz, "CIE XYZ", first->space.primaries}};
+}
+
+void note_disagreement(const std::vector<Said>& said, const std::filesystem::path& path,
+                       std::vector<std::string>& notes) {
+  for (std::size_t i = 1; i < said.size(); ++i)
+    if (!same_primaries(said[0].space, said[i].space))
+      notes.push_back(
+          fmt::format("{}: is {}, and {}; the first counts; if it is wrong, remove it: oiiotool IN "
+                      "--eraseattrib {} -o OUT.exr",
+                      path.string(), said[0].words(), said[i].words(),
+                      said[0].attribute.substr(0, said[0].attribute.find(' '))));
+}
+
 }  // namespace
 
 std::optional<ColorMatrix> rec709_from(const Imf::Header& header, ExrChannels channels,
                                        const std::filesystem::path& path,
                                        std::vector<std::string>& notes) {
   std::vector<Said> said = said_by(header, path);
-  const bool was_unsaid = !said.empty() && std::ranges::all_of(said, [](const Said& s) {
-    return s.space.kind == Space::Kind::unsaid;
-  });
-  if (was_unsaid)
+  if (!said.empty() &&
+      std::ranges::all_of(said, [](const Said& s) { return s.space.kind == Space::Kind::unsaid; }))
     notes.push_back(fmt::format(
         "{}: {} names no colour space; its values are used as linear Rec. 709; convert others: "
         "oiiotool IN --colorconvert FROM lin_rec709 -o OUT.exr",
         path.string(), said.front().attribute));
   std::erase_if(said, [](const Said& s) { return !s.space.has_primaries(); });
-  // A grey of any primaries is white as bright.
+  // A grey of any primaries is a grey of Rec. 709.
   if (channels == ExrChannels::luminance) return std::nullopt;
-  Said counts = said.empty() ? Said{"", linear_rec709} : said.front();
-  if (channels == ExrChannels::xyz && counts.space.kind != Space::Kind::xyz) {
-    const bool is_white_said = !said.empty();
-    counts = {"its channels X, Y and Z", xyz_d65};
-    if (is_white_said) counts.space.primaries[3] = said.front().space.primaries[3];
-    counts.space.words = "CIE XYZ";
-  }
-  for (std::size_t i = 1; channels == ExrChannels::rgb && i < said.size(); ++i)
-    if (!same_primaries(said[i].space, counts.space))
-      notes.push_back(
-          fmt::format("{}: is {}, and {}; the first counts; if it is wrong, remove it: oiiotool IN "
-                      "--eraseattrib {} -o OUT.exr",
-                      path.string(), counts.words(), said[i].words(),
-                      counts.attribute.substr(0, counts.attribute.find(' '))));
-  if (counts.space.is_rec709()) return std::nullopt;
-  const bool is_xyz = counts.space.kind == Space::Kind::xyz;
-  const auto matrix =
-      is_xyz ? rec709_from_xyz(counts.space.primaries[3]) : rec709_from(counts.space.primaries);
+  if (channels == ExrChannels::xyz) said = {said_by_xyz(said.empty() ? nullptr : &said.front())};
+  note_disagreement(said, path, notes);
+  if (said.empty() || said.front().space.is_rec709()) return std::nullopt;
+  const Space& space = said.front().space;
+  const auto matrix = matrix_of(space);
   if (!matrix)
     throw Error(fmt::format(
         "{}: its chromaticities span no colours; remove them if its values are linear Rec. 709: "
         "oiiotool IN --eraseattrib chromaticities -o OUT.exr",
         path.string()));
   notes.push_back(fmt::format("{}: is {}; it is converted to linear Rec. 709, white to white",
-                              path.string(), counts.words()));
+                              path.string(), said.front().words()));
   return matrix;
 }
 

@@ -247,7 +247,7 @@ TEST_F(ExrEnvironment, ASunThatOverflowedIsOneAfterConversion) {
 TEST_F(ExrEnvironment, XyzIsConvertedAndPositionsAreRefused) {
   const std::array<const char*, 3> xyz = {"X", "Y", "Z"};
   write(header_of(), plain({0.4f, 0.3f, 0.1f}), xyz);
-  expect_converted(of_xyz, "is CIE XYZ (by its channels X, Y and Z)");
+  expect_converted(of_xyz, "is CIE XYZ with a white of D65 (by its channels X, Y and Z)");
   // Equal energy is white where the file says so.
   Imf::Header header = header_of();
   Imf::addChromaticities(header, {{1, 0}, {0, 1}, {0, 0}, {1 / 3.f, 1 / 3.f}});
@@ -392,6 +392,10 @@ TEST_F(ExrEnvironment, AStereoPictureIsNamedWithTheWayToOneOfItsViews) {
         [&](int x, int y) { return x < 64 ? view(x, y) : view(x - 64 + 1, y); });
   EXPECT_THAT(refusal(), AllOf(HasSubstr("stereo picture, two views beside each other"),
                                HasSubstr("--cut 64x32+0+0")));
+  for (const int side : {1, 8}) {  // neither holes nor a single pixel hide what it is
+    write(header_of(side, side), plain(glm::vec3(std::nanf(""))));
+    EXPECT_THAT(refusal(), HasSubstr("twice as wide as high"));
+  }
   // A mirror ball: bright above, dark below, black around it.
   write(header_of(64, 64), [](int x, int y) {
     const int dx = 2 * x - 63, dy = 2 * y - 63;
