@@ -138,7 +138,7 @@ std::int64_t area(const Imath::Box2i& box) {
 
 Windows windows_of(const Imf::Header& header, const std::filesystem::path& path,
                    std::vector<std::string>& notes) {
-  const Imath::Box2i data = header.dataWindow(), shown = header.displayWindow();
+  const Imath::Box2i &data = header.dataWindow(), &shown = header.displayWindow();
   check_size(path, side(data, 0), side(data, 1));
   check_size(path, side(shown, 0), side(shown, 1));
   const Imath::Box2i common{{std::max(data.min.x, shown.min.x), std::max(data.min.y, shown.min.y)},

@@ -16,8 +16,8 @@ namespace {
 // Returns how many times the greatest common measure of the sides fits into the smaller picture.
 int measures(std::int64_t width, std::int64_t height, std::int64_t most) {
   const std::int64_t measure = std::gcd(width, height);
-  const double of_one =
-      static_cast<double>(width / measure) * static_cast<double>(height / measure);
+  const std::int64_t across = width / measure, down = height / measure;
+  const double of_one = static_cast<double>(across * down);
   const auto fitting =
       static_cast<std::int64_t>(std::sqrt(static_cast<double>(most) / of_one) * (1 + 1e-12));
   if (fitting < 1) return 0;
