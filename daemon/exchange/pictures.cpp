@@ -251,8 +251,10 @@ class PictureFiles final : public Footage {
                   ": is OpenEXR, which holds linear light of any range; read_as can name its "
                   "primaries only");
     std::vector<std::string> oddities;
-    const lighting::LinearPicture light = lighting::read_exr_picture(
-        name, oddities, {.keeps_primaries = read_as_.primaries.has_value()});
+    const lighting::LinearPicture light =
+        lighting::read_exr_picture(name, oddities,
+                                   {.keeps_primaries = read_as_.primaries.has_value(),
+                                    .most_kept = static_cast<std::int64_t>(most_pixels)});
     for (const std::string& oddity : oddities)
       note(name, oddity.substr(std::min(oddity.size(), name.size() + 2)));
     const auto m = *rec709_from(read_as_.primaries.value_or(AVCOL_PRI_BT709));
