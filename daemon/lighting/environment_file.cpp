@@ -192,13 +192,14 @@ bool is_latitude_longitude(const LinearPicture& picture) {
 
 std::string shape_words(const LinearPicture& picture) {
   const std::int64_t width = picture.width, height = picture.height;
+  const auto of_file = [&](double side) { return std::lround(side * picture.pixels_of_file); };
   const bool is_beside = width == 4 * height, is_above = width == height;
   if ((is_beside || (is_above && height > 1)) && has_like_halves(picture, is_beside))
     return fmt::format(
         ". It looks like a stereo picture, two views {} each other; use one of them: oiiotool IN "
         "--cut {}x{}+0+0 -o OUT.exr",
-        is_beside ? "beside" : "above", is_beside ? width / 2 : width,
-        is_beside ? height : height / 2);
+        is_beside ? "beside" : "above", of_file(is_beside ? 0.5 * picture.width : picture.width),
+        of_file(is_beside ? picture.height : 0.5 * picture.height));
   if (is_above)
     return ". A square may be a mirror ball, an angular map or a fisheye; convert it to "
            "latitude-longitude: HDRShop converts mirror balls and angular maps (light probes), and "
@@ -218,7 +219,8 @@ const CubeCross* known_cross(const std::filesystem::path& path, const LinearPict
   throw Error(fmt::format(
       "{}: the picture has {}x{} pixels; a latitude-longitude environment is twice as wide as "
       "high{}",
-      path.string(), picture.width, picture.height,
+      path.string(), std::lround(picture.width * picture.pixels_of_file),
+      std::lround(picture.height * picture.pixels_of_file),
       cross != nullptr ? ", and a cube cross, which has this shape, has nothing but one colour in "
                          "its corners: this is neither"
                        : shape_words(picture)));

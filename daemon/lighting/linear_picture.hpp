@@ -14,6 +14,7 @@ struct LinearPicture {
   int height = 0;
   std::vector<glm::vec3> radiance;  // row-major, linear Rec. 709
   float pixel_aspect = 1;           // a pixel's width by its height
+  double pixels_of_file = 1;        // for one of the picture's, along a side
 
   glm::vec3& at(int x, int y) { return radiance[index(x, y)]; }
   const glm::vec3& at(int x, int y) const { return radiance[index(x, y)]; }

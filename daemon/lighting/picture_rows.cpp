@@ -103,6 +103,7 @@ LinearPicture PictureRows::picture(std::vector<std::string>& notes) && {
         overflowed_ == 0
             ? std::string()
             : fmt::format(" ({} values of +Inf count as {})", overflowed_, largest_half)));
+  picture_.pixels_of_file = scale_;
   return std::move(picture_);
 }
 

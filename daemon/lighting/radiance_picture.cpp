@@ -236,7 +236,9 @@ LinearPicture read_radiance_picture(const std::filesystem::path& path,
         "green, blue; EXPOSURE, COLORCORR); this is divided out",
         path.string(), header.exposure.r, header.exposure.g, header.exposure.b));
   to_rec709(stored, header, path, notes);
+  const double scale_of_file = stored.pixels_of_file;
   LinearPicture picture = upright(std::move(stored), header);
+  picture.pixels_of_file = scale_of_file;
   picture.pixel_aspect = static_cast<float>(header.pixel_aspect);
   return picture;
 }

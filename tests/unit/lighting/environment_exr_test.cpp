@@ -429,6 +429,8 @@ TEST_F(ExrEnvironment, ATooLargePictureIsReadByItsMeans) {
     for (int x = 0; x < 32; ++x)
       ASSERT_EQ(picture.at(x, y), glm::vec3(1.5 + 2 * x, 1.5 + 2 * y, 3));
 
+  EXPECT_EQ(picture.pixels_of_file, 2);
+
   // A picture that is kept is not changed, and a sun that overflowed lights its share.
   EXPECT_EQ(read(2048).at(63, 31), place(63, 31));
   EXPECT_THAT(notes, testing::IsEmpty());
