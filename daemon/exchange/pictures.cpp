@@ -251,10 +251,12 @@ class PictureFiles final : public Footage {
                   ": is OpenEXR, which holds linear light of any range; read_as can name its "
                   "primaries only");
     std::vector<std::string> oddities;
-    const lighting::LinearPicture light = lighting::read_exr_picture(name, oddities);
-    if (!oddities.empty() && !read_as_.primaries)
-      throw Error(name + ": " + oddities.front() +
-                  "; convert it (oiiotool IN --colorconvert ACEScg lin_rec709 -o OUT)");
+    const lighting::LinearPicture light =
+        lighting::read_exr_picture(name, oddities,
+                                   {.keeps_primaries = read_as_.primaries.has_value(),
+                                    .most_kept = static_cast<std::int64_t>(most_pixels)});
+    for (const std::string& oddity : oddities)
+      note(name, oddity.substr(std::min(oddity.size(), name.size() + 2)));
     const auto m = *rec709_from(read_as_.primaries.value_or(AVCOL_PRI_BT709));
     cv::Mat image(light.height, light.width, CV_16UC3);
     auto* sample = image.ptr<std::uint16_t>();
@@ -272,7 +274,7 @@ class PictureFiles final : public Footage {
     const Imf::InputFile file(name.c_str());
     if (file.header().channels().findChannel("A")) note(name, "its transparency is not used");
     constexpr int parts = 10'000;
-    const double aspect = file.header().pixelAspectRatio();
+    const double aspect = light.pixel_aspect;
     if (!read_as_.pixel_aspect && aspect > 0.125 && aspect < 8)
       make_square(picture, static_cast<int>(std::lround(aspect * parts)), parts);
     return shaped(std::move(picture), Orientation{});

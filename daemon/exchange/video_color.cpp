@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/core/matx.hpp>
 
 #include "daemon/lighting/response.hpp"
 
 namespace previz::exchange {
+
+using lighting::d65, lighting::rec709;
+
 namespace {
 
 constexpr double most = 65535;
@@ -27,8 +29,7 @@ double hlg_light(double signal) {
   return signal <= 0.5 ? signal * signal / 3 : (std::exp((signal - c) / a) + b) / 12;
 }
 
-constexpr std::array<double, 2> d65 = {0.3127, 0.3290}, illuminant_c = {0.310, 0.316};
-constexpr Chromaticities rec709 = {{{0.640, 0.330}, {0.300, 0.600}, {0.150, 0.060}, d65}};
+constexpr std::array<double, 2> illuminant_c = {0.310, 0.316};
 
 // H.273 table 2.
 std::optional<Chromaticities> chromaticities_of(AVColorPrimaries primaries) {
@@ -58,34 +59,6 @@ std::optional<Chromaticities> chromaticities_of(AVColorPrimaries primaries) {
     default:
       return std::nullopt;
   }
-}
-
-// XYZ of a chromaticity, of any brightness.
-cv::Vec3d xyz(const std::array<double, 2>& xy) {
-  return {xy[0], xy[1], 1 - xy[0] - xy[1]};
-}
-
-// XYZ of the white, as bright as Y = 1.
-cv::Vec3d white_of(const Chromaticities& c) {
-  return xyz(c[3]) * (1 / c[3][1]);
-}
-
-// XYZ from linear RGB (SMPTE RP 177).
-cv::Matx33d xyz_from(const Chromaticities& c) {
-  cv::Matx33d columns;
-  for (int i = 0; i < 3; ++i)
-    for (int row = 0; row < 3; ++row) columns(row, i) = xyz(c[static_cast<std::size_t>(i)])[row];
-  const cv::Vec3d scales = columns.inv() * white_of(c);
-  return columns * cv::Matx33d::diag(scales);
-}
-
-// Turns one white into another as the eye adapts (Lam 1985, "Bradford").
-cv::Matx33d adapted(const cv::Vec3d& from, const cv::Vec3d& to) {
-  const cv::Matx33d cones(0.8951, 0.2664, -0.1614, -0.7502, 1.7135, 0.0367, 0.0389, -0.0685,
-                          1.0296);
-  const cv::Vec3d before = cones * from, after = cones * to;
-  const cv::Vec3d ratio(after[0] / before[0], after[1] / before[1], after[2] / before[2]);
-  return cones.inv() * cv::Matx33d::diag(ratio) * cones;
 }
 
 }  // namespace
@@ -130,26 +103,11 @@ std::optional<double> light_of(AVColorTransferCharacteristic transfer, double si
   }
 }
 
-std::optional<std::array<double, 9>> rec709_from(const Chromaticities& from) {
-  const cv::Vec3d white = white_of(from);
-  const cv::Matx33d matrix =
-      xyz_from(rec709).inv() * adapted(white, white_of(rec709)) * xyz_from(from);
-  std::array<double, 9> rows{};
-  std::copy_n(matrix.val, rows.size(), rows.begin());
-  // OpenCV's inverse of a singular matrix is zero, and a white without brightness is infinite. No
-  // primaries that something was filmed with need a factor of ten.
-  constexpr double most_factor = 1000;
-  if (!std::ranges::all_of(rows, [](double value) { return std::abs(value) < most_factor; }) ||
-      std::abs(cv::determinant(matrix)) < 1e-6)
-    return std::nullopt;
-  return rows;
-}
-
 std::optional<std::array<double, 9>> rec709_from(AVColorPrimaries primaries) {
   const auto from = chromaticities_of(primaries);
   if (!from) return std::nullopt;
   if (*from == rec709) return {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
-  return rec709_from(*from);
+  return lighting::rec709_from(*from);
 }
 
 ColorConversion::ColorConversion(AVColorTransferCharacteristic transfer, AVColorPrimaries primaries,

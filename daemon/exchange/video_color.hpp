@@ -14,6 +14,8 @@ extern "C" {
 #include <string>
 #include <vector>
 
+#include "daemon/lighting/primaries.hpp"
+
 namespace previz::exchange {
 
 // Returns the light of a signal 0..1 by the transfer characteristics of ITU-T H.273 table 3. Light
@@ -33,10 +35,7 @@ bool keeps_signal(AVColorTransferCharacteristic transfer);
 // 709, white to white (Bradford). Nothing for unknown primaries; the unit matrix for no tag.
 std::optional<std::array<double, 9>> rec709_from(AVColorPrimaries primaries);
 
-// CIE x and y of red, green, blue and white.
-using Chromaticities = std::array<std::array<double, 2>, 4>;
-// The same matrix for primaries that have no number; nothing for those that span no triangle.
-std::optional<std::array<double, 9>> rec709_from(const Chromaticities& chromaticities);
+using lighting::Chromaticities, lighting::rec709_from;
 
 // What a still's tags say of its samples: the light of a red, green and blue signal of 0..1, and
 // the matrix, row-major, from that light to linear Rec. 709.

@@ -145,32 +145,96 @@ class CubeTexelMeans {
   float step_, cosine_, sine_;
 };
 
+// Returns whether the picture's left half shows nearly what its right one does, or its upper half
+// what the lower one does, as the two views of a stereo picture do: by the means of 16x8 blocks.
+bool has_like_halves(const LinearPicture& picture, bool beside) {
+  const int width = beside ? picture.width / 2 : picture.width;
+  const int height = beside ? picture.height : picture.height / 2;
+  const auto blocks_at = [&](int left, int top) {
+    LinearPicture half{width, height, {}};
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) half.radiance.push_back(picture.at(left + x, top + y));
+    std::vector<float> blocks;
+    for (const glm::vec3& mean :
+         reduced(half, std::min(width, 16), std::min(height, 8), [](int, int) {
+           return 1.0;
+         }).radiance) {
+      const float light = mean.r + mean.g + mean.b;
+      blocks.push_back(std::isfinite(light) ? light : 0);
+    }
+    return blocks;
+  };
+  const std::vector<float> one = blocks_at(0, 0);
+  const std::vector<float> other = blocks_at(beside ? width : 0, beside ? 0 : height);
+  std::vector<float> sorted = one;
+  std::ranges::sort(sorted);
+  const float median = std::max(sorted[sorted.size() / 2], 1e-20f);
+  // A lamp in one block does not outweigh the others.
+  const auto seen = [&](float value) { return value / (std::abs(value) + median); };
+  // What is near is elsewhere for the other eye, by a block at most.
+  float difference = 0;
+  for (std::size_t i = 0; i < one.size(); ++i) {
+    float least = std::abs(seen(one[i]) - seen(other[i]));
+    for (const std::size_t j : {i - 1, i + 1})
+      if (j < other.size()) least = std::min(least, std::abs(seen(one[i]) - seen(other[j])));
+    difference += least;
+  }
+  constexpr float most_difference = 0.06f;
+  return difference < most_difference * static_cast<float>(one.size());
+}
+
+// Returns whether the picture is as its pixels' aspect makes it twice as wide as high.
+bool is_latitude_longitude(const LinearPicture& picture) {
+  const double width = static_cast<double>(picture.width) * picture.pixel_aspect;
+  return picture.width == 2 * std::int64_t{picture.height} ||
+         std::abs(width - 2.0 * picture.height) < 0.6 * std::max(1.0f, picture.pixel_aspect);
+}
+
+std::string shape_words(const LinearPicture& picture) {
+  const std::int64_t width = picture.width, height = picture.height;
+  const auto of_file = [&](double side) { return std::lround(side * picture.pixels_of_file); };
+  const bool is_beside = width == 4 * height, is_above = width == height;
+  if ((is_beside || (is_above && height > 1)) && has_like_halves(picture, is_beside))
+    return fmt::format(
+        ". It looks like a stereo picture, two views {} each other; use one of them: oiiotool IN "
+        "--cut {}x{}+0+0 -o OUT.exr",
+        is_beside ? "beside" : "above", of_file(is_beside ? 0.5 * picture.width : picture.width),
+        of_file(is_beside ? picture.height : 0.5 * picture.height));
+  if (is_above)
+    return ". A square may be a mirror ball, an angular map or a fisheye; convert it to "
+           "latitude-longitude: HDRShop converts mirror balls and angular maps (light probes), and "
+           "Hugin a fisheye (projection: equirectangular)";
+  if (width == 6 * height || height == 6 * width)
+    return ". This looks like a strip of six cube faces, whose order differs from program to "
+           "program; convert it to latitude-longitude or to a cube cross, by cmft for example";
+  return ", and a cube cross has 3:4 or 4:3; export the whole picture in one of these shapes";
+}
+
 // Returns the cross that the picture is, or null for a latitude-longitude picture. Throws
 // previz::Error for what is neither.
 const CubeCross* known_cross(const std::filesystem::path& path, const LinearPicture& picture) {
-  const std::int64_t width = picture.width, height = picture.height;
-  if (width == 2 * height) return nullptr;
+  if (is_latitude_longitude(picture)) return nullptr;
   const CubeCross* cross = cross_of(picture);
   if (cross != nullptr && is_bare_beside(*cross, picture)) return cross;
-  std::string message = fmt::format(
-      "{}: the picture has {}x{} pixels; a latitude-longitude environment is twice as wide as high",
-      path.string(), width, height);
-  if (cross != nullptr)
-    message +=
-        ", and a cube cross, which has this shape, has nothing but one colour in its corners: this "
-        "is neither";
-  else if (width == height)
-    message +=
-        ". A square may be a mirror ball, an angular map or a fisheye; convert it to "
-        "latitude-longitude: HDRShop converts mirror balls and angular maps (light probes), and "
-        "Hugin a fisheye (projection: equirectangular)";
-  else if (width == 6 * height || height == 6 * width)
-    message +=
-        ". This looks like a strip of six cube faces, whose order differs from program to program; "
-        "convert it to latitude-longitude or to a cube cross, by cmft for example";
-  else
-    message += ", and a cube cross has 3:4 or 4:3; export the whole picture in one of these shapes";
-  throw Error(message);
+  throw Error(fmt::format(
+      "{}: the picture has {}x{} pixels; a latitude-longitude environment is twice as wide as "
+      "high{}",
+      path.string(), std::lround(picture.width * picture.pixels_of_file),
+      std::lround(picture.height * picture.pixels_of_file),
+      cross != nullptr ? ", and a cube cross, which has this shape, has nothing but one colour in "
+                         "its corners: this is neither"
+                       : shape_words(picture)));
+}
+
+// An environment covers the sphere whatever its pixels' aspect is.
+void note_aspect(const std::filesystem::path& path, const LinearPicture& picture, bool is_cross,
+                 std::vector<std::string>& notes) {
+  const bool is_square = is_cross || picture.width == 2 * std::int64_t{picture.height};
+  if (std::abs(picture.pixel_aspect - 1) > 1e-3f)
+    notes.push_back(fmt::format(
+        "{}: has {}x{} pixels that are {:.4g} times as wide as high; it is {}", path.string(),
+        picture.width, picture.height, picture.pixel_aspect,
+        is_square ? "used as if they were square" : "stretched to be twice as wide as high"));
 }
 
 // A map that is this many times as coarse as the picture is made of a coarser picture, which has
@@ -232,6 +296,7 @@ Lighting load_environment(const set::Lighting& settings) {
   std::vector<std::string>& notes = lighting.report.notes;
   LinearPicture picture = read_linear_picture(path, notes);
   const CubeCross* cross = known_cross(path, picture);
+  note_aspect(path, picture, cross != nullptr, notes);
   const int face_pixels = cross ? picture.height / cross->rows : 0;
   repair(picture,
          {.wraps = cross == nullptr,
@@ -247,7 +312,8 @@ Lighting load_environment(const set::Lighting& settings) {
 
   // Radians a pixel: on the equator, or the mean of the cube's.
   const auto radians_a_pixel = [&] {
-    return cross ? std::sqrt(4 * pi / 6) * cross->rows / picture.height : 2 * pi / picture.width;
+    return cross ? std::sqrt(4 * pi / 6) * cross->rows / picture.height
+                 : std::min(2 * pi / picture.width, pi / picture.height);
   };
   double pixel_rad = radians_a_pixel();
   const int size = chosen_resolution(settings.resolution, pixel_rad * pixel_rad);

@@ -13,6 +13,8 @@ struct LinearPicture {
   int width = 0;
   int height = 0;
   std::vector<glm::vec3> radiance;  // row-major, linear Rec. 709
+  float pixel_aspect = 1;           // a pixel's width by its height
+  double pixels_of_file = 1;        // for one of the picture's, along a side
 
   glm::vec3& at(int x, int y) { return radiance[index(x, y)]; }
   const glm::vec3& at(int x, int y) const { return radiance[index(x, y)]; }
@@ -24,9 +26,11 @@ struct LinearPicture {
   }
 };
 
-// An environment of 16384x8192 pixels; light needs no finer one (max_resolution in
-// environment.hpp). Twice its 12 bytes a pixel are in memory while it is read.
-inline constexpr std::int64_t most_pixels = std::int64_t{1} << 27;
+// A picture of 32768x16384 pixels can be read; one of more than 16384x8192 is made coarser
+// meanwhile (picture_rows.hpp), because light needs no finer one (max_resolution in
+// environment.hpp). Twice its 12 bytes a pixel are in memory.
+inline constexpr std::int64_t most_pixels = std::int64_t{1} << 29;
+inline constexpr std::int64_t most_kept_pixels = std::int64_t{1} << 27;
 inline constexpr std::int64_t most_side = std::int64_t{1} << 16;
 
 // Throws previz::Error naming the file unless the picture, which a small file may claim to be of

@@ -79,11 +79,12 @@ std::string beginning_of(const std::filesystem::path& path) {
 }  // namespace
 
 LinearPicture read_linear_picture(const std::filesystem::path& path,
-                                  std::vector<std::string>& notes) {
+                                  std::vector<std::string>& notes, std::int64_t most_kept) {
   const std::string bytes = beginning_of(path);
-  if (bytes.starts_with("\x76\x2f\x31\x01"sv)) return read_exr_picture(path, notes);
-  if (bytes.starts_with("#?RADIANCE"sv) || bytes.starts_with("#?RGBE"sv))
-    return read_radiance_picture(path, notes);
+  if (bytes.starts_with("\x76\x2f\x31\x01"sv))
+    return read_exr_picture(path, notes, {.most_kept = most_kept});
+  // The name of the program follows.
+  if (bytes.starts_with("#?"sv)) return read_radiance_picture(path, notes, most_kept);
   refuse(path, bytes);
 }
 

@@ -2,12 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
 #include <optional>
 #include <sstream>
+#include <utility>
 
+#include "daemon/lighting/picture_rows.hpp"
+#include "daemon/lighting/primaries.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::lighting {
@@ -23,7 +27,9 @@ struct Axis {
 
 struct Header {
   glm::dvec3 exposure{1};  // EXPOSURE and COLORCORR, which the file's values are already scaled by
-  bool has_primaries = false;
+  std::optional<Chromaticities> primaries;  // where they are not those of Rec. 709
+  bool is_xyz = false;
+  double pixel_aspect = 1;
   Axis lines, pixels;  // from scan line to scan line; from pixel to pixel in one
 };
 
@@ -87,12 +93,10 @@ class Reader {
     if (name == "FORMAT") {
       std::string format;
       value >> format;
-      if (format == "32-bit_rle_xyze")
-        fail(
-            "its pixels are CIE XYZ (32-bit_rle_xyze), not red, green and blue; convert it: "
-            "ra_xyze -r IN.hdr OUT.hdr, of Radiance");
-      if (format != "32-bit_rle_rgbe")
-        fail(fmt::format("FORMAT is \"{}\"; expected 32-bit_rle_rgbe", format.substr(0, 40)));
+      header.is_xyz = format == "32-bit_rle_xyze";
+      if (!header.is_xyz && format != "32-bit_rle_rgbe")
+        fail(fmt::format("FORMAT is \"{}\"; expected 32-bit_rle_rgbe or 32-bit_rle_xyze",
+                         format.substr(0, 40)));
     } else if (name == "EXPOSURE" || name == "COLORCORR") {
       glm::dvec3 factor(0);
       value >> factor.r;
@@ -103,12 +107,16 @@ class Reader {
         if (!value || !(header.exposure[c] > 1e-30 && header.exposure[c] < 1e30))
           fail(fmt::format("\"{}\" is not a brightness factor", text.substr(0, 60)));
     } else if (name == "PRIMARIES") {
-      // Those of Rec. 709 to three digits; Radiance's own are others.
-      std::array<double, 6> found{};
-      for (double& number : found) value >> number;
-      constexpr std::array rec709{0.64, 0.33, 0.30, 0.60, 0.15, 0.06};
-      for (std::size_t i = 0; i < found.size(); ++i)
-        header.has_primaries |= std::abs(found[i] - rec709[i]) > 1e-3;
+      // Photoshop writes zeros, which say nothing; Radiance's own are none of Rec. 709.
+      Chromaticities found{};
+      for (auto& xy : found) value >> xy[0] >> xy[1];
+      if (found != Chromaticities{} && !is_rec709(found)) header.primaries = found;
+    } else if (name == "PIXASPECT") {
+      double height = 0;  // of a pixel, by its width
+      value >> height;
+      header.pixel_aspect /= height;
+      if (!(header.pixel_aspect > 0.01 && header.pixel_aspect < 100))
+        fail(fmt::format("\"{}\" is not a pixel's aspect", text.substr(0, 60)));
     }
   }
 
@@ -173,7 +181,8 @@ LinearPicture upright(LinearPicture&& stored, const Header& header) {
   const Axis& down = is_turned ? header.pixels : header.lines;
   const bool from_left = !across.descends, from_top = down.descends;
   if (!is_turned && from_left && from_top) return std::move(stored);
-  LinearPicture picture{static_cast<int>(across.size), static_cast<int>(down.size), {}};
+  LinearPicture picture{
+      is_turned ? stored.height : stored.width, is_turned ? stored.width : stored.height, {}};
   picture.radiance.resize(stored.radiance.size());
   for (int y = 0; y < picture.height; ++y)
     for (int x = 0; x < picture.width; ++x) {
@@ -184,34 +193,54 @@ LinearPicture upright(LinearPicture&& stored, const Header& header) {
   return picture;
 }
 
+// Radiance's XYZ has equal energy for white (its ra_xyze and "filefmts").
+void to_rec709(LinearPicture& picture, const Header& header, const std::filesystem::path& path,
+               std::vector<std::string>& notes) {
+  if (!header.is_xyz && !header.primaries) return;
+  const auto matrix =
+      header.is_xyz ? rec709_from_xyz(equal_energy) : rec709_from(*header.primaries);
+  if (matrix) convert(picture.radiance, *matrix);
+  notes.push_back(path.string() +
+                  (!matrix         ? ": its PRIMARIES span no colours; its values are used "
+                                     "as linear Rec. 709"
+                   : header.is_xyz ? ": is CIE XYZ; it is converted to linear Rec. 709, white to "
+                                     "white"
+                                   : ": has other PRIMARIES than those of Rec. 709; it is "
+                                     "converted, white to white"));
+}
+
 }  // namespace
 
 LinearPicture read_radiance_picture(const std::filesystem::path& path,
-                                    std::vector<std::string>& notes) {
+                                    std::vector<std::string>& notes, std::int64_t most_kept) {
   Reader reader(path);
   const Header header = reader.header();
   check_size(path, header.pixels.size, header.lines.size);
-  LinearPicture stored{
-      static_cast<int>(header.pixels.size), static_cast<int>(header.lines.size), {}};
-  reserve_pixels(stored, std::filesystem::file_size(path));
-  std::vector<Pixel> pixels(static_cast<std::size_t>(stored.width));
+  PictureRows rows(path, static_cast<int>(header.pixels.size), static_cast<int>(header.lines.size),
+                   most_kept);
+  std::vector<Pixel> pixels(static_cast<std::size_t>(header.pixels.size));
+  std::vector<glm::vec3> row(pixels.size());
   const glm::dvec3 scale = 1.0 / header.exposure;
-  for (int line = 0; line < stored.height; ++line) {
+  for (std::int64_t line = 0; line < header.lines.size; ++line) {
     reader.scan_line(pixels, line);
-    for (const Pixel& p : pixels) {
+    std::ranges::transform(pixels, row.begin(), [&](const Pixel& p) {
       const double unit = p[3] == 0 ? 0 : std::ldexp(1.0, p[3] - 136);
-      stored.radiance.emplace_back(scale * unit * glm::dvec3(p[0], p[1], p[2]));
-    }
+      return glm::vec3(scale * unit * glm::dvec3(p[0], p[1], p[2]));
+    });
+    rows.append(row);
   }
+  LinearPicture stored = std::move(rows).picture(notes);
   if (header.exposure != glm::dvec3(1))
     notes.push_back(fmt::format(
         "{}: its header says that it was made {:.4g}, {:.4g} and {:.4g} times as bright (red, "
         "green, blue; EXPOSURE, COLORCORR); this is divided out",
         path.string(), header.exposure.r, header.exposure.g, header.exposure.b));
-  if (header.has_primaries)
-    notes.push_back(path.string() +
-                    ": the file's primaries are not those of Rec. 709; its numbers are used as if");
-  return upright(std::move(stored), header);
+  to_rec709(stored, header, path, notes);
+  const double scale_of_file = stored.pixels_of_file;
+  LinearPicture picture = upright(std::move(stored), header);
+  picture.pixels_of_file = scale_of_file;
+  picture.pixel_aspect = static_cast<float>(header.pixel_aspect);
+  return picture;
 }
 
 }  // namespace previz::lighting

@@ -1,6 +1,7 @@
 // What an environment's picture may be besides a latitude-longitude OpenEXR: Radiance .hdr, a cube
 // cross; and what is said about everything else.
 #include "daemon/lighting/lighting.hpp"
+#include "daemon/lighting/picture_file.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -96,6 +97,70 @@ TEST_F(PictureFormats, ExposureAndColourCorrectionAreDividedOut) {
   EXPECT_THAT(lighting.report.notes, ElementsAre(HasSubstr("8, 4 and 2 times as bright")));
 }
 
+// Whichever program it names.
+TEST_F(PictureFormats, AnyProgramsRadianceFileIsRead) {
+  for (const char* magic : {"#?rgbe", "#?RGBE", "#?", "#?Autopano", "#?radiance"}) {
+    const Lighting lighting =
+        load(with_header("-Y 8 +X 16", "", magic) + flat(128, {128, 64, 32, 129}));
+    expect_even(lighting, {1, 0.5, 0.25});
+    EXPECT_THAT(lighting.report.notes, testing::IsEmpty()) << magic;
+  }
+}
+
+// The matrix of Rec. 2020 is that of ITU-R BT.2087, to four digits.
+TEST_F(PictureFormats, OtherPrimariesOfRadianceAreConverted) {
+  const auto with_primaries = [&](const char* numbers, const Rgbe& pixel = {128, 64, 32, 129}) {
+    return load(with_header("-Y 8 +X 16", "PRIMARIES=" + std::string(numbers) + "\n") +
+                flat(128, pixel));
+  };
+  const auto expect_near = [](const Lighting& lighting, const glm::vec3& radiance) {
+    for (const glm::vec3& texel : lighting.environment.radiance)
+      ASSERT_LT(glm::length(texel - radiance), 3e-4f);
+    EXPECT_THAT(lighting.report.notes, ElementsAre(HasSubstr("white to white")));
+  };
+  // Photoshop's, and those of Rec. 709.
+  for (const char* numbers :
+       {"0 0 0 0 0 0 0 0", " 0.6400 0.3300 0.3000 0.6000 0.1500 0.0600 0.3127 0.3290"}) {
+    const Lighting lighting = with_primaries(numbers);
+    expect_even(lighting, {1, 0.5, 0.25});
+    EXPECT_THAT(lighting.report.notes, testing::IsEmpty()) << numbers;
+  }
+  expect_near(with_primaries("0.708 0.292 0.170 0.797 0.131 0.046 0.3127 0.3290"),
+              {1.6605 - 0.5876 * 0.5 - 0.0728 * 0.25, -0.1246 + 1.1329 * 0.5 - 0.0083 * 0.25,
+               -0.0182 - 0.1006 * 0.5 + 1.1187 * 0.25});
+  // Radiance's own, whose white has equal energy.
+  const char* radiance = "0.640 0.330 0.290 0.600 0.150 0.060 0.333 0.333";
+  expect_near(with_primaries(radiance, {128, 128, 128, 129}), glm::vec3(1));
+  EXPECT_THAT(with_primaries("1 2 3").report.notes, ElementsAre(HasSubstr("span no colours")));
+  // XYZ, whose white has equal energy, too.
+  expect_near(
+      load("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 8 +X 16\n" + flat(128, {128, 128, 128, 129})),
+      glm::vec3(1));
+}
+
+TEST_F(PictureFormats, RadiancePixelsThatAreNotSquareAreStretched) {
+  const Lighting lighting =
+      load(with_header("-Y 16 +X 16", "PIXASPECT=0.5\n") + flat(256, {128, 64, 32, 129}));
+  expect_even(lighting, {1, 0.5, 0.25});
+  EXPECT_THAT(lighting.report.notes, ElementsAre(HasSubstr("2 times as wide as high")));
+}
+
+TEST_F(PictureFormats, ATooLargeRadiancePictureIsReadByItsMeans) {
+  const previz::test::TemporaryDirectory directory;
+  const std::filesystem::path file = directory / "sky.hdr";
+  // Columns of 1 and 0.5, rows of the same brightness, from below.
+  std::string bytes = with_header("+Y 8 +X 16");
+  for (int i = 0; i < 64; ++i)
+    bytes += flat(1, {128, 128, 128, 129}) + flat(1, {128, 128, 128, 128});
+  std::ofstream(file, std::ios::binary) << bytes;
+  std::vector<std::string> notes;
+  const LinearPicture picture = read_linear_picture(file, notes, 32);
+  ASSERT_EQ(picture.width, 8);
+  ASSERT_EQ(picture.height, 4);
+  for (const glm::vec3& pixel : picture.radiance) EXPECT_EQ(pixel, glm::vec3(0.75f));
+  EXPECT_THAT(notes, ElementsAre(HasSubstr("sky.hdr: has 16x8 pixels, which are read as 8x4")));
+}
+
 // A world with every direction another colour, none of whose channels is zero.
 glm::dvec3 smooth_world(const glm::dvec3& d) {
   return 0.5 * d + 0.6 + 0.1 * glm::dvec3(d.y * d.z, d.z * d.x, d.x * d.y);
@@ -159,7 +224,9 @@ TEST_F(PictureFormats, DamagedRadianceFilesAreRefusedByName) {
       {with_header("-Y 8192 +X 16384"), "scan line 1 is cut off"},
       {with_header("-Y -8 +X 16") + pixels, "16x-8 pixels"},
       {with_header("-Y 8 +Y 16") + pixels, "its size is \"-Y 8 +Y 16\""},
-      {"#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 8 +X 16\n" + pixels, "CIE XYZ"},
+      {"#?RADIANCE\nFORMAT=32-bit_rle_abcd\n\n-Y 8 +X 16\n" + pixels,
+       "FORMAT is \"32-bit_rle_abcd"},
+      {with_header(size, "PIXASPECT=0\n") + pixels, "\"PIXASPECT=0\" is not a pixel's aspect"},
       {with_header(size, "EXPOSURE=0\n") + pixels, "\"EXPOSURE=0\" is not a brightness factor"},
       {"#?RADIANCE\nFORMAT=32-bit_rle", "ends in its header"},
       {with_header(size) + bytes_of({2, 2, 0, 16, 128 + 17, 1}),

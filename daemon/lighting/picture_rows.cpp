@@ -1,0 +1,110 @@
+#include "daemon/lighting/picture_rows.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "daemon/lighting/picture_repair.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::lighting {
+namespace {
+
+// Returns how many times the greatest common measure of the sides fits into the smaller picture.
+int measures(std::int64_t width, std::int64_t height, std::int64_t most) {
+  const std::int64_t measure = std::gcd(width, height);
+  const std::int64_t across = width / measure, down = height / measure;
+  const double of_one = static_cast<double>(across * down);
+  const auto fitting =
+      static_cast<std::int64_t>(std::sqrt(static_cast<double>(most) / of_one) * (1 + 1e-12));
+  if (fitting < 1) return 0;
+  const std::int64_t pixels_for_one = (measure + fitting - 1) / fitting;
+  return static_cast<int>(measure / pixels_for_one);
+}
+
+}  // namespace
+
+PictureRows::PictureRows(const std::filesystem::path& path, int width, int height,
+                         std::int64_t most_kept)
+    : path_(path), width_(width), height_(height), picture_{width, height, {}} {
+  if (std::int64_t{width} * height > most_kept) {
+    const int count = measures(width, height, most_kept);
+    const int measure = std::gcd(width, height);
+    if (count == 0)
+      throw Error(fmt::format(
+          "{}: has {}x{} pixels; allowed: at most {}, or sides that both have a smaller one of the "
+          "same shape; make it smaller: oiiotool IN --resize 16384x8192 -o OUT.exr",
+          path.string(), width, height, most_kept));
+    picture_.width = width / measure * count;
+    picture_.height = height / measure * count;
+    scale_ = static_cast<double>(measure) / count;
+    across_.resize(static_cast<std::size_t>(picture_.width));
+    sums_.resize(across_.size());
+  }
+  reserve_pixels(picture_, std::filesystem::file_size(path));
+}
+
+void PictureRows::append(std::span<const glm::vec3> row) {
+  if (across_.empty())
+    picture_.radiance.insert(picture_.radiance.end(), row.begin(), row.end());
+  else
+    add(row);
+  ++rows_;
+}
+
+void PictureRows::add(std::span<const glm::vec3> row) {
+  std::ranges::fill(across_, glm::dvec3(0));
+  // The parts of a pixel, or of a row, that lie before and behind the end of a coarse one.
+  const auto share = [&](int pixel, auto&& body) {
+    const auto first = static_cast<std::size_t>(pixel / scale_ + 1e-9);
+    const double end = static_cast<double>(first + 1) * scale_;
+    const double before = std::min(end - pixel, 1.0);
+    body(first, before / scale_);
+    if (before < 1 - 1e-9) body(first + 1, (1 - before) / scale_);
+  };
+  for (int x = 0; x < width_; ++x) {
+    glm::dvec3 light(row[static_cast<std::size_t>(x)]);
+    for (int c = 0; c < 3; ++c)
+      if (std::isinf(light[c]) && light[c] > 0) {
+        light[c] = largest_half;
+        ++overflowed_;
+      }
+    share(x, [&](std::size_t column, double part) {
+      if (column < across_.size()) across_[column] += part * light;
+    });
+  }
+  const auto is_last = [&](std::size_t coarse) {
+    return static_cast<double>(coarse + 1) * scale_ <= rows_ + 1 + 1e-9;
+  };
+  share(rows_, [&](std::size_t coarse, double part) {
+    for (std::size_t i = 0; i < sums_.size(); ++i) sums_[i] += part * across_[i];
+    if (is_last(coarse)) finish_row();
+  });
+}
+
+void PictureRows::finish_row() {
+  if (picture_.radiance.size() ==
+      static_cast<std::size_t>(picture_.width) * static_cast<std::size_t>(picture_.height))
+    return;
+  for (glm::dvec3& sum : sums_) {
+    picture_.radiance.emplace_back(sum);
+    sum = glm::dvec3(0);
+  }
+}
+
+LinearPicture PictureRows::picture(std::vector<std::string>& notes) && {
+  if (!across_.empty())
+    notes.push_back(fmt::format(
+        "{}: has {}x{} pixels, which are read as {}x{} by their means{}; light needs no more",
+        path_.string(), width_, height_, picture_.width, picture_.height,
+        overflowed_ == 0
+            ? std::string()
+            : fmt::format(" ({} values of +Inf count as {})", overflowed_, largest_half)));
+  picture_.pixels_of_file = scale_;
+  return std::move(picture_);
+}
+
+}  // namespace previz::lighting
