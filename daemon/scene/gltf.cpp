@@ -373,6 +373,10 @@ void GltfFile::add(const set::Object& object, std::uint32_t index) {
   loader_->add(object, index);
 }
 
+void GltfFile::decode_textures() {
+  loader_->materials.decode_textures();
+}
+
 std::vector<std::string> GltfFile::notes() const {
   return loader_->notes.lines();
 }

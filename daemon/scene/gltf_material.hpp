@@ -47,6 +47,9 @@ class GltfMaterials {
   // does not exist.
   UsedMaterial use(int material);
 
+  // As GltfTextures::decode().
+  void decode_textures() { textures_.decode(); }
+
  private:
   class Textures;
 

@@ -5,11 +5,15 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <span>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "daemon/scene/gltf_accessor.hpp"
 #include "daemon/scene/gltf_uri.hpp"
 #include "daemon/scene/picture_bytes.hpp"
+#include "daemon/scene/texture_sizes.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 
@@ -22,8 +26,11 @@ Wrap wrap(int gltf) {
   return Wrap::repeat;
 }
 
+// Returns the texels of a picture of four samples a pixel, averaged in linear light where `to` is
+// smaller.
 template <typename Sample>
-std::vector<glm::vec4> linearise(const Sample* samples, std::size_t texels, Encoding encoding) {
+std::vector<glm::vec4> linearise(const Sample* samples, PictureSize from, PictureSize to,
+                                 Encoding encoding) {
   constexpr std::size_t values = std::size_t{std::numeric_limits<Sample>::max()} + 1;
   std::vector<float> color(values), data(values);
   for (std::size_t i = 0; i < values; ++i) {
@@ -31,10 +38,46 @@ std::vector<glm::vec4> linearise(const Sample* samples, std::size_t texels, Enco
     data[i] = static_cast<float>(value);
     color[i] = static_cast<float>(encoding == Encoding::srgb ? srgb_signal(value) : value);
   }
-  std::vector<glm::vec4> linear(texels);
-  for (std::size_t i = 0; i < texels; ++i, samples += 4)
-    linear[i] = {color[samples[0]], color[samples[1]], color[samples[2]], data[samples[3]]};
-  return linear;
+  const auto read = [&](std::span<glm::vec4> linear) {
+    for (glm::vec4& texel : linear) {
+      texel = {color[samples[0]], color[samples[1]], color[samples[2]], data[samples[3]]};
+      samples += 4;
+    }
+  };
+  const auto width = static_cast<std::size_t>(from.width);
+  if (from == to) {
+    std::vector<glm::vec4> linear(width * static_cast<std::size_t>(from.height));
+    read(linear);
+    return linear;
+  }
+  AreaAverage average(from, to);
+  std::vector<glm::vec4> row(width);
+  for (int y = 0; y < from.height; ++y) {
+    read(row);
+    average.add(row);
+  }
+  return average.take();
+}
+
+// Returns the texels of a picture of the size that its header says.
+std::vector<glm::vec4> decoded(const EncodedImage& image, PictureSize from, PictureSize to,
+                               Encoding encoding) {
+  const int size = static_cast<int>(image.bytes.size());
+  int width = 0, height = 0, channels = 0;
+  std::vector<glm::vec4> texels;
+  const auto take = [&](auto* loaded) {
+    const auto free = [](void* samples) { stbi_image_free(samples); };
+    const std::unique_ptr<std::remove_pointer_t<decltype(loaded)>, decltype(free)> samples(loaded,
+                                                                                           free);
+    if (samples && PictureSize{width, height} == from)
+      texels = linearise(samples.get(), from, to, encoding);
+  };
+  if (stbi_is_16_bit_from_memory(image.bytes.data(), size))
+    take(stbi_load_16_from_memory(image.bytes.data(), size, &width, &height, &channels, 4));
+  else
+    take(stbi_load_from_memory(image.bytes.data(), size, &width, &height, &channels, 4));
+  if (texels.empty()) throw Error(image.where + ": cannot be decoded: " + picture_failure());
+  return texels;
 }
 
 }  // namespace
@@ -89,44 +132,45 @@ std::uint32_t GltfTextures::use(int index, Encoding encoding) {
   const auto [at, is_new] =
       used_.try_emplace({texture.source, encoding, wrap_u, wrap_v, nearest}, no_texture);
   if (!is_new) return at->second;
-  Texture decoded = decode(texture.source, encoding);
-  decoded.wrap_u = wrap_u;
-  decoded.wrap_v = wrap_v;
-  decoded.nearest = nearest;
-  at->second = static_cast<std::uint32_t>(scene_.textures.size());
-  scene_.textures.push_back(std::move(decoded));
+  Pending pending{scene_.textures.size(),
+                  0,
+                  encoded_image(model_, texture.source, file_, names_in_objects),
+                  {},
+                  encoding};
+  if (!pending.image.note.empty()) notes_.add(pending.image.note);
+  pending.size = checked_picture_size(pending.image.bytes, pending.image.where);
+  pending.in_budget = budget_.add_texture(pending.size);
+  Texture header;
+  header.name =
+      pending.image.name.empty() ? "image " + std::to_string(texture.source) : pending.image.name;
+  header.wrap_u = wrap_u;
+  header.wrap_v = wrap_v;
+  header.nearest = nearest;
+  at->second = static_cast<std::uint32_t>(pending.texture);
+  scene_.textures.push_back(std::move(header));
+  pending_.push_back(std::move(pending));
   return at->second;
 }
 
-Texture GltfTextures::decode(int index, Encoding encoding) {
-  const EncodedImage image = encoded_image(model_, index, file_, names_in_objects);
-  const std::vector<unsigned char>& bytes = image.bytes;
-  const std::string& where = image.where;
-  if (!image.note.empty()) notes_.add(image.note);
-  auto [width, height] = checked_picture_size(bytes, where);
-  const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  budget_.add_texture(width, height, where);
-
-  Texture texture;
-  texture.name = image.name.empty() ? "image " + std::to_string(index) : image.name;
-  texture.width = width;
-  texture.height = height;
-  const int size = static_cast<int>(bytes.size());
-  int channels = 0;
-  const auto free = [](void* samples) { stbi_image_free(samples); };
-  if (stbi_is_16_bit_from_memory(bytes.data(), size)) {
-    const std::unique_ptr<stbi_us, decltype(free)> samples(
-        stbi_load_16_from_memory(bytes.data(), size, &width, &height, &channels, 4), free);
-    if (samples && width == texture.width && height == texture.height)
-      texture.texels = linearise(samples.get(), texels, encoding);
-  } else {
-    const std::unique_ptr<stbi_uc, decltype(free)> samples(
-        stbi_load_from_memory(bytes.data(), size, &width, &height, &channels, 4), free);
-    if (samples && width == texture.width && height == texture.height)
-      texture.texels = linearise(samples.get(), texels, encoding);
+void GltfTextures::decode() {
+  const auto in_words = [](PictureSize size) {
+    return std::to_string(size.width) + " x " + std::to_string(size.height);
+  };
+  for (const Pending& pending : pending_) {
+    const auto [width, height] = budget_.fitted_texture(pending.in_budget);
+    Texture& texture = scene_.textures[pending.texture];
+    texture.width = width;
+    texture.height = height;
+    texture.texels = decoded(pending.image, pending.size, {width, height}, pending.encoding);
+    if (pending.size == PictureSize{width, height}) continue;
+    notes_.add("texture \"" + set::one_line(texture.name) + "\" of " + in_words(pending.size) +
+               " pixels is reduced to " + in_words({width, height}) +
+               ": the textures of the scene have more than " +
+               std::to_string(budget_.most_texels()) +
+               " together; to choose their sizes, use gltf-transform resize IN OUT --width " +
+               std::to_string(width) + " --height " + std::to_string(height));
   }
-  if (texture.texels.empty()) throw Error(where + ": cannot be decoded: " + picture_failure());
-  return texture;
+  pending_.clear();
 }
 
 }  // namespace previz::scene

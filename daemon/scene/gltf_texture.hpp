@@ -3,6 +3,7 @@
 
 #include <tiny_gltf.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -12,6 +13,7 @@
 
 #include "daemon/scene/load_log.hpp"
 #include "daemon/scene/named_file.hpp"
+#include "daemon/scene/picture_bytes.hpp"
 #include "daemon/scene/scene.hpp"
 
 namespace previz::scene {
@@ -30,7 +32,7 @@ struct EncodedImage {
 EncodedImage encoded_image(const tinygltf::Model& model, int image, const std::string& file,
                            NameRules rules);
 
-// Holds the textures of one file, each decoded when first used.
+// Holds the textures of one file. What is used is known by its size first, and decoded at last.
 class GltfTextures {
  public:
   GltfTextures(const tinygltf::Model& model, std::string file, Scene& scene, Notes& notes,
@@ -41,16 +43,27 @@ class GltfTextures {
   // JPEG image. Throws previz::Error naming file and image if the image cannot be read.
   std::uint32_t use(int texture, Encoding encoding);
 
+  // Decodes what was used since the last call, smaller where the budget has no place for all of it,
+  // with a note. All files of the scene have added theirs to the budget before. Throws
+  // previz::Error naming file and image.
+  void decode();
+
  private:
   using Key = std::tuple<int, Encoding, Wrap, Wrap, bool>;  // image and how it is read
 
-  Texture decode(int image, Encoding encoding);
+  struct Pending {
+    std::size_t texture, in_budget;
+    EncodedImage image;
+    PictureSize size;
+    Encoding encoding;
+  };
 
   const tinygltf::Model& model_;
   std::string file_;
   Scene& scene_;
   Notes& notes_;
   Budget& budget_;
+  std::vector<Pending> pending_;
   std::map<Key, std::uint32_t> used_;
 };
 

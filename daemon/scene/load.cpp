@@ -39,11 +39,11 @@ void apply(const set::Surface& surface, const std::string& set_file, Scene& scen
 
 }  // namespace
 
-Scene load_scene(const set::Set& set) {
+Scene load_scene(const set::Set& set, std::uint64_t most_texels) {
   Scene scene;
-  Budget budget(set.estimation.filter_textures);
+  Budget budget(set.estimation.filter_textures, most_texels);
   std::map<std::filesystem::path, std::unique_ptr<GltfFile>> files;
-  std::vector<const GltfFile*> in_order;
+  std::vector<GltfFile*> in_order;
   for (std::size_t i = 0; i < set.objects.size(); ++i) {
     const set::Object& object = set.objects[i];
     std::error_code not_there;
@@ -56,6 +56,7 @@ Scene load_scene(const set::Set& set) {
     file->add(object, static_cast<std::uint32_t>(i));
     scene.light_objects.resize(scene.lights.size(), static_cast<std::uint32_t>(i));
   }
+  for (GltfFile* file : in_order) file->decode_textures();
   for (const set::Surface& surface : set.surfaces) apply(surface, set.file.string(), scene);
   hide_tags(scene.instances, set.hides_tags);  // a tag's colour is real, hidden or not
   scene.lights.insert(scene.lights.end(), set.lights.begin(), set.lights.end());

@@ -1,8 +1,6 @@
 #include "daemon/scene/load_log.hpp"
 
-#include <algorithm>
-
-#include "daemon/scene/scene.hpp"
+#include "daemon/scene/texture_sizes.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
 
@@ -52,17 +50,14 @@ void Budget::add_instance(const std::string& where) {
   scene::add(instances_, 1, max_instances, "instances", where);
 }
 
-void Budget::add_texture(int width, int height, const std::string& where) {
-  const auto texels = [](int w, int h) {
-    return static_cast<std::uint64_t>(w) * static_cast<std::uint64_t>(h);
-  };
-  std::uint64_t count = texels(width, height);
-  while (has_levels_ && (width > 1 || height > 1)) {
-    width = std::max(width / 2, 1);
-    height = std::max(height / 2, 1);
-    count += texels(width, height);
-  }
-  scene::add(texels_, count, max_texels, "texels", where);
+std::size_t Budget::add_texture(PictureSize size) {
+  sizes_.push_back(size);
+  return sizes_.size() - 1;
+}
+
+PictureSize Budget::fitted_texture(std::size_t texture) {
+  if (fitted_.size() != sizes_.size()) fitted_ = fitted_sizes(sizes_, has_levels_, most_texels_);
+  return fitted_[texture];
 }
 
 void Budget::add_deformed(std::uint64_t count, const std::string& where) {

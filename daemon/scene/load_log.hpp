@@ -7,6 +7,9 @@
 #include <unordered_map>
 #include <vector>
 
+#include "daemon/scene/picture_bytes.hpp"
+#include "daemon/scene/scene.hpp"
+
 namespace previz::scene {
 
 // Collects notes about one file. A repeated note is counted, not repeated.
@@ -31,11 +34,16 @@ std::string numbered(const std::string& kind, std::size_t index, const std::stri
 class Budget {
  public:
   // With `has_levels` a texture counts with all its levels (daemon/render/mip_levels.hpp).
-  explicit Budget(bool has_levels = false) : has_levels_(has_levels) {}
+  explicit Budget(bool has_levels = false, std::uint64_t most_texels = max_texels)
+      : has_levels_(has_levels), most_texels_(most_texels) {}
   void add_vertices(std::uint64_t count, const std::string& where);
   void add_triangles(std::uint64_t count, const std::string& where);
   void add_instance(const std::string& where);
-  void add_texture(int width, int height, const std::string& where);
+  // Counts a texture and returns its number; how large it may be is known after the last.
+  std::size_t add_texture(PictureSize size);
+  // Returns the size that a texture may have so that all fit, its own where they do.
+  PictureSize fitted_texture(std::size_t texture);
+  std::uint64_t most_texels() const { return most_texels_; }
   // Counts the vertices of one mesh once for each morph target and each set of joints.
   void add_deformed(std::uint64_t count, const std::string& where);
   // Counts the joints of a skin for each node that has it.
@@ -43,7 +51,9 @@ class Budget {
 
  private:
   bool has_levels_;
-  std::uint64_t vertices_ = 0, triangles_ = 0, instances_ = 0, texels_ = 0;
+  std::uint64_t most_texels_;
+  std::vector<PictureSize> sizes_, fitted_;  // of textures
+  std::uint64_t vertices_ = 0, triangles_ = 0, instances_ = 0;
   std::uint64_t deformed_ = 0, joints_ = 0;
 };
 

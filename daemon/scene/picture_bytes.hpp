@@ -10,6 +10,7 @@ namespace previz::scene {
 
 struct PictureSize {
   int width = 0, height = 0;  // at least 1, at most max_texture_side
+  friend bool operator==(const PictureSize&, const PictureSize&) = default;
 };
 
 // Returns the size of a PNG or JPEG whose bytes may be decoded. Throws previz::Error, "WHERE: ...":

@@ -226,7 +226,8 @@ struct Size {
   std::uint64_t instanced_triangles = 0;  // every copy counted
 };
 
-// At most this much is loaded; anything larger is refused before it is allocated.
+// At most this much is loaded; anything larger is refused before it is allocated, and textures are
+// made smaller.
 inline constexpr std::uint64_t max_triangles = 1ull << 26;  // unique ones; also for vertices
 inline constexpr std::uint64_t max_instances = 1ull << 20;
 inline constexpr std::uint64_t max_texels = 1ull << 27;  // of all textures together

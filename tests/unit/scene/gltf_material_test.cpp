@@ -455,13 +455,4 @@ TEST_F(GltfMaterials, LeavesOutTexturesInFormatsOfExtensions) {
                                        HasSubstr("texture 0: has no PNG or JPEG image; ignored")));
 }
 
-// The levels of 2^27 texels have a third more.
-TEST(TextureBudget, CountsTheLevelsOfTexturesThatAreFiltered) {
-  scene::Budget(false).add_texture(16384, 8192, "here");
-  EXPECT_THROW(scene::Budget(true).add_texture(16384, 8192, "here"), Error);
-  scene::Budget budget(true);
-  for (int i = 0; i < 2; ++i) budget.add_texture(8192, 4096, "here");
-  EXPECT_THROW(budget.add_texture(8192, 4096, "here"), Error);
-}
-
 }  // namespace previz::test::gltf_material_test

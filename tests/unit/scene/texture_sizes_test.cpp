@@ -1,0 +1,90 @@
+#include "daemon/scene/texture_sizes.hpp"
+
+#include "tests/support/gltf_test.hpp"
+
+namespace previz::test::texture_sizes_test {
+
+using scene::PictureSize;
+
+TEST(TextureSizes, AreHalvedFromTheLargestUntilAllFit) {
+  using Sizes = std::vector<PictureSize>;
+  const Sizes three(3, {8192, 8192});
+  EXPECT_EQ(scene::fitted_sizes(three, false, 3ull << 26), three);
+  EXPECT_EQ(scene::fitted_sizes(three, false, scene::max_texels),
+            (Sizes{{8192, 8192}, {4096, 4096}, {4096, 4096}}));
+  EXPECT_EQ(scene::fitted_sizes({{16384, 16384}, {64, 64}}, false, scene::max_texels),
+            (Sizes{{8192, 8192}, {64, 64}}));
+  EXPECT_EQ(scene::fitted_sizes({{7, 1}, {1, 9}}, false, 2), (Sizes{{1, 1}, {1, 1}}));
+  EXPECT_EQ(scene::fitted_sizes({{7, 1}, {1, 9}}, false, 0), (Sizes{{1, 1}, {1, 1}}));
+}
+
+// The levels of 2^27 texels have a third more.
+TEST(TextureSizes, CountTheLevelsOfTexturesThatAreFiltered) {
+  const std::vector<PictureSize> whole{{16384, 8192}};
+  EXPECT_EQ(scene::fitted_sizes(whole, false, scene::max_texels), whole);
+  EXPECT_EQ(scene::fitted_sizes(whole, true, scene::max_texels),
+            (std::vector<PictureSize>{{8192, 4096}}));
+}
+
+// Each texel of 5 x 3 reaches over 2/5 x 1/3 of a texel of 2 x 1: the middle column is shared.
+TEST(TextureSizes, AverageAreasOfAnyShape) {
+  scene::AreaAverage average({5, 3}, {2, 1});
+  for (int y = 0; y < 3; ++y) {
+    std::vector<glm::vec4> row;
+    for (int x = 0; x < 5; ++x) row.emplace_back(x, y, x * y, 1);
+    average.add(row);
+  }
+  const auto texels = average.take();
+  ASSERT_EQ(texels.size(), 2u);
+  const float left = (0 + 1 + 0.5f * 2) / 2.5f, right = (0.5f * 2 + 3 + 4) / 2.5f;
+  const glm::vec4 expected[] = {{left, 1, left, 1}, {right, 1, right, 1}};
+  for (int i = 0; i < 2; ++i)
+    for (int c = 0; c < 4; ++c) EXPECT_NEAR(texels[i][c], expected[i][c], 1e-6) << i << c;
+}
+
+class TextureBudget : public GltfTest {
+ protected:
+  // A texture of white and black columns, and its material.
+  void use(int side, const char* key) {
+    std::vector<unsigned char> rgba;
+    for (int i = 0; i < side * side; ++i)
+      for (int c = 0; c < 4; ++c) rgba.push_back(c == 3 || i % 2 == 0 ? 255 : 0);
+    const int texture = gltf.texture(side, side, rgba);
+    gltf.root("a", gltf.triangle_mesh(gltf.add(
+                       "materials",
+                       {{"name", "m"}, {"pbrMetallicRoughness", {{key, {{"index", texture}}}}}})));
+  }
+  scene::Scene load_with(std::uint64_t most_texels) {
+    gltf.save(directory / "test.gltf");
+    set::Set set;
+    set.objects.resize(1);
+    set.objects[0].file = directory / "test.gltf";
+    return scene::load_scene(set, most_texels);
+  }
+};
+
+TEST_F(TextureBudget, WhatIsOverItIsReducedInLinearLightWithANote) {
+  use(8, "baseColorTexture");
+  use(8, "metallicRoughnessTexture");
+  use(4, "baseColorTexture");
+  const scene::Scene whole = load_with(144);
+  const scene::Scene reduced = load_with(143);
+  ASSERT_EQ(whole.textures.size(), 3u);
+  ASSERT_EQ(reduced.textures.size(), 3u);
+  EXPECT_EQ(reduced.textures[0], whole.textures[0]);  // to the bit
+  EXPECT_EQ(reduced.textures[2], whole.textures[2]);
+  EXPECT_EQ(reduced.textures[1].width, 4);
+  EXPECT_EQ(reduced.textures[1].height, 4);
+  EXPECT_THAT(reduced.textures[1].texels, ::testing::Each(glm::vec4(0.5f, 0.5f, 0.5f, 1)));
+  const auto said = HasSubstr(
+      "texture \"image 1\" of 8 x 8 pixels is reduced to 4 x 4: the textures of the scene have "
+      "more "
+      "than 143 together; to choose their sizes, use gltf-transform resize IN OUT --width 4 "
+      "--height 4");
+  EXPECT_THAT(whole.notes, Not(Contains(said)));
+  EXPECT_THAT(reduced.notes, Contains(said));
+  // Half of the area is white: half of the light, whatever the code of that is.
+  EXPECT_THAT(load_with(3).textures.at(0).texels, ElementsAre(glm::vec4(0.5f, 0.5f, 0.5f, 1)));
+}
+
+}  // namespace previz::test::texture_sizes_test
