@@ -27,7 +27,8 @@ glm::dvec3 middle_of(const lighting::Triangles& triangles) {
 bool meets_surface(const lighting::Room& surface, const glm::dvec3& edge, const glm::dvec3& into,
                    const glm::dvec3& other) {
   const glm::dvec3 beside = edge + 0.5 * touch_m * (into - other);
-  return !surface.sees(beside, beside - 1.5 * touch_m * into);
+  const auto distance = surface.distance(beside, -into);
+  return distance && *distance < 1.5 * touch_m;
 }
 
 bool is_touched(const lighting::Room& surface, const FeatureEdge& edge) {

@@ -24,6 +24,35 @@ Triangles box_triangles(const glm::dvec3& size_m, const glm::dmat4& world_from_b
   return triangles;
 }
 
+namespace {
+
+// Returns the unit normal of a triangle that is within on_surface_m of a place; nothing if it is
+// not.
+std::optional<glm::dvec3> normal_of_near(const glm::dvec3* triangle, const glm::dvec3& place) {
+  const glm::dvec3 &a = triangle[0], &b = triangle[1], &c = triangle[2];
+  const glm::dvec3 normal = glm::cross(b - a, c - a);
+  const double area = glm::length(normal);
+  if (!(area > 0) || std::abs(glm::dot(place - a, normal)) >= on_surface_m * area) return {};
+  for (const auto& [from, to] : {std::pair(a, b), {b, c}, {c, a}}) {
+    const glm::dvec3 inwards = glm::cross(normal / area, to - from);
+    if (glm::dot(place - from, inwards) < -on_surface_m * glm::length(inwards)) return {};
+  }
+  return normal / area;
+}
+
+}  // namespace
+
+glm::dvec3 off_surfaces(const Triangles& triangles, glm::dvec3 place, const glm::dvec3& camera) {
+  for (std::size_t t = 0; t + 2 < triangles.size(); t += 3) {
+    auto normal = normal_of_near(&triangles[t], place);
+    if (!normal) continue;
+    const double side = glm::dot(camera - triangles[t], *normal);
+    if (std::abs(side) > on_surface_m ? side < 0 : normal->z < 0) *normal = -*normal;
+    place += (on_surface_m - glm::dot(place - triangles[t], *normal)) * *normal;
+  }
+  return place;
+}
+
 struct Room::Impl {
   RTCDevice device = rtcNewDevice(nullptr);
   RTCScene scene = rtcNewScene(device);
@@ -66,7 +95,7 @@ Room& Room::operator=(Room&&) noexcept = default;
 
 namespace {
 
-RTCRay room_ray(const glm::dvec3& origin, const glm::dvec3& direction, double end) {
+RTCRay room_ray(const glm::dvec3& origin, const glm::dvec3& direction, double begin, double end) {
   RTCRay ray{};
   ray.org_x = static_cast<float>(origin.x);
   ray.org_y = static_cast<float>(origin.y);
@@ -74,6 +103,7 @@ RTCRay room_ray(const glm::dvec3& origin, const glm::dvec3& direction, double en
   ray.dir_x = static_cast<float>(direction.x);
   ray.dir_y = static_cast<float>(direction.y);
   ray.dir_z = static_cast<float>(direction.z);
+  ray.tnear = static_cast<float>(begin);
   ray.tfar = static_cast<float>(end);
   ray.mask = ~0u;
   return ray;
@@ -83,7 +113,7 @@ RTCRay room_ray(const glm::dvec3& origin, const glm::dvec3& direction, double en
 
 std::optional<double> Room::distance(const glm::dvec3& origin, const glm::dvec3& direction) const {
   RTCRayHit hit{};
-  hit.ray = room_ray(origin - seen_from_, direction, std::numeric_limits<float>::infinity());
+  hit.ray = room_ray(origin - seen_from_, direction, 0, std::numeric_limits<float>::infinity());
   hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   embree::find_closest(impl_->scene, hit);
   if (hit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
@@ -91,7 +121,10 @@ std::optional<double> Room::distance(const glm::dvec3& origin, const glm::dvec3&
 }
 
 bool Room::sees(const glm::dvec3& from, const glm::dvec3& surface_point) const {
-  RTCRay ray = room_ray(from - seen_from_, surface_point - from, 0.999);
+  constexpr double end = 0.999;
+  const double begin = on_surface_m / glm::length(surface_point - from);
+  if (!(begin < end)) return true;
+  RTCRay ray = room_ray(from - seen_from_, surface_point - from, begin, end);
   return !embree::is_blocked(impl_->scene, ray);
 }
 

@@ -38,7 +38,7 @@ void check_inside(const set::Set& set, const set::Room& room, const char* what,
                   const glm::dvec3& place) {
   const glm::dvec3 in_room(glm::inverse(room.world_from_room) * glm::dvec4(place, 1));
   for (int axis = 0; axis < 3; ++axis)
-    if (!(std::abs(in_room[axis]) < (*room.size_m)[axis] / 2))
+    if (!(std::abs(in_room[axis]) < (*room.size_m)[axis] / 2 + lighting::on_surface_m))
       throw Error(set.file.string() + ": lighting.room: " + what + " is not inside the box");
 }
 
@@ -48,17 +48,17 @@ std::shared_ptr<const lighting::Room> open_room(const set::Set& set,
                                                 const glm::dvec3& light_camera_position) {
   if (!set.lighting.room) return nullptr;
   const set::Room& room = *set.lighting.room;
-  if (!room.size_m) {
-    const lighting::Triangles triangles = file_triangles(room);
-    if (triangles.empty())
-      throw Error(set.file.string() + ": lighting.room: " + room.file.string() +
-                  " holds no surface");
-    return std::make_shared<const lighting::Room>(triangles, room.seen_from);
+  if (room.size_m) {
+    check_inside(set, room, "the light camera", light_camera_position);
+    check_inside(set, room, "seen_from_m", room.seen_from);
   }
-  check_inside(set, room, "the light camera", light_camera_position);
-  check_inside(set, room, "seen_from_m", room.seen_from);
+  const lighting::Triangles triangles =
+      room.size_m ? lighting::box_triangles(*room.size_m, room.world_from_room)
+                  : file_triangles(room);
+  if (triangles.empty())
+    throw Error(set.file.string() + ": lighting.room: " + room.file.string() + " holds no surface");
   return std::make_shared<const lighting::Room>(
-      lighting::box_triangles(*room.size_m, room.world_from_room), room.seen_from);
+      triangles, lighting::off_surfaces(triangles, room.seen_from, light_camera_position));
 }
 
 }  // namespace previz::pipeline

@@ -62,6 +62,31 @@ TEST(Room, WhatStandsBetweenHides) {
   EXPECT_THROW(Room({}, glm::dvec3(0)), Error);
 }
 
+// A wall that a camera is mounted on, and the floor that it stands on, hide nothing (Embree meets
+// the triangle that a ray starts on).
+TEST(Room, ACameraOnASurfaceSeesTheRest) {
+  const Room room(box_triangles(glm::dvec3(4), glm::dmat4(1)), glm::dvec3(0));
+  for (const glm::dvec3& camera : {glm::dvec3(0.3, 0.2, -2), {-2, 0.1, 0.4}, {-2, 2, -2}}) {
+    EXPECT_TRUE(room.sees(camera, glm::dvec3(2, 0.5, 0.25)));
+    EXPECT_TRUE(room.sees(camera, glm::dvec3(0.1, 0.5, 2)));
+    EXPECT_TRUE(room.sees(camera, camera));
+  }
+  EXPECT_FALSE(room.sees(glm::dvec3(0, 0, -2.01), glm::dvec3(0.1, 0.5, 2)));
+}
+
+TEST(Room, APlaceOnASurfaceIsBroughtBeforeIt) {
+  const Triangles box = box_triangles(glm::dvec3(4), glm::dmat4(1));
+  const glm::dvec3 inside(0.5, -0.5, 1);
+  const auto off = [&](const glm::dvec3& place) { return off_surfaces(box, place, inside); };
+  EXPECT_EQ(off(inside), inside);
+  EXPECT_NEAR(off({0.3, 0.2, -2}).z, -2 + on_surface_m, 1e-12);
+  EXPECT_NEAR(off({0.3, 0.2, -2 - 0.5 * on_surface_m}).z, -2 + on_surface_m, 1e-12);
+  const glm::dvec3 corner = off({2, -2, -2});
+  for (glm::length_t k = 0; k < 3; ++k) EXPECT_NEAR(std::abs(corner[k]), 2 - on_surface_m, 1e-12);
+  // With the camera on the same floor, upwards.
+  EXPECT_NEAR(off_surfaces(box, {0, 0, -2}, {1, 1, -2}).z, -2 + on_surface_m, 1e-12);
+}
+
 struct SeenLamp {
   double flux = 0;
   glm::dvec3 direction{0};
@@ -118,6 +143,26 @@ TEST(Parallax, ALampIsWhereTheSetSeesIt) {
               0.15 * degree);
     EXPECT_NEAR(near.flux / expected.flux, 1, 0.02);
   }
+}
+
+// The default is the middle of tag 0, which lies on the table. A hand's breadth above, at 0.1 m of
+// walls 2.5 m away and more, the room looks the same to a few degrees.
+TEST(Parallax, APlaceOnTheFloorKeepsTheMeasuredLight) {
+  LightCameraCalibration camera = test::fisheye_camera(128, test::looking(0, 90));
+  camera.world_from_camera[3] = glm::dvec4(0.5, 0.2, 1, 1);
+  const FramePtr frame = test::photograph(
+      camera, [](const glm::dvec3& d) { return glm::dvec3(d.z > 0.5 ? 3 : 1); }, 0.25);
+  const Triangles walls = box_triangles(box_size_m, box_pose());  // its floor is at -0.1 m
+  const auto flux_from = [&](double height_m) {
+    const glm::dvec3 place =
+        off_surfaces(walls, {0.5, 0.2, -0.1 + height_m}, camera.world_from_camera[3]);
+    return total_flux(estimate({&frame, 1}, camera, test::unseen_as(set::UnseenRule::constant, 0),
+                               std::make_shared<const Room>(walls, place))
+                          .environment)
+        .g;
+  };
+  EXPECT_NEAR(flux_from(0) / flux_from(1e-2), 1, 0.02);
+  EXPECT_NEAR(flux_from(-1e-4) / flux_from(1e-2), 1, 0.02);
 }
 
 TEST(Parallax, AUniformRoomIsUniform) {
