@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "daemon/model/embree_surface.hpp"
-#include "daemon/model/scan_read.hpp"
+#include "daemon/model/scan_file.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz::model {

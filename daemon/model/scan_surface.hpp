@@ -10,7 +10,7 @@
 #include <limits>
 #include <vector>
 
-#include "daemon/model/scan_read.hpp"
+#include "daemon/model/scan_file.hpp"
 
 namespace previz::model {
 

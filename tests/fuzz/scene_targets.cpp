@@ -8,6 +8,9 @@
 #include "daemon/calibrate/lens/lens_file.hpp"
 #include "daemon/calibrate/lens/lens_file_check.hpp"
 #include "daemon/lighting/lighting.hpp"
+#include "daemon/model/scan_obj.hpp"
+#include "daemon/model/scan_ply.hpp"
+#include "daemon/model/scan_stl.hpp"
 #include "daemon/output/png.hpp"
 #include "daemon/scene/deformation.hpp"
 #include "daemon/scene/load.hpp"
@@ -134,6 +137,38 @@ void environment(Bytes bytes) {
       expect(radiance[c] >= 0 && radiance[c] <= 1e12f, "light can be summed");
 }
 
+// What follows a zero byte in an OBJ is its MTL.
+model::FoundSurface found_in(const std::string& text, const std::filesystem::path& file,
+                             model::ScanTextures& textures) {
+  if (text.starts_with("ply") || text.starts_with("\xef\xbb\xbfply"))
+    return model::read_ply(file, std::string(text), &textures);
+  if (text.starts_with("solid") || (text.size() >= 84 && text.find('\0') < 80))
+    return model::read_stl(file, text);
+  const std::size_t end = std::min(text.find('\0'), text.size());
+  file_of(bytes_of(std::string_view(text).substr(std::min(end + 1, text.size()))), "a.mtl");
+  return model::read_obj(file, text.substr(0, end), &textures);
+}
+
+void scan(Bytes bytes) {
+  const std::filesystem::path file = work_folder() / "scan";
+  output::write_png(work_folder() / "a.png", Plate{1, 1, 8, {1, 2, 3}});
+  model::ScanTextures textures(file);
+  model::ScanFile read;
+  model::take_surface(file, found_in(text_of(bytes), file, textures), model::Colouring::read, read);
+  read.colours.pictures = textures.take();
+  const std::size_t vertices = read.mesh.positions.size();
+  for (const unsigned index : read.mesh.indices) expect(index < vertices, "a corner is a vertex");
+  for (const glm::vec3& p : read.mesh.positions)
+    for (int axis = 0; axis < 3; ++axis) expect(std::isfinite(p[axis]), "coordinates are finite");
+  const model::ScanColours& colours = read.colours;
+  expect(colours.uvs.size() == vertices && colours.luma.size() == vertices &&
+             colours.sources.size() == read.mesh.triangles(),
+         "every vertex and triangle has its colours");
+  for (const int source : colours.sources)
+    expect(source >= model::colourless && source < int(colours.pictures.size()),
+           "a source is a picture");
+}
+
 void png(Bytes bytes) {
   const Plate plate = output::read_png(file_of(bytes, "plate.png"));
   expect(plate.samples.size() == std::size_t{3} * static_cast<std::size_t>(plate.width) *
@@ -177,6 +212,7 @@ constexpr Target own[] = {
     {"gltf", "a glTF file", gltf, mutate_gltf},
     {"texture", "an image of a glTF file", texture},
     {"environment", "an environment: OpenEXR or Radiance .hdr", environment},
+    {"scan", "a scan: PLY, STL, or OBJ and behind a zero its MTL", scan},
     {"png", "a plate as PNG", png},
     {"lens_file", "a lens of another program", lens_file},
 };
