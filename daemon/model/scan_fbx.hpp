@@ -1,4 +1,4 @@
-// Reads scans in FBX, with Assimp.
+// Reads scans in FBX, with Assimp, in a process of its own.
 #pragma once
 
 #include <filesystem>

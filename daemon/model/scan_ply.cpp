@@ -261,6 +261,12 @@ class PlyValues {
     return static_cast<std::uint64_t>(count);
   }
 
+  // Returns how many of so many elements there can be in what is left.
+  std::size_t at_most(std::uint64_t count) const {
+    constexpr std::size_t least_bytes = 4;
+    return std::min<std::uint64_t>(count, bytes_.size() / least_bytes);
+  }
+
   // Begins with an element's values, whose line in a text may have more values than the last
   // element had properties.
   void begin_element() {
@@ -371,6 +377,7 @@ class PlyReader {
                    property.type == Type::float32 && header_.format != Format::text;
     std::array<double, roles> values{};
     double farthest = 0;
+    found_.points.reserve(values_.at_most(element.count));
     for (std::uint64_t i = 0; i < element.count; ++i) {
       values_.begin_element();
       for (const Property& property : element.properties) read(property, values);
@@ -406,6 +413,7 @@ class PlyReader {
   void read_faces(const Element& element) {
     const bool are_strips = element.name == "tristrips";
     const bool are_faces = element.name == "face" || are_strips;
+    if (are_faces && !are_strips) reserve_faces(values_.at_most(element.count));
     std::array<double, roles> values{};
     for (std::uint64_t i = 0; i < element.count; ++i) {
       values_.begin_element();
@@ -420,6 +428,14 @@ class PlyReader {
         found_.end_face(picture_of(values[static_cast<std::size_t>(Role::picture)]));
       }
     }
+  }
+
+  // Most faces are triangles.
+  void reserve_faces(std::size_t count) {
+    found_.corners.reserve(3 * count);
+    if (textures_) found_.corner_uvs.reserve(3 * count);
+    found_.ends.reserve(count);
+    found_.sources.reserve(count);
   }
 
   int picture_of(double number) const {

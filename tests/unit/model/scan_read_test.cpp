@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <bit>
+#include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <functional>
 #include <glm/geometric.hpp>
 
 #include "daemon/model/glb.hpp"
+#include "daemon/model/in_child.hpp"
 #include "daemon/model/scan_mesh.hpp"
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -136,6 +139,26 @@ TEST_F(ScanRead, WhatIsNotAMeshIsRefused) {
   EXPECT_THAT(refusal("scan.e57", "junk"), HasSubstr("allowed: .obj, .ply"));
   EXPECT_THAT(error_of([&] { model::read_scan(folder_ / "none.obj"); }),
               HasSubstr("none.obj: file not found"));
+}
+
+// A library that crashes costs an error; what it returns or throws comes back.
+TEST(InChild, OnlyTheChildEnds) {
+  EXPECT_EQ(model::in_child("a.fbx", [] { return std::string("a\0b", 3); }),
+            std::string("a\0b", 3));
+  EXPECT_EQ(model::in_child("a.fbx", [] { return std::string(1 << 22, 'x'); }).size(), 1u << 22);
+  EXPECT_EQ(error_of([] {
+              model::in_child("a.fbx", []() -> std::string { throw Error("a.fbx: is empty"); });
+            }),
+            "a.fbx: is empty");
+  EXPECT_THAT(error_of([] {
+                model::in_child("a.fbx", []() -> std::string {
+                  std::raise(SIGSEGV);
+                  return "";
+                });
+              }),
+              HasSubstr("a.fbx: the library that reads this format was stopped by it"));
+  EXPECT_THAT(error_of([] { model::in_child("a.fbx", []() -> std::string { std::_Exit(3); }); }),
+              HasSubstr("a.fbx: the process that reads it ended without a result"));
 }
 
 // In UTM coordinates, zone 33; metres.
@@ -337,6 +360,68 @@ TEST_F(ScanLooks, OfObjAreThoseOfItsMaterial) {
   std::ofstream(folder_ / "a.obj") << "mtllib a.mtl\nusemtl red\n" << obj;
   EXPECT_THAT(error_of([&] { looks_of(folder_ / "a.obj"); }),
               HasSubstr("a.obj: its texture \"red.png\" is moved or scaled on its faces"));
+}
+
+// The texture's picture lies beside the file, or is in it.
+TEST_F(ScanLooks, OfFbxAreThoseOfItsMaterial) {
+  std::string text = fbx_text;
+  const auto insert = [&](const std::string& before, const std::string& more) {
+    text.insert(text.find(before), more);
+  };
+  insert("    GeometryVersion: 124", R"(    LayerElementUV: 0 {
+      Version: 101
+      Name: "UV"
+      MappingInformationType: "ByPolygonVertex"
+      ReferenceInformationType: "IndexToDirect"
+      UV: *8 {
+        a: 0,0,1,0,0.25,0.75,0,1
+      }
+      UVIndex: *4 {
+        a: 0,1,2,3
+      }
+    }
+    LayerElementMaterial: 0 {
+      Version: 101
+      Name: ""
+      MappingInformationType: "AllSame"
+      ReferenceInformationType: "IndexToDirect"
+      Materials: *1 {
+        a: 0
+      }
+    }
+    Layer: 0 {
+      Version: 100
+      LayerElement:  {
+        Type: "LayerElementUV"
+        TypedIndex: 0
+      }
+      LayerElement:  {
+        Type: "LayerElementMaterial"
+        TypedIndex: 0
+      }
+    }
+)");
+  insert("  Model: 2000", R"(  Material: 3000, "Material::m", "" {
+    Version: 102
+    ShadingModel: "phong"
+    MultiLayer: 0
+  }
+  Texture: 4000, "Texture::t", "" {
+    Type: "TextureVideoClip"
+    Version: 202
+    TextureName: "Texture::t"
+    FileName: "C:/scans/red.png"
+    RelativeFilename: "C:/scans/red.png"
+  }
+)");
+  insert("  C: \"OO\",1000,2000",
+         "  C: \"OO\",3000,2000\n  C: \"OP\",4000,3000, \"DiffuseColor\"\n");
+  const Looks found = looks("a.fbx", text);
+  EXPECT_EQ(found.picture, "C:/scans/red.png");
+  EXPECT_EQ(std::vector(found.uvs.begin(), found.uvs.begin() + 3), uvs_);
+  std::filesystem::remove(folder_ / "red.png");
+  EXPECT_THAT(error_of([&] { looks_of(folder_ / "a.fbx"); }),
+              HasSubstr("its texture \"C:/scans/red.png\" is missing"));
 }
 
 TEST_F(ScanLooks, FilesOfOtherNamesAreSaid) {

@@ -1,0 +1,87 @@
+#include "daemon/model/in_child.hpp"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <exception>
+#include <string_view>
+
+#include "drivers/error.hpp"
+
+namespace previz::model {
+namespace {
+
+constexpr rlim_t most_cpu_s = 600;
+
+// Reads all that is written to a pipe.
+std::string all_of(int pipe) {
+  std::string bytes;
+  std::array<char, 1 << 16> part{};
+  for (;;) {
+    const ssize_t count = ::read(pipe, part.data(), part.size());
+    if (count > 0) bytes.append(part.data(), static_cast<std::size_t>(count));
+    if (count == 0 || (count < 0 && errno != EINTR)) return bytes;
+  }
+}
+
+// The first letter says what follows: a result, or the words of an error.
+[[noreturn]] void work_and_end(int pipe, const std::function<std::string()>& work) {
+  const rlimit cpu{most_cpu_s, most_cpu_s};
+  ::setrlimit(RLIMIT_CPU, &cpu);
+  const rlimit no_core{0, 0};
+  ::setrlimit(RLIMIT_CORE, &no_core);
+  for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTERM, SIGINT})
+    ::signal(signal, SIG_DFL);
+  std::string bytes;
+  try {
+    bytes = 'r' + work();
+  } catch (const std::exception& error) {
+    bytes = std::string("e") + error.what();
+  }
+  for (std::string_view rest = bytes; !rest.empty();) {
+    const ssize_t count = ::write(pipe, rest.data(), rest.size());
+    if (count < 0 && errno != EINTR) ::_exit(1);
+    if (count > 0) rest.remove_prefix(static_cast<std::size_t>(count));
+  }
+  ::_exit(0);
+}
+
+}  // namespace
+
+std::string in_child(const std::string& subject, const std::function<std::string()>& work) {
+  std::array<int, 2> pipe{};
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0)
+    throw Error(subject + ": no process can be made to read it: " + std::strerror(errno));
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::close(pipe[0]);
+    work_and_end(pipe[1], work);
+  }
+  ::close(pipe[1]);
+  std::string bytes = child > 0 ? all_of(pipe[0]) : std::string();
+  ::close(pipe[0]);
+  if (child < 0)
+    throw Error(subject + ": no process can be made to read it: " + std::strerror(errno));
+  int status = 0;
+  while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
+  }
+  if (WIFSIGNALED(status))
+    throw Error(fmt::format(
+        "{}: the library that reads this format {} by it ({}); export it as binary PLY or glTF",
+        subject, WTERMSIG(status) == SIGXCPU ? "was kept busy for ten minutes" : "was stopped",
+        ::strsignal(WTERMSIG(status))));
+  if (status != 0 || bytes.empty())
+    throw Error(subject + ": the process that reads it ended without a result; try again");
+  const std::string rest = bytes.substr(1);
+  if (bytes[0] == 'e') throw Error(rest);
+  return rest;
+}
+
+}  // namespace previz::model
