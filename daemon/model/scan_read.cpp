@@ -11,6 +11,7 @@
 #include "daemon/model/scan_stl.hpp"
 #include "daemon/model/scan_surface.hpp"
 #include "daemon/model/scan_text.hpp"
+#include "daemon/scene/other_format.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::model {
@@ -25,12 +26,29 @@ FoundSurface found_in(const std::filesystem::path& path, ScanTextures* textures,
   return read_gltf_scan(path, textures, file);
 }
 
+// Phones give scans as USDZ, laser scanners as clouds of points.
+[[noreturn]] void refuse_ending(const std::filesystem::path& path, const std::string& ending) {
+  constexpr std::array clouds{".e57", ".las", ".laz", ".pcd", ".ptx", ".pts", ".xyz"};
+  const std::string allowed = "; allowed: .obj, .ply, .stl, .fbx, .gltf, .glb";
+  if (std::ranges::find(clouds, ending) != clouds.end())
+    throw Error(path.string() +
+                ": is a cloud of points; make a mesh of it, in CloudCompare for "
+                "example" +
+                allowed);
+  const std::string format = scene::format_by_ending(path.string());
+  throw Error(path.string() + ": is " +
+              (format.empty() ? "not a scan"
+                              : format + "; export the scan in another format, or convert it, in "
+                                         "Blender for example") +
+              allowed);
+}
+
 }  // namespace
 
 ScanFile read_scan(const std::filesystem::path& path, Colouring colouring) {
   constexpr std::array formats{".obj", ".ply", ".stl", ".fbx", ".gltf", ".glb"};
-  if (std::ranges::find(formats, in_lower_case(path.extension().string())) == formats.end())
-    throw Error(path.string() + ": is not a scan; allowed: .obj, .ply, .stl, .fbx, .gltf, .glb");
+  const std::string ending = in_lower_case(path.extension().string());
+  if (std::ranges::find(formats, ending) == formats.end()) refuse_ending(path, ending);
   if (!std::filesystem::is_regular_file(path)) throw Error(path.string() + ": file not found");
   ScanTextures textures(path);
   ScanFile file;

@@ -82,21 +82,25 @@ void check(const Encoded& encoded, const std::string& where) {
                 std::to_string(encoded.count) + " elements; the file is damaged");
 }
 
+// KHR_meshopt_compression has version 1 for vertices, which meshoptimizer decodes from 0.23 on.
+constexpr unsigned int newest_vertex_codec = MESHOPTIMIZER_VERSION >= 230 ? 1 : 0;
+
 // The first byte has the codec in its upper half and the codec's version in its lower half.
 void check_version(const Encoded& encoded, const std::string& where) {
   const unsigned int codec = encoded.mode == "ATTRIBUTES"  ? 0xa0
                              : encoded.mode == "TRIANGLES" ? 0xe0
                                                            : 0xd0;
-  const unsigned int newest = encoded.mode == "ATTRIBUTES" ? 0 : 1;
+  const unsigned int newest = encoded.mode == "ATTRIBUTES" ? newest_vertex_codec : 1;
   const unsigned int head = encoded.bytes.empty() ? 0 : encoded.bytes[0];
   if ((head & 0xf0) != codec)
     throw Error(where + ": does not begin as compressed " + encoded.mode +
                 " do; export the file again, or without compression");
   if ((head & 0x0f) > newest)
-    throw Error(where + ": is compressed with version " + std::to_string(head & 0x0f) +
-                " of the codec; up to " + std::to_string(newest) +
-                " is supported; export the file with EXT_meshopt_compression, or without "
-                "compression");
+    throw Error(
+        where + ": is compressed with version " + std::to_string(head & 0x0f) +
+        " of the codec; up to " + std::to_string(newest) +
+        " is supported; export the file with EXT_meshopt_compression (gltfpack -c), or without "
+        "compression");
 }
 
 std::vector<unsigned char> decoded(const Encoded& encoded, const std::string& where) {

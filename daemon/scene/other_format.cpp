@@ -101,6 +101,15 @@ bool has_bytes(std::string_view head, std::string_view bytes, std::size_t offset
   return head.size() >= offset && head.substr(offset).starts_with(bytes);
 }
 
+const Format* find_by_ending(const std::string& file) {
+  const std::string ending = lower_case(std::filesystem::path(file).extension().string());
+  if (ending.empty()) return nullptr;
+  const auto* const found = std::ranges::find_if(formats, [&](const Format& format) {
+    return format.endings.find(ending + ".") != std::string_view::npos;
+  });
+  return found == formats.end() ? nullptr : found;
+}
+
 [[noreturn]] void refuse(const Format& format, const std::string& file) {
   std::string message = file + ": is ";
   message.append(format.name).append("; an object is glTF 2.0 (.glb or .gltf): export it as that");
@@ -128,11 +137,13 @@ void refuse_other_format(std::span<const unsigned char> bytes, const std::string
   refuse_mistake(mistakes, lower_case(head), file);
   for (const Format& format : formats)
     if (has_bytes(head, format.bytes, format.offset)) refuse(format, file);
-  const std::string ending = lower_case(std::filesystem::path(file).extension().string());
-  if (!ending.empty())
-    for (const Format& format : formats)
-      if (format.endings.find(ending + ".") != std::string_view::npos) refuse(format, file);
+  if (const Format* format = find_by_ending(file)) refuse(*format, file);
   refuse_mistake(packed, head, file);
+}
+
+std::string format_by_ending(const std::string& file) {
+  const Format* const format = find_by_ending(file);
+  return format ? std::string(format->name) : std::string();
 }
 
 }  // namespace previz::scene

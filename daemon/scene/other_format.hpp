@@ -10,4 +10,8 @@ namespace previz::scene {
 // glTF or of none, and the file's ending is that of a known one. Returns if neither says anything.
 void refuse_other_format(std::span<const unsigned char> bytes, const std::string& file);
 
+// Returns the format of a file that is no glTF by its name's ending, "a USDZ file" for example; ""
+// if the ending is of no known one.
+std::string format_by_ending(const std::string& file);
+
 }  // namespace previz::scene

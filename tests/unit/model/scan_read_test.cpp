@@ -136,7 +136,11 @@ TEST_F(ScanRead, WhatIsNotAMeshIsRefused) {
               "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 7\n"),
       HasSubstr("lacking.ply: has a face with a vertex that the file lacks"));
   EXPECT_THAT(refusal("junk.ply", "junk"), HasSubstr("junk.ply: cannot be read"));
-  EXPECT_THAT(refusal("scan.e57", "junk"), HasSubstr("allowed: .obj, .ply"));
+  EXPECT_THAT(refusal("scan.e57", "junk"), HasSubstr("is a cloud of points; make a mesh of it"));
+  EXPECT_THAT(refusal("scan.USDZ", "junk"),
+              HasSubstr("is a USDZ file; export the scan in another format, or convert it, in "
+                        "Blender for example; allowed: .obj, .ply"));
+  EXPECT_THAT(refusal("scan.txt", "junk"), HasSubstr("is not a scan; allowed: .obj, .ply"));
   EXPECT_THAT(error_of([&] { model::read_scan(folder_ / "none.obj"); }),
               HasSubstr("none.obj: file not found"));
 }
