@@ -36,6 +36,7 @@ constexpr Extension extensions[] = {
     {"KHR_materials_variants", Support::read, ""},
     {"KHR_mesh_quantization", Support::read, ""},
     {"KHR_meshopt_compression", Support::read, ""},
+    {"KHR_node_visibility", Support::read, ""},
     {"KHR_texture_transform", Support::read, ""},
     {"KHR_animation_pointer", Support::ignored,
      "what it animates besides nodes and weights stands still"},
@@ -45,9 +46,6 @@ constexpr Extension extensions[] = {
     {"EXT_texture_avif", Support::refused, plain_textures},
     {"EXT_texture_webp", Support::refused, plain_textures},
     {"KHR_gaussian_splatting", Support::refused, plain_meshes},
-    {"KHR_node_visibility", Support::refused,
-     "delete the hidden nodes before the export, or name those to be shown with the key \"nodes\""
-     " of the object and export without the extension"},
     {"KHR_techniques_webgl", Support::refused, "export the file with glTF's own materials"},
     {"KHR_texture_basisu", Support::refused, plain_textures},
     {"MSFT_texture_dds", Support::refused, plain_textures}};

@@ -547,6 +547,21 @@ TEST_F(GltfScanRead, CopiesAndMirroredNodesAreThere) {
   }
 }
 
+// A hidden node and its children are no part of the model (KHR_node_visibility).
+TEST_F(GltfScanRead, HiddenNodesAreLeftOut) {
+  GltfWriter gltf;
+  const int mesh = gltf.triangle_mesh();
+  const int child = gltf.add("nodes", {{"mesh", mesh}});
+  gltf.root("scan", mesh);
+  gltf.root(
+      "helper", mesh,
+      {{"children", {child}}, {"extensions", {{"KHR_node_visibility", {{"visible", false}}}}}});
+  gltf.json["extensionsUsed"] = {"KHR_node_visibility"};
+  EXPECT_NEAR(area_of(read(gltf)), 0.5, 1e-6);
+  gltf.json["extensionsRequired"] = {"KHR_node_visibility"};
+  EXPECT_NEAR(area_of(read(gltf)), 0.5, 1e-6);
+}
+
 TEST_F(GltfScanRead, AnUnknownExtensionThatIsRequiredIsRefused) {
   GltfWriter gltf;
   gltf.root("scan", gltf.triangle_mesh());
