@@ -74,6 +74,8 @@ struct GltfFile::Loader {
                      const std::string& name, const std::string& suffix, const std::string& what);
   void add_looks(const tinygltf::Primitive& primitive, const std::vector<int>& worn,
                  const MeshSource& source, const std::string& what);
+  void take_tangents(const tinygltf::Primitive& primitive, const std::vector<int>& worn,
+                     MeshSource& source);
   void note_missing_uvs(const UsedMaterial& material, const MeshSource& source,
                         const std::string& what);
   void keep_looks(std::uint32_t object_index);
@@ -203,6 +205,7 @@ bool GltfFile::Loader::add_primitive(const tinygltf::Primitive& primitive, const
   const std::vector<int> worn = variants.materials(primitive, what);
   const UsedMaterial material = materials.use(worn.size() > 1 ? worn[look] : worn[0]);
   MeshSource source = mesh_source(primitive, material.mappings);
+  take_tangents(primitive, worn, source);
   add_deformation(primitive, use.deforms, file + ": " + what, source);
   note_missing_uvs(material, source, what);
   const auto index = static_cast<std::uint32_t>(scene.instances.size());
@@ -239,7 +242,8 @@ void GltfFile::Loader::add_looks(const tinygltf::Primitive& primitive, const std
                   ": deforms, and one of its variants maps textures differently; there it "
                   "keeps its own material");
       } else {
-        const MeshSource mapped = mesh_source(primitive, used.mappings);
+        MeshSource mapped = mesh_source(primitive, used.mappings);
+        take_tangents(primitive, {material}, mapped);
         const std::string name = scene.meshes[own.mesh].name;
         look_then.mesh = use_mesh(mapped, name, what).value_or(own.mesh);
         note_missing_uvs(used, mapped, what);
@@ -251,6 +255,18 @@ void GltfFile::Loader::add_looks(const tinygltf::Primitive& primitive, const std
   }
 }
 
+// The tangents matter to bumps and brushed metal only. Without normals they are to be ignored (glTF
+// 2.0, 3.7.2.1).
+void GltfFile::Loader::take_tangents(const tinygltf::Primitive& primitive,
+                                     const std::vector<int>& worn, MeshSource& source) {
+  const auto given = primitive.attributes.find("TANGENT");
+  if (given == primitive.attributes.end() || source.normals < 0) return;
+  if (std::ranges::any_of(worn, [&](int material) {
+        return has_directions(scene.materials[materials.use(material).index]);
+      }))
+    source.tangents = given->second;
+}
+
 void GltfFile::Loader::note_missing_uvs(const UsedMaterial& material, const MeshSource& source,
                                         const std::string& what) {
   const auto missing = [&](std::size_t mapping) {
@@ -260,7 +276,7 @@ void GltfFile::Loader::note_missing_uvs(const UsedMaterial& material, const Mesh
     if (source.uvs[i] < 0) notes.add(missing(i) + " for its textures; they are read at (0, 0)");
   const Material& m = scene.materials[material.index];
   const std::size_t around = mapping_of(m, &Material::anisotropy_texture);
-  if (is_anisotropic(m) && source.uvs[around] < 0)
+  if (is_anisotropic(m) && source.uvs[around] < 0 && source.tangents < 0)
     notes.add(missing(around) + " for its anisotropy direction; an arbitrary one is used");
 }
 
