@@ -7,15 +7,18 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 
 #include "daemon/scene/gltf_animation.hpp"
 #include "daemon/scene/gltf_deformation.hpp"
+#include "daemon/scene/gltf_extensions.hpp"
 #include "daemon/scene/gltf_material.hpp"
 #include "daemon/scene/gltf_mesh.hpp"
 #include "daemon/scene/gltf_nodes.hpp"
 #include "daemon/scene/gltf_read.hpp"
 #include "daemon/scene/gltf_value.hpp"
 #include "daemon/scene/gltf_variants.hpp"
+#include "daemon/scene/seen_backs.hpp"
 #include "daemon/scene/transform.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
@@ -79,6 +82,7 @@ struct GltfFile::Loader {
   void note_missing_uvs(const UsedMaterial& material, const MeshSource& source,
                         const std::string& what);
   void keep_looks(std::uint32_t object_index);
+  void note_backs();
   void add_light(const PlacedNode& placed, const glm::dmat4& world_from_node,
                  std::uint32_t presence);
   std::optional<std::uint32_t> use_mesh(const MeshSource& source, const std::string& name,
@@ -291,6 +295,38 @@ void GltfFile::Loader::keep_looks(std::uint32_t object_index) {
   scene.variants.push_back(std::move(kept));
 }
 
+// seen_backs.hpp says why it is no more than a note.
+void GltfFile::Loader::note_backs() {
+  const std::map<std::uint32_t, std::size_t> one_sided = materials.one_sided();
+  std::set<std::vector<std::uint32_t>> judged;  // meshes of a node
+  std::set<std::size_t> seen;                   // materials of the file
+  for (auto first = scene.instances.begin(), last = first; first != scene.instances.end();
+       first = last) {
+    last = std::find_if(first, scene.instances.end(), [&](const Instance& instance) {
+      return instance.object != first->object || instance.placed != first->placed;
+    });
+    if (first->presence != world_mixed) continue;
+    std::vector<std::uint32_t> meshes_of_node;
+    std::vector<const Mesh*> surfaces;
+    bool is_new = false;
+    for (auto instance = first; instance != last; ++instance) {
+      meshes_of_node.push_back(instance->mesh);
+      surfaces.push_back(&scene.meshes[instance->mesh]);
+      const auto at = one_sided.find(instance->material);
+      is_new |= at != one_sided.end() && !seen.contains(at->second);
+    }
+    if (!is_new || !judged.insert(meshes_of_node).second) continue;
+    const std::vector<bool> behind = are_seen_from_behind(surfaces);
+    for (std::size_t i = 0; i < behind.size(); ++i) {
+      const auto at = one_sided.find(first[static_cast<std::ptrdiff_t>(i)].material);
+      if (behind[i] && at != one_sided.end()) seen.insert(at->second);
+    }
+  }
+  if (!seen.empty())
+    notes.add("its one-sided faces are shown from behind, too, where glTF hides them" +
+              in_brackets(model, {seen.begin(), seen.end()}));
+}
+
 // Every instance of a mesh that deforms has a mesh of its own.
 std::optional<std::uint32_t> GltfFile::Loader::add_deformed(const MeshSource& source,
                                                             const std::string& name,
@@ -389,8 +425,9 @@ void GltfFile::add(const set::Object& object, std::uint32_t index) {
   loader_->add(object, index);
 }
 
-void GltfFile::decode_textures() {
+void GltfFile::finish() {
   loader_->materials.decode_textures();
+  loader_->note_backs();
 }
 
 std::vector<std::string> GltfFile::notes() const {
