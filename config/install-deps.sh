@@ -9,7 +9,7 @@ packages=(
   # Vulkan: loader, Mesa's drivers (with a CPU one) and the validation layer the tests switch on
   libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
   # pictures and video
-  libopencv-dev libopenexr-dev libimath-dev libpng-dev libtiff-dev libexiv2-dev liblcms2-dev
+  libopencv-dev libopenexr-dev libimath-dev libpng-dev libtiff-dev libwebp-dev libexiv2-dev liblcms2-dev
   libcairo2-dev
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libdeflate-dev libjpeg62-turbo-dev
   # the display and its text

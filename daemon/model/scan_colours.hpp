@@ -36,7 +36,7 @@ class ScanTextures {
   explicit ScanTextures(std::filesystem::path file) : file_(std::move(file)) {}
 
   // Both return the index of a picture. They throw previz::Error naming the scan and its texture:
-  // it is missing, is no PNG or JPEG, is damaged, or is too large together with the others.
+  // it is missing, is no PNG, JPEG or WebP, is damaged, or is too large together with the others.
   int named(const std::string& written);  // a file, by the path that the scan has
   int encoded(std::span<const unsigned char> bytes, const std::string& name);
 

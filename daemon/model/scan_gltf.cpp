@@ -110,10 +110,11 @@ class GltfScanReader {
   }
 
   int picture(int texture) {
-    if (static_cast<std::size_t>(texture) >= model_.textures.size())
-      throw Error(path_ + ": no texture " + std::to_string(texture));
-    const int image = model_.textures[static_cast<std::size_t>(texture)].source;
-    if (image < 0) return colourless;
+    const auto [image, missing] = scene::image_of(model_, texture, path_);
+    if (image < 0) {
+      notes_.add(missing + "; the scan has no colours there");
+      return colourless;
+    }
     const scene::EncodedImage encoded = scene::encoded_image(model_, image, path_, names_in_gltf);
     if (!encoded.note.empty()) notes_.add(encoded.note);
     return textures_->encoded(encoded.bytes, encoded.name);

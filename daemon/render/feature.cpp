@@ -36,6 +36,11 @@ bool can_be_bare(const Material& m) {
   return !lacquered && (!scene::has_sheen(m) || is_textured(m.sheen_color_texture));
 }
 
+bool has_tangents(const Scene& scene) {
+  return std::ranges::any_of(scene.meshes,
+                             [](const scene::Mesh& mesh) { return !mesh.tangents.empty(); });
+}
+
 bool has_vertex_colors(const Scene& scene) {
   return std::ranges::any_of(scene.meshes,
                              [](const scene::Mesh& mesh) { return !mesh.colors.empty(); });
@@ -232,6 +237,14 @@ constexpr Feature own_features[] = {
          },
      .used = "a surface has its bumps from an image",
      .left_out = "no surface has its bumps from an image"},
+    {.name = "tangents",
+     .bit = gpu::FEATURE_TANGENTS,
+     .can_be_carried = true,
+     .in_material = [](const Material& m, const Scene&,
+                       double) { return scene::has_directions(m); },
+     .in_frame = [](bool directed, const Demand& d) { return directed && has_tangents(d.scene); },
+     .used = "a mesh states which way its bumps or its brushed metal lie",
+     .left_out = "bumps and brushed metal lie as the images of their surfaces do"},
     {.name = "alpha",
      .bit = gpu::FEATURE_ALPHA,
      .can_be_carried = true,

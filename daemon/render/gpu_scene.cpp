@@ -39,10 +39,10 @@ double environment_share(double environment_power, double light_power) {
 }
 
 // Returns how many values a vertex of the mesh has in EXTRAS (GpuInstance): its colour, and its
-// texture coordinates after the first.
+// texture coordinates after the first, and last its tangent.
 std::uint32_t extras_per_vertex(const scene::Mesh& mesh) {
-  if (mesh.colors.empty() && mesh.more_uvs.empty()) return 0;
-  return static_cast<std::uint32_t>(1 + mesh.more_uvs.size());
+  if (mesh.colors.empty() && mesh.more_uvs.empty() && mesh.tangents.empty()) return 0;
+  return static_cast<std::uint32_t>(1 + mesh.more_uvs.size() + (mesh.tangents.empty() ? 0 : 1));
 }
 
 void append_extras(const scene::Mesh& mesh, std::vector<glm::uvec2>& extras) {
@@ -53,6 +53,10 @@ void append_extras(const scene::Mesh& mesh, std::vector<glm::uvec2>& extras) {
     for (const std::vector<glm::vec2>& uvs : mesh.more_uvs)
       extras.emplace_back(uvs.empty() ? glm::uvec2(0)
                                       : std::bit_cast<glm::uvec2>(glm::vec2(uvs[i])));
+    if (mesh.tangents.empty()) continue;
+    const glm::vec4& tangent = mesh.tangents[i];
+    extras.emplace_back(glm::packSnorm2x16(glm::vec2(tangent)),
+                        glm::packSnorm2x16(glm::vec2(tangent.z, tangent.w)));
   }
 }
 
@@ -367,6 +371,8 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
     record.first_light = lights_.first_light(i);
     record.presence = instance.presence;
     record.extras_per_vertex = extras_per_vertex(scene_.meshes[instance.mesh]);
+    if (!scene_.meshes[instance.mesh].tangents.empty())
+      record.tangent_extra = record.extras_per_vertex - 1;
     record.first_extra = place.first_extra - place.first_vertex * record.extras_per_vertex;
     instances.push_back(record);
     top.push_back({&place.bvh, place.first_record, instance.presence, world});

@@ -7,15 +7,18 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <set>
 
 #include "daemon/scene/gltf_animation.hpp"
 #include "daemon/scene/gltf_deformation.hpp"
+#include "daemon/scene/gltf_extensions.hpp"
 #include "daemon/scene/gltf_material.hpp"
 #include "daemon/scene/gltf_mesh.hpp"
 #include "daemon/scene/gltf_nodes.hpp"
 #include "daemon/scene/gltf_read.hpp"
 #include "daemon/scene/gltf_value.hpp"
 #include "daemon/scene/gltf_variants.hpp"
+#include "daemon/scene/seen_backs.hpp"
 #include "daemon/scene/transform.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
@@ -74,9 +77,12 @@ struct GltfFile::Loader {
                      const std::string& name, const std::string& suffix, const std::string& what);
   void add_looks(const tinygltf::Primitive& primitive, const std::vector<int>& worn,
                  const MeshSource& source, const std::string& what);
+  void take_tangents(const tinygltf::Primitive& primitive, const std::vector<int>& worn,
+                     MeshSource& source);
   void note_missing_uvs(const UsedMaterial& material, const MeshSource& source,
                         const std::string& what);
   void keep_looks(std::uint32_t object_index);
+  void note_backs();
   void add_light(const PlacedNode& placed, const glm::dmat4& world_from_node,
                  std::uint32_t presence);
   std::optional<std::uint32_t> use_mesh(const MeshSource& source, const std::string& name,
@@ -203,6 +209,7 @@ bool GltfFile::Loader::add_primitive(const tinygltf::Primitive& primitive, const
   const std::vector<int> worn = variants.materials(primitive, what);
   const UsedMaterial material = materials.use(worn.size() > 1 ? worn[look] : worn[0]);
   MeshSource source = mesh_source(primitive, material.mappings);
+  take_tangents(primitive, worn, source);
   add_deformation(primitive, use.deforms, file + ": " + what, source);
   note_missing_uvs(material, source, what);
   const auto index = static_cast<std::uint32_t>(scene.instances.size());
@@ -239,7 +246,8 @@ void GltfFile::Loader::add_looks(const tinygltf::Primitive& primitive, const std
                   ": deforms, and one of its variants maps textures differently; there it "
                   "keeps its own material");
       } else {
-        const MeshSource mapped = mesh_source(primitive, used.mappings);
+        MeshSource mapped = mesh_source(primitive, used.mappings);
+        take_tangents(primitive, {material}, mapped);
         const std::string name = scene.meshes[own.mesh].name;
         look_then.mesh = use_mesh(mapped, name, what).value_or(own.mesh);
         note_missing_uvs(used, mapped, what);
@@ -251,6 +259,18 @@ void GltfFile::Loader::add_looks(const tinygltf::Primitive& primitive, const std
   }
 }
 
+// The tangents matter to bumps and brushed metal only. Without normals they are to be ignored (glTF
+// 2.0, 3.7.2.1).
+void GltfFile::Loader::take_tangents(const tinygltf::Primitive& primitive,
+                                     const std::vector<int>& worn, MeshSource& source) {
+  const auto given = primitive.attributes.find("TANGENT");
+  if (given == primitive.attributes.end() || source.normals < 0) return;
+  if (std::ranges::any_of(worn, [&](int material) {
+        return has_directions(scene.materials[materials.use(material).index]);
+      }))
+    source.tangents = given->second;
+}
+
 void GltfFile::Loader::note_missing_uvs(const UsedMaterial& material, const MeshSource& source,
                                         const std::string& what) {
   const auto missing = [&](std::size_t mapping) {
@@ -260,7 +280,7 @@ void GltfFile::Loader::note_missing_uvs(const UsedMaterial& material, const Mesh
     if (source.uvs[i] < 0) notes.add(missing(i) + " for its textures; they are read at (0, 0)");
   const Material& m = scene.materials[material.index];
   const std::size_t around = mapping_of(m, &Material::anisotropy_texture);
-  if (is_anisotropic(m) && source.uvs[around] < 0)
+  if (is_anisotropic(m) && source.uvs[around] < 0 && source.tangents < 0)
     notes.add(missing(around) + " for its anisotropy direction; an arbitrary one is used");
 }
 
@@ -273,6 +293,38 @@ void GltfFile::Loader::keep_looks(std::uint32_t object_index) {
         }))
       kept.own = kept.names[i];
   scene.variants.push_back(std::move(kept));
+}
+
+// seen_backs.hpp says why it is no more than a note.
+void GltfFile::Loader::note_backs() {
+  const std::map<std::uint32_t, std::size_t> one_sided = materials.one_sided();
+  std::set<std::vector<std::uint32_t>> judged;  // meshes of a node
+  std::set<std::size_t> seen;                   // materials of the file
+  for (auto first = scene.instances.begin(), last = first; first != scene.instances.end();
+       first = last) {
+    last = std::find_if(first, scene.instances.end(), [&](const Instance& instance) {
+      return instance.object != first->object || instance.placed != first->placed;
+    });
+    if (first->presence != world_mixed) continue;
+    std::vector<std::uint32_t> meshes_of_node;
+    std::vector<const Mesh*> surfaces;
+    bool is_new = false;
+    for (auto instance = first; instance != last; ++instance) {
+      meshes_of_node.push_back(instance->mesh);
+      surfaces.push_back(&scene.meshes[instance->mesh]);
+      const auto at = one_sided.find(instance->material);
+      is_new |= at != one_sided.end() && !seen.contains(at->second);
+    }
+    if (!is_new || !judged.insert(meshes_of_node).second) continue;
+    const std::vector<bool> behind = are_seen_from_behind(surfaces);
+    for (std::size_t i = 0; i < behind.size(); ++i) {
+      const auto at = one_sided.find(first[static_cast<std::ptrdiff_t>(i)].material);
+      if (behind[i] && at != one_sided.end()) seen.insert(at->second);
+    }
+  }
+  if (!seen.empty())
+    notes.add("its one-sided faces are shown from behind, too, where glTF hides them" +
+              in_brackets(model, {seen.begin(), seen.end()}));
 }
 
 // Every instance of a mesh that deforms has a mesh of its own.
@@ -373,8 +425,9 @@ void GltfFile::add(const set::Object& object, std::uint32_t index) {
   loader_->add(object, index);
 }
 
-void GltfFile::decode_textures() {
+void GltfFile::finish() {
   loader_->materials.decode_textures();
+  loader_->note_backs();
 }
 
 std::vector<std::string> GltfFile::notes() const {

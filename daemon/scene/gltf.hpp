@@ -29,8 +29,9 @@ class GltfFile {
   // are out of range.
   void add(const set::Object& object, std::uint32_t index);
 
-  // Decodes the textures of what was added; call this once every file of the scene is added.
-  void decode_textures();
+  // Decodes the textures of what was added, and notes what the whole file is about; call this once
+  // every file of the scene is added.
+  void finish();
 
   // Returns what was left out or not understood so far, ready to print.
   std::vector<std::string> notes() const;

@@ -22,7 +22,7 @@ struct Extension {
   std::string_view text;  // ignored: what is different; refused: what can be done
 };
 
-constexpr std::string_view plain_textures = "export the file with textures in PNG or JPEG";
+constexpr std::string_view plain_textures = "export the file with textures in PNG, JPEG or WebP";
 constexpr std::string_view plain_meshes =
     "export the object as a mesh of triangles with its materials";
 
@@ -31,11 +31,13 @@ constexpr std::string_view plain_meshes =
 constexpr Extension extensions[] = {
     {"EXT_mesh_gpu_instancing", Support::read, ""},
     {"EXT_meshopt_compression", Support::read, ""},
+    {"EXT_texture_webp", Support::read, ""},
     {"KHR_draco_mesh_compression", Support::read, ""},
     {"KHR_lights_punctual", Support::read, ""},
     {"KHR_materials_variants", Support::read, ""},
     {"KHR_mesh_quantization", Support::read, ""},
     {"KHR_meshopt_compression", Support::read, ""},
+    {"KHR_node_visibility", Support::read, ""},
     {"KHR_texture_transform", Support::read, ""},
     {"KHR_animation_pointer", Support::ignored,
      "what it animates besides nodes and weights stands still"},
@@ -43,11 +45,7 @@ constexpr Extension extensions[] = {
     {"KHR_xmp_json_ld", Support::ignored, "it says who made the file, and changes nothing to see"},
     {"CESIUM_RTC", Support::refused, "export the file with its place in the nodes' translations"},
     {"EXT_texture_avif", Support::refused, plain_textures},
-    {"EXT_texture_webp", Support::refused, plain_textures},
     {"KHR_gaussian_splatting", Support::refused, plain_meshes},
-    {"KHR_node_visibility", Support::refused,
-     "delete the hidden nodes before the export, or name those to be shown with the key \"nodes\""
-     " of the object and export without the extension"},
     {"KHR_techniques_webgl", Support::refused, "export the file with glTF's own materials"},
     {"KHR_texture_basisu", Support::refused, plain_textures},
     {"MSFT_texture_dds", Support::refused, plain_textures}};
@@ -62,23 +60,29 @@ std::optional<Extension> find(std::string_view name) {
   return *at;
 }
 
-// Returns the materials that have an extension, in brackets; "" if none has.
 std::string materials_with(const std::string& extension, const tinygltf::Model& model) {
-  constexpr std::size_t most_named = 3;
-  std::string materials;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < model.materials.size(); ++i) {
-    const tinygltf::Material& material = model.materials[i];
-    if (!material.extensions.contains(extension) || ++count > most_named) continue;
-    materials += count > 1 ? ", " : "";
-    materials += material.name.empty() ? "number " + std::to_string(i)
-                                       : '"' + set::one_line(material.name) + '"';
-  }
-  if (count > most_named) materials += " and " + std::to_string(count - most_named) + " more";
-  return count > 0 ? " (materials: " + materials + ")" : "";
+  std::vector<std::size_t> with;
+  for (std::size_t i = 0; i < model.materials.size(); ++i)
+    if (model.materials[i].extensions.contains(extension)) with.push_back(i);
+  return in_brackets(model, with);
 }
 
 }  // namespace
+
+std::string in_brackets(const tinygltf::Model& model, const std::vector<std::size_t>& materials) {
+  constexpr std::size_t most_named = 3;
+  if (materials.empty()) return "";
+  std::string names;
+  for (std::size_t i = 0; i < std::min(materials.size(), most_named); ++i) {
+    const std::string& name = model.materials[materials[i]].name;
+    names += i > 0 ? ", " : "";
+    names +=
+        name.empty() ? "number " + std::to_string(materials[i]) : '"' + set::one_line(name) + '"';
+  }
+  if (materials.size() > most_named)
+    names += " and " + std::to_string(materials.size() - most_named) + " more";
+  return " (materials: " + names + ")";
+}
 
 void check_required_extensions(const nlohmann::json& root, const std::string& file) {
   const auto required = root.find("extensionsRequired");

@@ -4,8 +4,10 @@
 
 #include <tiny_gltf.h>
 
+#include <cstddef>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "daemon/scene/load_log.hpp"
 
@@ -16,6 +18,9 @@ namespace previz::scene {
 // even where it is required: what stands where is right without it, and the note says what looks
 // different.
 void check_required_extensions(const nlohmann::json& root, const std::string& file);
+
+// Returns the names of these materials of the file, in brackets and at most three; "" of none.
+std::string in_brackets(const tinygltf::Model& model, const std::vector<std::size_t>& materials);
 
 // Notes the extensions that the file uses and previzd does not read.
 void note_extensions(const tinygltf::Model& model, Notes& notes);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <utility>
 #include <variant>
 
@@ -15,6 +16,7 @@ namespace previz::scene {
 namespace {
 
 constexpr double max_radiance = 1e30;
+constexpr const char* specular_glossiness = "KHR_materials_pbrSpecularGlossiness";
 
 // A reference to a texture, from the core of glTF or from an extension.
 struct TextureInfo {
@@ -88,6 +90,21 @@ void forget(const MaterialExtension& row, Material& material) {
   for (const LayerTexture& texture : row.textures) material.*texture.texture = no_texture;
 }
 
+// The header says why. Paint of the default index of refraction reflects 0.04, which the specular
+// colour multiplies.
+void read_gloss(const tinygltf::Value& gloss, const std::string& what, Material& material,
+                Notes& notes) {
+  constexpr float reflectance = 0.04f;
+  const glm::vec3 specular = color_within(numbers(gloss, "specularFactor", {1, 1, 1}), 1,
+                                          what + ": specularFactor", notes);
+  const float strongest = std::max({specular.r, specular.g, specular.b});
+  material.metallic = 0;
+  material.roughness =
+      1 - within(number(gloss, "glossinessFactor", 1), 0, 1, what + ": glossinessFactor", notes);
+  material.specular = std::min(strongest / reflectance, 1.0f);
+  if (strongest > 0) material.specular_color = specular / (reflectance * material.specular);
+}
+
 AlphaMode alpha_mode(const std::string& mode, const std::string& what, Notes& notes) {
   if (mode == "MASK") return AlphaMode::mask;
   if (mode == "BLEND") return AlphaMode::blend;
@@ -96,14 +113,39 @@ AlphaMode alpha_mode(const std::string& mode, const std::string& what, Notes& no
   return AlphaMode::opaque;
 }
 
+// Throws previz::Error beginning with `where` for a material of which nothing is said but by an
+// extension that is unknown: it would be white.
+void refuse_foreign(const tinygltf::Material& given, const std::string& where) {
+  const auto has = [&](const char* key) { return given.values.contains(key); };
+  if (has("baseColorTexture") && given.pbrMetallicRoughness.baseColorTexture.index < 0)
+    throw Error(where +
+                ": its base colour texture names no texture, and without it the surface "
+                "would be white; export the file again");
+  if (!given.values.empty() || given.emissiveTexture.index >= 0 ||
+      given.emissiveFactor != std::vector<double>{0, 0, 0})
+    return;
+  std::string unknown;
+  for (const auto& [name, content] : given.extensions) {
+    const auto row =
+        std::ranges::find_if(material_extensions(), [&](const auto& r) { return name == r.name; });
+    if (row == material_extensions().end())
+      unknown = name;
+    else if (!row->ignored)
+      return;
+  }
+  if (!unknown.empty())
+    throw Error(where + ": has nothing but the extension \"" + set::one_line(unknown) +
+                "\", which is not supported, and without it the surface would be white; export the "
+                "file with glTF's own materials");
+}
+
 }  // namespace
 
 LookTexture look_texture(const tinygltf::Material& material, const std::string& what,
                          Notes& notes) {
   const TextureInfo infos[] = {
       info_of(material.pbrMetallicRoughness.baseColorTexture),
-      info_of(extension(material.extensions, "KHR_materials_pbrSpecularGlossiness"),
-              "diffuseTexture"),
+      info_of(extension(material.extensions, specular_glossiness), "diffuseTexture"),
       info_of(material.emissiveTexture)};
   for (const TextureInfo& info : infos)
     if (info.index >= 0) return {info.index, read_mapping(info, what, notes)};
@@ -124,8 +166,19 @@ UsedMaterial GltfMaterials::use(int index) {
                 ", which does not exist");
   const auto number = static_cast<std::size_t>(index);
   const tinygltf::Material& given = model_.materials[number];
+  refuse_foreign(given, file_ + ": " + numbered("material", number, given.name));
   at->second = read(given, numbered("material", number, given.name));
   return at->second;
+}
+
+std::map<std::uint32_t, std::size_t> GltfMaterials::one_sided() const {
+  std::map<std::uint32_t, std::size_t> result;
+  for (const auto& [number, material] : used_) {
+    if (number < 0 || transmits(scene_.materials[material.index])) continue;
+    const auto index = static_cast<std::size_t>(number);
+    if (!model_.materials[index].doubleSided) result.emplace(material.index, index);
+  }
+  return result;
 }
 
 // The textures of one material, and the mappings that they are read by.
@@ -136,16 +189,29 @@ class GltfMaterials::Textures {
 
   // Gives the material a texture. Returns false if the file names one that cannot be had.
   bool take(const TextureInfo& info, Encoding encoding, std::uint32_t Material::*texture,
-            const std::string& which) {
+            const std::string& which, std::optional<float> glossiness = {}) {
     if (info.index < 0) return true;
     const UvMapping wanted = read_mapping(info, what_ + ", " + which, notes_);
-    material_.*texture = textures_.use(info.index, encoding);
+    const bool white =
+        texture == &Material::base_color_texture || texture == &Material::emission_texture;
+    material_.*texture = textures_.use(info.index, encoding, white, glossiness);
     if (material_.*texture == no_texture) return false;
     const auto at = std::ranges::find(mappings, wanted) - mappings.begin();
     if (at == std::ssize(mappings)) mappings.push_back(wanted);
     const auto role = std::ranges::find(material_textures, texture) - material_textures.begin();
     material_.mappings[static_cast<std::size_t>(role)] = static_cast<std::uint8_t>(at);
     return true;
+  }
+
+  // KHR_materials_pbrSpecularGlossiness: one texture of the specular colour and, in its alpha, the
+  // glossiness.
+  void take_gloss(const tinygltf::Value& gloss) {
+    const std::string key = "specularGlossinessTexture";
+    const TextureInfo info = info_of(gloss, key);
+    const float glossiness = 1 - material_.roughness;
+    take(info, Encoding::srgb, &Material::specular_color_texture, key);
+    take(info, Encoding::linear, &Material::metallic_roughness_texture, key, glossiness);
+    if (material_.metallic_roughness_texture != no_texture) material_.roughness = 1;
   }
 
   // Takes the textures of an extension. Returns false if one without which it says nothing about
@@ -175,14 +241,22 @@ class GltfMaterials::Textures {
 
 UsedMaterial GltfMaterials::read(const tinygltf::Material& given, const std::string& what) {
   const tinygltf::PbrMetallicRoughness& pbr = given.pbrMetallicRoughness;
+  const bool is_glossy = given.extensions.contains(specular_glossiness);
+  const tinygltf::Value gloss = extension(given.extensions, specular_glossiness);
+  const std::vector<double> color =
+      is_glossy ? numbers(gloss, "diffuseFactor", {1, 1, 1, 1}) : pbr.baseColorFactor;
   Material material;
   material.name = given.name;
-  material.base_color = color_within(pbr.baseColorFactor, 1, what + ": its base colour", notes_);
-  material.metallic = within(pbr.metallicFactor, 0, 1, what + ": metallicFactor", notes_);
-  material.roughness = within(pbr.roughnessFactor, 0, 1, what + ": roughnessFactor", notes_);
+  material.base_color = color_within(color, 1, what + ": its base colour", notes_);
+  if (is_glossy) {
+    read_gloss(gloss, what, material, notes_);
+  } else {
+    material.metallic = within(pbr.metallicFactor, 0, 1, what + ": metallicFactor", notes_);
+    material.roughness = within(pbr.roughnessFactor, 0, 1, what + ": roughnessFactor", notes_);
+  }
   material.alpha_mode = alpha_mode(given.alphaMode, what, notes_);
   if (material.alpha_mode != AlphaMode::opaque)
-    material.alpha = within(pbr.baseColorFactor[3], 0, 1, what + ": its alpha", notes_);
+    material.alpha = within(color[3], 0, 1, what + ": its alpha", notes_);
   material.alpha_cutoff = within(given.alphaCutoff, 0, std::numeric_limits<float>::max(),
                                  what + ": alphaCutoff", notes_);
   const std::vector<double> emissive =
@@ -195,10 +269,13 @@ UsedMaterial GltfMaterials::read(const tinygltf::Material& given, const std::str
 
   // The base colour comes first, so that its mapping is the mesh's first (Material::mappings).
   Textures textures(textures_, what, notes_, material);
-  textures.take(info_of(pbr.baseColorTexture), Encoding::srgb, &Material::base_color_texture,
-                "base colour texture");
-  textures.take(info_of(pbr.metallicRoughnessTexture), Encoding::linear,
-                &Material::metallic_roughness_texture, "metallic-roughness texture");
+  textures.take(is_glossy ? info_of(gloss, "diffuseTexture") : info_of(pbr.baseColorTexture),
+                Encoding::srgb, &Material::base_color_texture, "base colour texture");
+  if (is_glossy)
+    textures.take_gloss(gloss);
+  else
+    textures.take(info_of(pbr.metallicRoughnessTexture), Encoding::linear,
+                  &Material::metallic_roughness_texture, "metallic-roughness texture");
   textures.take(info_of(given.emissiveTexture), Encoding::srgb, &Material::emission_texture,
                 "emission texture");
   textures.take(info_of(given.normalTexture), Encoding::linear, &Material::normal_texture,

@@ -1,10 +1,20 @@
 // Reads glTF materials: metallic-roughness and the extensions that material_extensions.hpp says are
 // read.
+//
+// KHR_materials_pbrSpecularGlossiness, where a material has it, takes the place of
+// metallic-roughness: its diffuse colour is the base colour, its specular colour the reflectance of
+// paint at normal incidence (KHR_materials_specular), and the roughness 1 - glossiness. That is its
+// own model, of metals, too: black paint whose reflectance has the colour of gold. A conversion to
+// `metallic` would have to guess which of both a surface is, and has no value for what lies between
+// them. Below 0.04 the reflectance at grazing angles falls to 0 with it, so that no specular colour
+// is no reflection.
 #pragma once
 
 #include <tiny_gltf.h>
 
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <unordered_map>
 
@@ -46,6 +56,10 @@ class GltfMaterials {
   // Material -1 is glTF's default. Throws previz::Error if the material, its texture or an image
   // does not exist.
   UsedMaterial use(int material);
+
+  // Returns the materials used so far whose back glTF hides: from the index in the scene to that in
+  // the file. What lets light through is seen from both sides.
+  std::map<std::uint32_t, std::size_t> one_sided() const;
 
   // As GltfTextures::decode().
   void decode_textures() { textures_.decode(); }

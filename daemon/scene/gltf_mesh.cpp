@@ -16,6 +16,9 @@ namespace {
 // Up to this coordinate, squares and products stay finite in single precision.
 constexpr float max_coordinate = 1e15f;
 constexpr std::uint32_t unused = 0xffffffffu;
+// Cosines of the angle up to which tangents are those that the texture coordinates give: 1 degree,
+// and 10 of a mesh that cannot have its own.
+constexpr double least_agreement = 0.99985, least_agreement_deformed = 0.985;
 
 std::string count_of(std::uint64_t count, const std::string& one, const std::string& many) {
   return std::to_string(count) + " " + (count == 1 ? one : many);
@@ -114,6 +117,7 @@ void take_vertices(Mesh& mesh, const std::vector<std::uint32_t>& vertices) {
   take(mesh.uvs, vertices);
   for (std::vector<glm::vec2>& uvs : mesh.more_uvs) take(uvs, vertices);
   take(mesh.colors, vertices);
+  take(mesh.tangents, vertices);
   for (MorphTarget& target : mesh.undeformed.targets) {
     take(target.positions, vertices);
     take(target.normals, vertices);
@@ -188,6 +192,7 @@ void repair_normals(Mesh& mesh, const std::string& what, Notes& notes) {
       ++replaced;
     } else if (!faces_one) {
       normal = -normal;
+      if (!mesh.tangents.empty()) mesh.tangents[i].w *= -1;  // +Y stays where it is
       ++turned;
     }
     mesh.normals[i] = glm::vec3(normal);
@@ -247,6 +252,72 @@ std::vector<glm::vec4> read_vertex_colors(const tinygltf::Model& model, int acce
   return colors;
 }
 
+std::vector<glm::vec4> read_tangents(const tinygltf::Model& model, int accessor,
+                                     const std::string& where, const std::string& what,
+                                     Notes& notes) {
+  if (accessor < 0) return {};
+  std::vector<glm::vec4> tangents =
+      read_vec4s(model, accessor, where + ", TANGENT", Components::tangents);
+  std::uint64_t unusable = 0;
+  for (glm::vec4& tangent : tangents) {
+    const double length = glm::length(glm::dvec3(tangent));
+    if (length > 1e-12 && std::isfinite(length) && std::abs(tangent.w) > 0) {
+      tangent = glm::vec4(glm::dvec3(tangent) / length, tangent.w < 0 ? -1 : 1);
+      continue;
+    }
+    tangent = glm::vec4(0);
+    ++unusable;
+  }
+  if (unusable > 0)
+    notes.add(what + ": " + count_of(unusable, "tangent is", "tangents are") +
+              " no direction; computed from texture coordinates");
+  return tangents;
+}
+
+// Returns whether the tangents are those that texture_frame() of shaders/lib/scene.glsl finds by
+// these texture coordinates, up to an angle of this cosine. Only corners that give both count.
+bool follows(const Mesh& mesh, const std::vector<glm::vec2>& uvs, double least_cosine) {
+  const auto along_u = [&](const glm::uvec3& t, double& side) {
+    const glm::dvec2 uv1 = uvs[t.y] - uvs[t.x], uv2 = uvs[t.z] - uvs[t.x];
+    const glm::dvec3 edge1 = mesh.positions[t.y] - mesh.positions[t.x];
+    const glm::dvec3 edge2 = mesh.positions[t.z] - mesh.positions[t.x];
+    const double area = uv1.x * uv2.y - uv2.x * uv1.y;
+    // v runs down, so that the texture of a positive area is mirrored.
+    side = area > 0 ? -1 : area < 0 ? 1 : 0;
+    return side * (edge2 * uv1.y - edge1 * uv2.y);
+  };
+  return std::ranges::all_of(mesh.triangles, [&](const glm::uvec3& triangle) {
+    double side = 0;
+    const glm::dvec3 along = along_u(triangle, side);
+    for (int i = 0; i < 3; ++i) {
+      const glm::dvec3 normal = mesh.normals[triangle[i]];
+      const glm::dvec4 given = mesh.tangents[triangle[i]];
+      const glm::dvec3 a = along - normal * glm::dot(normal, along);
+      const glm::dvec3 b = glm::dvec3(given) - normal * glm::dot(normal, glm::dvec3(given));
+      const double lengths = glm::length(a) * glm::length(b);
+      if (!(lengths > 0)) continue;
+      if (given.w != side || glm::dot(a, b) < least_cosine * lengths) return false;
+    }
+    return true;
+  });
+}
+
+// Forgets tangents without which the picture is the same, and with a note those of a mesh that
+// deforms, whose directions the renderer finds in each of its shapes.
+void keep_tangents(const std::string& what, Notes& notes, Mesh& mesh) {
+  const bool deforms = !mesh.undeformed.is_empty();
+  const double least_cosine = deforms ? least_agreement_deformed : least_agreement;
+  bool follow = !mesh.uvs.empty() && follows(mesh, mesh.uvs, least_cosine);
+  for (const std::vector<glm::vec2>& uvs : mesh.more_uvs)
+    follow = follow && !uvs.empty() && follows(mesh, uvs, least_cosine);
+  if (!follow && !deforms) return;
+  if (!follow)
+    notes.add(what +
+              ": deforms, so that its tangents are not used; they differ from those of its texture "
+              "coordinates, which turn its bumps or its brushed metal");
+  mesh.tangents.clear();
+}
+
 int attribute(const tinygltf::Primitive& primitive, const std::string& name) {
   const auto at = primitive.attributes.find(name);
   return at == primitive.attributes.end() ? -1 : at->second;
@@ -275,7 +346,7 @@ std::optional<Mesh> read_shape(const tinygltf::Model& model, const MeshSource& s
   }
   Mesh mesh;
   const std::uint64_t count = element_count(model, source.positions, where + ", positions");
-  budget.add_vertices(count * source.mappings.size(), where);
+  budget.add_vertices(count * (source.mappings.size() + (source.tangents >= 0 ? 1 : 0)), where);
   const std::uint64_t deformed = source.targets.size() + source.influences.size();
   budget.add_deformed(count * deformed, where);
   mesh.positions =
@@ -288,7 +359,9 @@ std::optional<Mesh> read_shape(const tinygltf::Model& model, const MeshSource& s
     uvs = read_uvs(model, source.uvs[i], source.mappings[i], where, what, notes);
   }
   mesh.colors = read_vertex_colors(model, source.colors, where, what, notes);
+  mesh.tangents = read_tangents(model, source.tangents, where, what, notes);
   bool is_whole = (source.normals < 0 || mesh.normals.size() == count) &&
+                  (source.tangents < 0 || mesh.tangents.size() == count) &&
                   (source.colors < 0 || mesh.colors.size() == count);
   for (std::size_t i = 0; i < source.uvs.size(); ++i)
     is_whole = is_whole && (source.uvs[i] < 0 || uvs_of(mesh, i).size() == count);
@@ -324,6 +397,7 @@ std::optional<Mesh> read_mesh(const tinygltf::Model& model, const MeshSource& so
     }
     set_flat_normals(mesh);
   }
+  if (!mesh.tangents.empty()) keep_tangents(what, notes, mesh);
   if (mesh.undeformed.is_empty()) return read;
   mesh.undeformed.positions = mesh.positions;
   mesh.undeformed.normals = mesh.normals;

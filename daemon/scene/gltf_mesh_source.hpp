@@ -20,6 +20,7 @@ struct UvMapping {
 // Everything that a mesh is made of: primitives with equal sources are the same mesh.
 struct MeshSource {
   int positions = -1, normals = -1, colors = -1, indices = -1;  // accessors; -1: none
+  int tangents = -1;  // also -1 where the material asks for no direction on its surface
   int mode = TINYGLTF_MODE_TRIANGLES;
   std::vector<UvMapping> mappings;              // at least one
   std::vector<int> uvs;                         // accessors, one for each mapping; -1: none

@@ -37,6 +37,16 @@ std::vector<int> root_nodes(const tinygltf::Model& model, const std::string& fil
   return roots;
 }
 
+// KHR_node_visibility: a node that is not visible hides its children, too.
+bool is_hidden_by_itself(const tinygltf::Model& model, int node, Notes& notes) {
+  const tinygltf::Value given =
+      extension(model.nodes[static_cast<std::size_t>(node)].extensions, "KHR_node_visibility");
+  if (!given.Has("visible")) return false;
+  if (given.Get("visible").IsBool()) return !given.Get("visible").Get<bool>();
+  notes.add(node_name(model, node) + ": its \"visible\" is neither true nor false; shown");
+  return false;
+}
+
 }  // namespace
 
 // A node has a matrix, or translation * rotation * scale.
@@ -145,19 +155,19 @@ std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
                                     Notes& notes) {
   struct Visit {
     PlacedNode placed;  // file_from_node is the parent's until the node is visited
-    bool is_wanted;
+    bool is_wanted, is_hidden;
   };
   std::vector<Visit> to_visit;
   const auto push = [&](const std::vector<int>& nodes, const glm::dmat4& parent, NamedTag tag,
-                        bool is_wanted) {
+                        bool is_wanted, bool is_hidden) {
     for (auto node = nodes.rbegin(); node != nodes.rend(); ++node)
-      to_visit.push_back({{*node, parent, tag}, is_wanted});
+      to_visit.push_back({{*node, parent, tag}, is_wanted, is_hidden});
   };
 
   std::vector<PlacedNode> placed;
   std::vector<bool> visited(model.nodes.size());
   std::set<std::string> known;
-  push(root_nodes(model, file, notes), glm::dmat4(1.0), {}, names.empty());
+  push(root_nodes(model, file, notes), glm::dmat4(1.0), {}, names.empty(), false);
   while (!to_visit.empty()) {
     Visit visit = to_visit.back();
     to_visit.pop_back();
@@ -174,10 +184,17 @@ std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
     if (!node.name.empty()) known.insert(node.name);
     if (const NamedTag own = named_tag(node.name); own.part != TagPart::none)
       visit.placed.tag = own;
-    const bool is_wanted =
-        visit.is_wanted || std::find(names.begin(), names.end(), node.name) != names.end();
-    if (is_wanted) placed.push_back(visit.placed);
-    push(node.children, visit.placed.file_from_node, visit.placed.tag, is_wanted);
+    const bool is_named = std::find(names.begin(), names.end(), node.name) != names.end();
+    const bool is_wanted = visit.is_wanted || is_named;
+    bool is_hidden = is_hidden_by_itself(model, index, notes) || visit.is_hidden;
+    if (is_hidden && is_named) {
+      notes.add(node_name(model, index) +
+                ": is hidden by the file (KHR_node_visibility), but named by the object's key "
+                "\"nodes\"; shown");
+      is_hidden = false;
+    }
+    if (is_wanted && !is_hidden) placed.push_back(visit.placed);
+    push(node.children, visit.placed.file_from_node, visit.placed.tag, is_wanted, is_hidden);
   }
 
   for (const std::string& name : names) {

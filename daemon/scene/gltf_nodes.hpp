@@ -23,8 +23,10 @@ struct PlacedNode {
 };
 
 // Returns nodes of the default scene (or the first, or all roots), parents before children: the
-// nodes called `names` with their descendants, or all nodes where `names` is empty. Throws
-// previz::Error naming `file` if the nodes are no tree or a name does not exist.
+// nodes called `names` with their descendants, or all nodes where `names` is empty. A node that the
+// file hides (KHR_node_visibility) is left out with its descendants, unless `names` has it: who
+// names a node wants to see it, which is noted. Throws previz::Error naming `file` if the nodes are
+// no tree or a name does not exist.
 std::vector<PlacedNode> place_nodes(const tinygltf::Model& model,
                                     const std::vector<std::string>& names, const std::string& file,
                                     Notes& notes);

@@ -2,6 +2,7 @@
 
 #include <stb_image.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -12,6 +13,7 @@
 
 #include "daemon/scene/gltf_accessor.hpp"
 #include "daemon/scene/gltf_uri.hpp"
+#include "daemon/scene/gltf_value.hpp"
 #include "daemon/scene/picture_bytes.hpp"
 #include "daemon/scene/texture_sizes.hpp"
 #include "daemon/set/problems.hpp"
@@ -62,6 +64,12 @@ std::vector<glm::vec4> linearise(const Sample* samples, PictureSize from, Pictur
 // Returns the texels of a picture of the size that its header says.
 std::vector<glm::vec4> decoded(const EncodedImage& image, PictureSize from, PictureSize to,
                                Encoding encoding) {
+  if (is_webp(image.bytes)) {
+    const WebpTexels webp = decoded_webp(image.bytes);
+    if (!webp.rgba || webp.size != from)
+      throw Error(image.where + ": cannot be decoded: it is a damaged WebP");
+    return linearise(webp.rgba.get(), from, to, encoding);
+  }
   const int size = static_cast<int>(image.bytes.size());
   int width = 0, height = 0, channels = 0;
   std::vector<glm::vec4> texels;
@@ -109,17 +117,36 @@ EncodedImage encoded_image(const tinygltf::Model& model, int index, const std::s
   return encoded;
 }
 
-std::uint32_t GltfTextures::use(int index, Encoding encoding) {
+TextureImage image_of(const tinygltf::Model& model, int index, const std::string& file) {
   const std::string name = "texture " + std::to_string(index);
-  if (index < 0 || static_cast<std::size_t>(index) >= model_.textures.size())
-    throw Error(file_ + ": a material uses " + name + ", which does not exist");
-  const tinygltf::Texture& texture = model_.textures[static_cast<std::size_t>(index)];
-  if (texture.source < 0) {
-    notes_.add(name + ": has no PNG or JPEG image; ignored");
+  if (index < 0 || static_cast<std::size_t>(index) >= model.textures.size())
+    throw Error(file + ": a material uses " + name + ", which does not exist");
+  const tinygltf::Texture& texture = model.textures[static_cast<std::size_t>(index)];
+  int image = texture.source;
+  const double webp = number(extension(texture.extensions, "EXT_texture_webp"), "source", -1);
+  if (webp >= 0) image = static_cast<int>(std::min(webp, 2e9));
+  if (image >= 0 && static_cast<std::size_t>(image) >= model.images.size())
+    throw Error(file + ": " + name + ": no image " + std::to_string(image));
+  if (image >= 0) return {image, ""};
+  for (const auto& [extension, content] : texture.extensions)
+    return {-1, name + ": its picture is in a format that is not supported (" +
+                    set::one_line(extension) + ")"};
+  return {-1, name + ": has no picture"};
+}
+
+std::uint32_t GltfTextures::use(int index, Encoding encoding, bool white,
+                                std::optional<float> glossiness) {
+  const auto [image, missing] = image_of(model_, index, file_);
+  if (image < 0 && white)
+    throw Error(file_ + ": " + missing +
+                ", and without it a surface would be white; export the file with textures in PNG, "
+                "JPEG or WebP");
+  if (image < 0) {
+    notes_.add(missing + "; ignored");
     return no_texture;
   }
-  if (static_cast<std::size_t>(texture.source) >= model_.images.size())
-    throw Error(file_ + ": " + name + ": no image " + std::to_string(texture.source));
+  const std::string name = "texture " + std::to_string(index);
+  const tinygltf::Texture& texture = model_.textures[static_cast<std::size_t>(index)];
   tinygltf::Sampler sampler;
   if (texture.sampler >= 0) {
     if (static_cast<std::size_t>(texture.sampler) >= model_.samplers.size())
@@ -130,19 +157,19 @@ std::uint32_t GltfTextures::use(int index, Encoding encoding) {
   const Wrap wrap_u = wrap(sampler.wrapS), wrap_v = wrap(sampler.wrapT);
   const bool nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
   const auto [at, is_new] =
-      used_.try_emplace({texture.source, encoding, wrap_u, wrap_v, nearest}, no_texture);
+      used_.try_emplace({image, encoding, wrap_u, wrap_v, nearest, glossiness}, no_texture);
   if (!is_new) return at->second;
   Pending pending{scene_.textures.size(),
                   0,
-                  encoded_image(model_, texture.source, file_, names_in_objects),
+                  encoded_image(model_, image, file_, names_in_objects),
                   {},
-                  encoding};
+                  encoding,
+                  glossiness};
   if (!pending.image.note.empty()) notes_.add(pending.image.note);
   pending.size = checked_picture_size(pending.image.bytes, pending.image.where);
   pending.in_budget = budget_.add_texture(pending.size);
   Texture header;
-  header.name =
-      pending.image.name.empty() ? "image " + std::to_string(texture.source) : pending.image.name;
+  header.name = pending.image.name.empty() ? "image " + std::to_string(image) : pending.image.name;
   header.wrap_u = wrap_u;
   header.wrap_v = wrap_v;
   header.nearest = nearest;
@@ -162,6 +189,8 @@ void GltfTextures::decode() {
     texture.width = width;
     texture.height = height;
     texture.texels = decoded(pending.image, pending.size, {width, height}, pending.encoding);
+    if (pending.glossiness)
+      for (glm::vec4& texel : texture.texels) texel = {1, 1 - *pending.glossiness * texel.a, 1, 1};
     if (pending.size == PictureSize{width, height}) continue;
     notes_.add("texture \"" + set::one_line(texture.name) + "\" of " + in_words(pending.size) +
                " pixels is reduced to " + in_words({width, height}) +

@@ -1,4 +1,4 @@
-// Decodes glTF textures, PNG and JPEG images, to linear floats.
+// Decodes glTF textures, PNG, JPEG and WebP images, to linear floats.
 #pragma once
 
 #include <tiny_gltf.h>
@@ -18,13 +18,21 @@
 
 namespace previz::scene {
 
-// A picture of a model as it is stored, PNG or JPEG.
+// A picture of a model as it is stored.
 struct EncodedImage {
   std::vector<unsigned char> bytes;  // at least one
   std::string name;                  // the image's, or its file's; "" where it has none
   std::string where;  // FILE: image 3 "NAME", as checked_picture_size() and others take it
   std::string note;   // of a picture that is read from a file of another name; "" mostly
 };
+
+// The image of a texture of a model: that of EXT_texture_webp, else its source.
+struct TextureImage {
+  int image = -1;
+  std::string missing;  // where there is none: why, "texture 3: ..."
+};
+// Throws previz::Error naming `file` if the texture or the image does not exist.
+TextureImage image_of(const tinygltf::Model& model, int texture, const std::string& file);
 
 // Returns the picture of an image of a model that read_gltf() has read from `file`, be it in a
 // buffer view, in a data URI or in a file that the rules let it name. Throws previz::Error naming
@@ -39,9 +47,12 @@ class GltfTextures {
                Budget& budget)
       : model_(model), file_(std::move(file)), scene_(scene), notes_(notes), budget_(budget) {}
 
-  // Returns an index in Scene::textures, or no_texture with a note where the texture has no PNG or
-  // JPEG image. Throws previz::Error naming file and image if the image cannot be read.
-  std::uint32_t use(int texture, Encoding encoding);
+  // Returns an index in Scene::textures, or no_texture with a note where the texture has no image
+  // that is read (image_of()). With a glossiness the texture's green is roughness: 1 - glossiness *
+  // alpha. Throws previz::Error naming file and image if the image cannot be read, or, where
+  // without the texture the surface would be `white`, if there is none.
+  std::uint32_t use(int texture, Encoding encoding, bool white = false,
+                    std::optional<float> glossiness = {});
 
   // Decodes what was used since the last call, smaller where the budget has no place for all of it,
   // with a note. All files of the scene have added theirs to the budget before. Throws
@@ -49,13 +60,15 @@ class GltfTextures {
   void decode();
 
  private:
-  using Key = std::tuple<int, Encoding, Wrap, Wrap, bool>;  // image and how it is read
+  // Image and how it is read.
+  using Key = std::tuple<int, Encoding, Wrap, Wrap, bool, std::optional<float>>;
 
   struct Pending {
     std::size_t texture, in_budget;
     EncodedImage image;
     PictureSize size;
     Encoding encoding;
+    std::optional<float> glossiness;
   };
 
   const tinygltf::Model& model_;

@@ -56,7 +56,7 @@ Scene load_scene(const set::Set& set, std::uint64_t most_texels) {
     file->add(object, static_cast<std::uint32_t>(i));
     scene.light_objects.resize(scene.lights.size(), static_cast<std::uint32_t>(i));
   }
-  for (GltfFile* file : in_order) file->decode_textures();
+  for (GltfFile* file : in_order) file->finish();
   for (const set::Surface& surface : set.surfaces) apply(surface, set.file.string(), scene);
   hide_tags(scene.instances, set.hides_tags);  // a tag's colour is real, hidden or not
   scene.lights.insert(scene.lights.end(), set.lights.begin(), set.lights.end());

@@ -22,6 +22,8 @@ const char* read_volume(const GivenNumber& number, Material& m) {
 constexpr MaterialExtension extension_rows[] = {
     // Read with the emission, which it multiplies.
     {.name = "KHR_materials_emissive_strength"},
+    // Read in the place of metallic-roughness (gltf_material.hpp).
+    {.name = "KHR_materials_pbrSpecularGlossiness"},
     // An ior of 0 stands for a Fresnel term of 1 and is there for old specular-glossiness assets.
     {.name = "KHR_materials_ior",
      .factors = {{{"ior", Packed{&Material::ior, &GpuMaterial::ior}, 1, 100}}}},
@@ -101,8 +103,6 @@ constexpr MaterialExtension extension_rows[] = {
     {.name = "KHR_materials_dispersion", .ignored = "glass does not split light into its colours"},
     {.name = "KHR_materials_iridescence",
      .ignored = "soap bubbles and films of oil do not change colour with the angle of view"},
-    {.name = "KHR_materials_pbrSpecularGlossiness",
-     .ignored = "colours and gloss are used as without it"},
     {.name = "KHR_materials_unlit", .ignored = "unlit materials are lit like all others"}};
 
 // A row with textures has a word here.

@@ -1,7 +1,9 @@
 #include "daemon/scene/picture_bytes.hpp"
 
 #include <stb_image.h>
+#include <webp/decode.h>
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -16,6 +18,9 @@ namespace {
 // A file has at most this many texels per byte: Deflate packs at most 1032 bytes into one, and a
 // PNG of one bit per pixel has 8 pixels in each of those bytes. JPEG is less dense.
 constexpr std::uint64_t max_texels_a_byte = 8256;
+
+// A WebP of one colour has a few bytes, whatever its size; up to here it is taken.
+constexpr std::uint64_t most_texels_of_few_bytes = std::uint64_t{4096} * 4096;
 
 constexpr unsigned char png_signature[] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 constexpr unsigned char jpeg_signature[] = {0xff, 0xd8, 0xff};
@@ -46,7 +51,37 @@ void require_chunks(std::span<const unsigned char> png, const std::string& where
   }
 }
 
+// "WebP Container Specification" (Google): animations have a flag in their header.
+PictureSize webp_size(std::span<const unsigned char> bytes, const std::string& where) {
+  WebPBitstreamFeatures features;
+  if (WebPGetFeatures(bytes.data(), bytes.size(), &features) != VP8_STATUS_OK)
+    throw Error(where + ": cannot be decoded: it is a damaged WebP");
+  if (features.has_animation != 0)
+    throw Error(where + ": is an animated WebP; export it as one picture, as PNG, JPEG or WebP");
+  return {features.width, features.height};
+}
+
+PictureSize stb_size(std::span<const unsigned char> bytes, const std::string& where) {
+  int width = 0, height = 0, channels = 0;
+  if (!stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height,
+                             &channels) ||
+      width < 1 || height < 1)
+    throw Error(where + ": cannot be decoded: " + picture_failure());
+  return {width, height};
+}
+
 }  // namespace
+
+bool is_webp(std::span<const unsigned char> bytes) {
+  return bytes.size() > 12 && std::memcmp(bytes.data(), "RIFF", 4) == 0 &&
+         std::memcmp(bytes.data() + 8, "WEBP", 4) == 0;
+}
+
+WebpTexels decoded_webp(std::span<const unsigned char> bytes) {
+  int width = 0, height = 0;
+  std::uint8_t* const rgba = WebPDecodeRGBA(bytes.data(), bytes.size(), &width, &height);
+  return {{rgba, WebPFree}, {width, height}};
+}
 
 std::string picture_failure() {
   const char* reason = stbi_failure_reason();
@@ -55,26 +90,44 @@ std::string picture_failure() {
 
 PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std::string& where) {
   const bool is_png = begins_with(bytes, png_signature);
-  if (!is_png && !begins_with(bytes, jpeg_signature))
-    throw Error(where + ": is neither PNG nor JPEG; export it as PNG or JPEG");
+  if (!is_png && !begins_with(bytes, jpeg_signature) && !is_webp(bytes))
+    throw Error(where + ": is neither PNG, JPEG nor WebP; export it as PNG or JPEG");
   if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
     throw Error(where + ": is larger than 2 GiB");
   if (is_png) require_chunks(bytes, where);
-  int width = 0, height = 0, channels = 0;
-  if (!stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height,
-                             &channels) ||
-      width < 1 || height < 1)
-    throw Error(where + ": cannot be decoded: " + picture_failure());
+  const auto [width, height] = is_webp(bytes) ? webp_size(bytes, where) : stb_size(bytes, where);
   if (width > max_texture_side || height > max_texture_side)
     throw Error(where + ": is " + std::to_string(width) + "x" + std::to_string(height) +
                 "; a side is at most " + std::to_string(max_texture_side));
   const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  if (texels / max_texels_a_byte > bytes.size()) throw Error(where + ": is cut short");
+  const bool is_small = is_webp(bytes) && texels <= most_texels_of_few_bytes;
+  if (!is_small && texels / max_texels_a_byte > bytes.size()) throw Error(where + ": is cut short");
   return {width, height};
 }
 
+namespace {
+
+// By the weights of stb_image: a scan has the same luma in each format.
+std::vector<std::uint8_t> webp_luma(std::span<const unsigned char> bytes, PictureSize size,
+                                    const std::string& where) {
+  const WebpTexels decoded = decoded_webp(bytes);
+  if (!decoded.rgba || decoded.size != size)
+    throw Error(where + ": cannot be decoded: it is a damaged WebP");
+  std::vector<std::uint8_t> luma(static_cast<std::size_t>(size.width) *
+                                 static_cast<std::size_t>(size.height));
+  const std::uint8_t* texel = decoded.rgba.get();
+  for (std::uint8_t& y : luma) {
+    y = static_cast<std::uint8_t>((77 * texel[0] + 150 * texel[1] + 29 * texel[2]) >> 8);
+    texel += 4;
+  }
+  return luma;
+}
+
+}  // namespace
+
 std::vector<std::uint8_t> decoded_luma(std::span<const unsigned char> bytes, PictureSize size,
                                        const std::string& where) {
+  if (is_webp(bytes)) return webp_luma(bytes, size, where);
   int width = 0, height = 0, channels = 0;
   const auto free = [](void* samples) { stbi_image_free(samples); };
   const std::unique_ptr<stbi_uc, decltype(free)> samples(

@@ -24,7 +24,7 @@ double least_factor(const Scene& scene, std::uint32_t texture, int channel) {
 // deformation.
 bool are_same_mesh(const Mesh& a, const Mesh& b) {
   if (a.triangles != b.triangles || a.uvs != b.uvs || a.more_uvs != b.more_uvs ||
-      a.colors != b.colors || a.undeformed != b.undeformed)
+      a.colors != b.colors || a.tangents != b.tangents || a.undeformed != b.undeformed)
     return false;
   return !a.undeformed.is_empty() || (a.positions == b.positions && a.normals == b.normals);
 }
@@ -128,6 +128,11 @@ bool has_specular_color(const Material& m) {
 
 bool is_anisotropic(const Material& m) {
   return m.anisotropy > 0 && m.transmission <= 0;
+}
+
+bool has_directions(const Material& m) {
+  return m.normal_texture != no_texture || m.clearcoat_normal_texture != no_texture ||
+         is_anisotropic(m);
 }
 
 bool has_opaque_part(const Material& m) {

@@ -38,7 +38,10 @@ struct Mesh {
   std::vector<glm::vec2> uvs;
   // Texture coordinates of the material's further mappings (Material::mappings), from 1 on.
   std::vector<std::vector<glm::vec2>> more_uvs;
-  std::vector<glm::vec4> colors;      // linear, 0..1: factors of the base colour and of the alpha
+  std::vector<glm::vec4> colors;  // linear, 0..1: factors of the base colour and of the alpha
+  // The direction of a texture's +X, unit or 0, and in w 1 or -1, the side of +Y from cross(normal,
+  // direction) (glTF 2.0, 3.7.2.1). Empty, and where it is 0: the texture coordinates give both.
+  std::vector<glm::vec4> tangents;
   std::vector<glm::uvec3> triangles;  // vertex indices
   Undeformed undeformed;              // empty: the mesh keeps its shape
 };
@@ -283,6 +286,9 @@ bool has_specular_color(const Material& material);
 // Returns whether reflections are wider along one direction. What lets light through is left as it
 // is, rough glass in all directions alike.
 bool is_anisotropic(const Material& material);
+
+// Returns whether directions on the surface matter: to bumps or to an anisotropy.
+bool has_directions(const Material& material);
 
 // Returns whether paint or plastic reflects on any part of this material.
 bool has_coat(const Material& material);

@@ -38,6 +38,7 @@ PREVIZ_CONST uint FEATURE_FILTERED_TEXTURES = 2097152u;  // looked up over a sam
 PREVIZ_CONST uint FEATURE_VERTEX_COLORS = 4194304u;   // base colours that meshes state
 PREVIZ_CONST uint FEATURE_MAPPINGS = 8388608u;        // textures of a surface that lie differently on it
 PREVIZ_CONST uint FEATURE_LAYER_TEXTURES = 16777216u;  // textures of glass, gloss, lacquer and sheen
+PREVIZ_CONST uint FEATURE_TANGENTS = 33554432u;        // directions on surfaces that meshes state
 
 // The lobe of smoother sheen is narrower than its table resolves.
 PREVIZ_CONST float LEAST_SHEEN_ROUGHNESS = 0.07f;

@@ -184,6 +184,7 @@ struct GpuInstance {
   // coordinates. 0: nothing.
   uint first_extra;
   uint extras_per_vertex;
+  uint tangent_extra;  // which of them is the tangent, four fractions from -1 to 1; 0: none
 };
 
 PREVIZ_CONST uint TEXTURE_REPEAT = 0u;
@@ -481,7 +482,7 @@ static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 160);
 static_assert(sizeof(GpuControl) == 96);
-static_assert(sizeof(GpuInstance) == 120);
+static_assert(sizeof(GpuInstance) == 124);
 static_assert(sizeof(GpuTexture) == 32);
 static_assert(sizeof(GpuLight) == 160);
 static_assert(offsetof(GpuLight, uv0) == 112);

@@ -198,11 +198,38 @@ Triangle mapped_triangle(Triangle t, GpuInstance instance, uvec3 vertices, uint 
 // A mapped normal that dips below the surface is lifted above it by this much.
 const float LEAST_NORMAL_LIFT = 1e-3;
 
-// Finds the directions of +X and +Y of a texture around a normal. They follow the triangle's own
-// texture coordinates, as glTF prescribes where no tangents are given, but are not smoothed over
-// the vertices. Returns false if the coordinates give no direction.
-bool texture_frame(GpuInstance instance, Triangle t, vec3 normal, out vec3 tangent,
+// Returns the tangent that the mesh states at a point of a triangle of these vertices (glTF 2.0,
+// 3.7.2.1), in object space; 0 where it states none.
+vec4 stated_tangent(GpuInstance instance, uvec3 vertices, vec3 b) {
+  vec4 tangent = vec4(0.0);
+  if (!has_feature(FEATURE_TANGENTS) || instance.tangent_extra == 0u) return tangent;
+  for (int i = 0; i < 3; ++i) {
+    const uvec2 bits = vertex_extra(instance, vertices[i], instance.tangent_extra);
+    tangent += b[i] * vec4(unpackSnorm2x16(bits.x), unpackSnorm2x16(bits.y));
+  }
+  return tangent;
+}
+
+// Finds the directions of +X and +Y of a texture around a normal. They are the stated ones, or
+// follow the triangle's own texture coordinates, as glTF prescribes where no tangents are given, but
+// are not smoothed over the vertices. Returns false if the coordinates give no direction.
+bool texture_frame(GpuInstance instance, Triangle t, vec4 stated, vec3 normal, out vec3 tangent,
                    out vec3 bitangent) {
+  if (has_feature(FEATURE_TANGENTS)) {
+    const vec3 given = transform_vector(instance.world_from_object, stated.xyz);
+    const vec3 given_across = given - normal * dot(normal, given);
+    const float given_squared = dot(given_across, given_across);
+    if (given_squared > 0.0) {
+      tangent = given_across * inversesqrt(given_squared);
+      // A mirrored instance mirrors the cross product.
+      const bool is_mirrored = dot(cross(instance.world_from_object[0].xyz,
+                                         instance.world_from_object[1].xyz),
+                                   instance.world_from_object[2].xyz) < 0.0;
+      const vec3 upwards = cross(normal, tangent);
+      bitangent = (stated.w < 0.0) != is_mirrored ? -upwards : upwards;
+      return true;
+    }
+  }
   const vec2 along1 = vec2(t.p1.w, t.n1.w) - vec2(t.p0.w, t.n0.w);
   const vec2 along2 = vec2(t.p2.w, t.n2.w) - vec2(t.p0.w, t.n0.w);
   const vec3 edge1 = transform_vector(instance.world_from_object, t.p1.xyz - t.p0.xyz);
@@ -224,10 +251,10 @@ bool texture_frame(GpuInstance instance, Triangle t, vec3 normal, out vec3 tange
 }
 
 // Applies a normal texture.
-vec3 map_normal(GpuInstance instance, uint texture, float scale, Triangle t, vec2 uv, vec3 normal,
-                vec3 outward) {
+vec3 map_normal(GpuInstance instance, uint texture, float scale, Triangle t, vec4 stated, vec2 uv,
+                vec3 normal, vec3 outward) {
   vec3 tangent, bitangent;
-  if (!texture_frame(instance, t, normal, tangent, bitangent)) return normal;
+  if (!texture_frame(instance, t, stated, normal, tangent, bitangent)) return normal;
   vec3 mapped = sample_texture(texture, uv).xyz * 2.0 - 1.0;
   mapped.xy *= scale;
   mapped = tangent * mapped.x + bitangent * mapped.y + normal * mapped.z;
@@ -376,7 +403,8 @@ vec3 anisotropic_direction(TexturePoint at, vec2 anisotropy, vec3 normal) {
   const Triangle t = mapped_triangle(at.triangle, at.instance, at.vertices,
                                      TEXTURE_OF_LAYERS + LAYER_ANISOTROPY);
   if (all(equal(anisotropy, vec2(0.0))) ||
-      !texture_frame(at.instance, t, normal, tangent, bitangent))
+      !texture_frame(at.instance, t, stated_tangent(at.instance, at.vertices, at.b), normal, tangent,
+                     bitangent))
     return vec3(0.0);
   return tangent * anisotropy.x + bitangent * anisotropy.y;
 }
@@ -461,7 +489,7 @@ vec3 mirroring_normal(vec3 normal, vec3 geometric_normal, vec3 wo) {
 // Applies a normal texture (TEXTURE_OF_*) as it lies on the triangle.
 vec3 normal_at(TexturePoint at, uint texture, float scale, uint role, vec3 normal, vec3 outward) {
   const Triangle t = mapped_triangle(at.triangle, at.instance, at.vertices, role);
-  return map_normal(at.instance, texture, scale, t,
+  return map_normal(at.instance, texture, scale, t, stated_tangent(at.instance, at.vertices, at.b),
                     triangle_uv(t.p0, t.n0, t.p1, t.n1, t.p2, t.n2, at.b), normal, outward);
 }
 

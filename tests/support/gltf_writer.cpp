@@ -5,6 +5,7 @@
 #include <fstream>
 #include <span>
 #include <stdexcept>
+#include <string_view>
 
 #include "drivers/session/files.hpp"
 
@@ -25,6 +26,9 @@ void append_chunk(std::string& file, const char* type, std::string data, char pa
 }  // namespace
 
 int GltfWriter::add(const char* what, Json value) {
+  // The meshes of tests are mostly open, and their backs are not what a test is about.
+  if (what == std::string_view("materials") && !value.contains("doubleSided"))
+    value["doubleSided"] = true;
   json[what].push_back(std::move(value));
   return static_cast<int>(json[what].size()) - 1;
 }

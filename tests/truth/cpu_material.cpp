@@ -137,9 +137,27 @@ struct TextureAxes {
   glm::dvec3 x, y;
 };
 
+// Those that the mesh states (glTF 2.0, 3.7.2.1). A mirrored instance mirrors +Y as all else.
+std::optional<TextureAxes> stated_axes(const scene::Scene& scene, const Hit& hit) {
+  const scene::Mesh& mesh = mesh_of(scene, hit);
+  if (mesh.tangents.empty()) return std::nullopt;
+  glm::dvec4 sum(0);
+  for (int i = 0; i < 3; ++i)
+    sum += hit.weights[i] * glm::dvec4(mesh.tangents[mesh.triangles[hit.triangle][i]]);
+  const glm::dmat3 world(scene.instances[hit.instance].world_from_object);
+  const glm::dvec3 given = world * glm::dvec3(sum);
+  const glm::dvec3& n = hit.shading_normal;
+  const glm::dvec3 across = given - n * glm::dot(n, given);
+  if (!(glm::length(across) > 0)) return std::nullopt;
+  const glm::dvec3 tangent = glm::normalize(across);
+  return TextureAxes{tangent, glm::cross(n, tangent) * (sum.w < 0 ? -1.0 : 1.0) *
+                                  (glm::determinant(world) < 0 ? -1.0 : 1.0)};
+}
+
 std::optional<TextureAxes> texture_axes(const scene::Scene& scene, const Geometry& geometry,
                                         const Hit& hit, std::uint32_t scene::Material::*texture) {
   const scene::Mesh& mesh = mesh_of(scene, hit);
+  if (const auto stated = stated_axes(scene, hit)) return stated;
   const std::vector<glm::vec2>& uvs =
       scene::uvs_of(mesh, scene::mapping_of(material_of(scene, hit), texture));
   if (uvs.empty()) return std::nullopt;

@@ -297,4 +297,24 @@ TEST(Patchwork, HasTheSameDifferenceByBothEstimators) {
   expect_same_difference(patchwork(), 16, true);
 }
 
+// The same bumps and brushed metal where the meshes state tangents that turn from vertex to vertex,
+// one of them in a mirrored instance.
+View turned_tangents() {
+  View view = cloth_and_brushed_metal();
+  for (scene::Mesh& mesh : view.scene.meshes)
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
+      const glm::vec3 p = 5.0f * mesh.positions[i];
+      mesh.tangents.emplace_back(glm::normalize(glm::vec3(std::cos(p.x), std::sin(p.y), 0.5f)),
+                                 mesh.positions[0].x < 0 ? 1 : -1);
+    }
+  for (scene::Instance& instance : view.scene.instances)
+    if (scene::has_directions(view.scene.materials[instance.material]))
+      instance.world_from_object[0] *= -1;
+  return view;
+}
+
+TEST(Tangents, AgreeWithTheCpuTracer) {
+  expect_agreement(turned_tangents(), 16, true);
+}
+
 }  // namespace previz::test::material_agreement_test

@@ -636,6 +636,35 @@ TEST_F(GltfScanRead, CopiesAndMirroredNodesAreThere) {
   }
 }
 
+// Two texels, (0, 51, 255) and (10, 11, 128), without loss; the luma is stb_image's.
+TEST_F(GltfScanRead, TexturesInWebpAreRead) {
+  GltfWriter gltf;
+  gltf.add("images", {{"uri",
+                       "data:image/webp;base64,UklGRiIAAABXRUJQVlA4TBYAAAAvAQAAEA/wGexReOD/"
+                       "g/6DBxWI6H8A"}});
+  const int texture =
+      gltf.add("textures", {{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}});
+  const int material = gltf.add(
+      "materials", {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}});
+  gltf.root("scan", gltf.triangle_mesh(material));
+  EXPECT_THAT(read(gltf).colours.pictures.at(0).luma, ElementsAre(58, 23));
+}
+
+// A hidden node and its children are no part of the model (KHR_node_visibility).
+TEST_F(GltfScanRead, HiddenNodesAreLeftOut) {
+  GltfWriter gltf;
+  const int mesh = gltf.triangle_mesh();
+  const int child = gltf.add("nodes", {{"mesh", mesh}});
+  gltf.root("scan", mesh);
+  gltf.root(
+      "helper", mesh,
+      {{"children", {child}}, {"extensions", {{"KHR_node_visibility", {{"visible", false}}}}}});
+  gltf.json["extensionsUsed"] = {"KHR_node_visibility"};
+  EXPECT_NEAR(area_of(read(gltf)), 0.5, 1e-6);
+  gltf.json["extensionsRequired"] = {"KHR_node_visibility"};
+  EXPECT_NEAR(area_of(read(gltf)), 0.5, 1e-6);
+}
+
 TEST_F(GltfScanRead, AnUnknownExtensionThatIsRequiredIsRefused) {
   GltfWriter gltf;
   gltf.root("scan", gltf.triangle_mesh());

@@ -171,7 +171,8 @@ TEST_F(ScanTags, OfTexturesThatCannotBeReadAreNamed) {
   std::filesystem::rename(folder_ / "set.png", folder_ / "other.png");
   EXPECT_THAT(refusal(), HasSubstr("set.obj: its texture \"set.png\" is missing; put it beside"));
   std::ofstream(folder_ / "set.png") << "junk";
-  EXPECT_THAT(refusal(), HasSubstr("set.obj: its texture \"set.png\": is neither PNG nor JPEG"));
+  EXPECT_THAT(refusal(),
+              HasSubstr("set.obj: its texture \"set.png\": is neither PNG, JPEG nor WebP"));
   std::string png(session::read_file(folder_ / "other.png"));
   std::ofstream(folder_ / "set.png", std::ios::binary) << png.substr(0, png.size() / 2);
   EXPECT_THAT(refusal(), HasSubstr("set.png\": is cut short"));

@@ -200,4 +200,52 @@ TEST(TextureMappings, ReadEachTextureByItsOwn) {
   EXPECT_NE(picture(by_other), picture(as_turned));
 }
 
+void expect_alike(const View& a, const View& b) {
+  const auto shown = picture(a), expected = picture(b);
+  // Triangles and turns that are rounded otherwise: a few last places.
+  for (std::size_t i = 0; i < shown.size(); ++i)
+    ASSERT_LT(glm::length(shown[i] - expected[i]), 1e-4f * glm::length(expected[i])) << i;
+}
+
+// A square whose bumps lean to these directions of the texture, or a plain one with these tangents.
+View bumpy(float along_x, float along_y, const std::optional<glm::vec4>& tangent = {}) {
+  Material metallic = metal({0.9f, 0.7f, 0.4f}, 0.4f);
+  View view = square(metallic);
+  view.scene.materials[0].normal_texture =
+      add_texture(view.scene, texture_of({0.5f + along_x, 0.5f + along_y, 0.9375f, 1}));
+  if (tangent)
+    view.scene.meshes[0].tangents.assign(view.scene.meshes[0].positions.size(), *tangent);
+  return view;
+}
+
+// glTF 2.0, 3.7.2.1: +X is the tangent, and +Y is cross(normal, tangent) times w.
+TEST(Tangents, SayWhichWayBumpsLie) {
+  const glm::vec4 plain(1, 0, 0, 1);
+  const auto expected = picture(bumpy(0.125f, 0.0625f, plain));
+  EXPECT_EQ(picture(bumpy(-0.125f, 0.0625f, glm::vec4(-1, 0, 0, -1))), expected);
+  EXPECT_EQ(picture(bumpy(0.125f, -0.0625f, glm::vec4(1, 0, 0, -1))), expected);
+  EXPECT_EQ(picture(bumpy(0.0625f, -0.125f, glm::vec4(0, 1, 0, 1))), expected);
+  EXPECT_NE(picture(bumpy(-0.125f, 0.0625f, plain)), expected);
+  EXPECT_EQ(picture(bumpy(0.125f, 0, plain)), picture(bumpy(0.125f, 0)));
+  // No direction at all: that of the coordinates.
+  EXPECT_EQ(picture(bumpy(0.125f, 0, glm::vec4(0))), picture(bumpy(0.125f, 0)));
+}
+
+// The mirror image of bumps that lean to +x leans to -x, and +Y stays.
+TEST(Tangents, AreMirroredWithTheirInstance) {
+  View mirrored = bumpy(0.125f, 0.0625f, glm::vec4(1, 0, 0, 1));
+  mirrored.scene.instances[0].world_from_object[0][0] = -1;
+  expect_alike(mirrored, bumpy(-0.125f, 0.0625f, glm::vec4(1, 0, 0, 1)));
+}
+
+TEST(Tangents, SayWhichWayBrushedMetalLies) {
+  Material m = metal({0.9f, 0.7f, 0.4f}, 0.4f);
+  m.anisotropy = 0.8f;
+  View turned = square(m);
+  turned.scene.meshes[0].tangents.assign(turned.scene.meshes[0].positions.size(), {0, 1, 0, 1});
+  EXPECT_NE(picture(turned), picture(square(m)));
+  m.anisotropy_rotation_rad = std::numbers::pi_v<float> / 2;
+  expect_alike(turned, square(m));
+}
+
 }  // namespace previz::test::layer_texture_test

@@ -20,7 +20,7 @@ using render::describe_spirv;
 using render::specialise_spirv;
 using render::SpirvInfo;
 
-constexpr std::uint32_t every_feature = (gpu::FEATURE_LAYER_TEXTURES << 1) - 1;
+constexpr std::uint32_t every_feature = (gpu::FEATURE_TANGENTS << 1) - 1;
 
 TEST(Spirv, NamesTheBuffersThatAreUsed) {
   const SpirvInfo info = describe_spirv(generate_spv);

@@ -407,7 +407,7 @@ TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
   const std::string file = (directory / "test.gltf").string();
   EXPECT_EQ(error(), file + ": image 0 \"lost.png\": not found; put it beside the file");
   EXPECT_EQ(error_with("/images/0", {{"name", "text"}, {"uri", "data:text/plain;base64,bm8hIQ=="}}),
-            file + ": image 0 \"text\": is neither PNG nor JPEG; export it as PNG or JPEG");
+            file + ": image 0 \"text\": is neither PNG, JPEG nor WebP; export it as PNG or JPEG");
   std::vector<unsigned char> broken = png(2, 1, two_texels);
   broken.at(42) ^= 0xff;  // the header of the compressed texels
   // Width in the PNG's header, big-endian at byte 16: larger than allowed, and more than its bytes.
@@ -445,14 +445,135 @@ TEST_F(GltfMaterials, RefusesPngsWhoseChunksGoOnAfterTheFile) {
   EXPECT_EQ(load().textures.at(0).width, 2);
 }
 
-TEST_F(GltfMaterials, LeavesOutTexturesInFormatsOfExtensions) {
+// The texels of two_texels, without loss.
+const char* const webp = "UklGRiIAAABXRUJQVlA4TBYAAAAvAQAAEA/wGexReOD/g/6DBxWI6H8A";
+
+TEST_F(GltfMaterials, ReadsWebpWhetherItIsRequiredOrNot) {
+  gltf.add("images", image_of(png(1, 1, {9, 9, 9, 255})));
+  gltf.add("images", {{"uri", std::string("data:image/webp;base64,") + webp}});
+  const Json of_webp = {{"EXT_texture_webp", {{"source", 1}}}};
+  use(colored({{"index", gltf.add("textures", {{"extensions", of_webp}})}}));
+  use(colored({{"index", gltf.add("textures", {{"source", 0}, {"extensions", of_webp}})}}));
   gltf.json["extensionsUsed"] = {"EXT_texture_webp"};
-  const Json webp = {{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}};
-  use(colored({{"index", gltf.add("textures", webp)}}));
+  for (const bool is_required : {false, true}) {
+    if (is_required) gltf.json["extensionsRequired"] = {"EXT_texture_webp"};
+    const scene::Scene scene = load();
+    EXPECT_THAT(scene.notes, IsEmpty());
+    ASSERT_EQ(scene.textures.size(), 1u);
+    EXPECT_EQ(scene.textures[0].width, 2);
+    EXPECT_EQ(scene.textures[0].texels[0].b, 1);
+    EXPECT_FLOAT_EQ(scene.textures[0].texels[0].g, std::pow((0.2f + 0.055f) / 1.055f, 2.4f));
+    EXPECT_EQ(scene.textures[0].texels[1].a, static_cast<float>(64 / 255.0));
+  }
+}
+
+TEST_F(GltfMaterials, RefusesWebpThatIsDamagedAnimatedOrTooLarge) {
+  use_image(Json::object());
+  const auto message_of = [&](std::vector<unsigned char> bytes) {
+    return error_with("/images/0", {{"uri", "data:image/webp;base64," + base64(bytes)}});
+  };
+  // A canvas of width and height less 1 in 24 bits each, with flags (Google's "WebP Container
+  // Specification").
+  const std::vector<unsigned char> canvas = {'R', 'I', 'F', 'F', 22,  0,   0,  0, 'W', 'E',
+                                             'B', 'P', 'V', 'P', '8', 'X', 10, 0, 0,   0,
+                                             2,   0,   0,   0,   1,   0,   0,  0, 0,   0};
+  EXPECT_THAT(message_of(canvas), HasSubstr("image 0: is an animated WebP; export it as one"));
+  // Without loss: a signature, then 14 bits each of width and height less 1.
+  const auto picture_of = [](std::uint32_t side) {
+    const std::uint32_t size = (side - 1) | (side - 1) << 14;
+    std::vector<unsigned char> bytes = {'R', 'I', 'F', 'F', 34,  0,  0, 0, 'W', 'E', 'B',
+                                        'P', 'V', 'P', '8', 'L', 22, 0, 0, 0,   0x2f};
+    for (int i = 0; i < 4; ++i) bytes.push_back(static_cast<unsigned char>(size >> 8 * i));
+    bytes.resize(42);
+    return bytes;
+  };
+  EXPECT_THAT(message_of(picture_of(16000)), HasSubstr("image 0: is cut short"));
+  std::vector<unsigned char> broken = picture_of(2);
+  std::ranges::fill(broken.begin() + 25, broken.end(), 0xff);
+  EXPECT_THAT(message_of(broken), HasSubstr("image 0: cannot be decoded: it is a damaged WebP"));
+  broken.resize(16);
+  EXPECT_THAT(message_of(broken), HasSubstr("image 0: cannot be decoded: it is a damaged WebP"));
+}
+
+// What would be white without its texture is refused; bumps are left out with a note.
+TEST_F(GltfMaterials, RefusesColoursInFormatsThatAreNotRead) {
+  const std::string file = (directory / "test.gltf").string();
+  const auto in_format = [&](const char* extension) {
+    return Json{{"index", gltf.add("textures", {{"extensions", {{extension, {{"source", 0}}}}}})}};
+  };
+  use(colored(in_format("KHR_texture_basisu")));
+  EXPECT_EQ(error(),
+            file +
+                ": texture 0: its picture is in a format that is not supported "
+                "(KHR_texture_basisu), and without it a surface would be white; export the "
+                "file with textures in PNG, JPEG or WebP");
+  const Json none = {{"index", gltf.add("textures", Json::object())}};
+  gltf.json["materials"][0] = colored(none);
+  EXPECT_THAT(error(), HasSubstr("texture 1: has no picture, and without it a surface would be"));
+  gltf.json["materials"][0] = colored(Json::object());
+  EXPECT_THAT(error(), HasSubstr("material 0: its base colour texture names no texture"));
+  gltf.json["materials"][0] = {{"emissiveFactor", {1, 1, 1}},
+                               {"emissiveTexture", in_format("EXT_texture_avif")}};
+  EXPECT_THAT(error(), HasSubstr("(EXT_texture_avif), and without it a surface would be white"));
+  gltf.json["materials"][0] = {{"extensions", {{"KHR_techniques_webgl", {{"technique", 0}}}}}};
+  EXPECT_THAT(error(), HasSubstr("material 0: has nothing but the extension "
+                                 "\"KHR_techniques_webgl\", which is not supported"));
+  gltf.json["materials"][0] = {{"doubleSided", true},
+                               {"normalTexture", in_format("MSFT_texture_dds")}};
+  EXPECT_THAT(load().notes,
+              ElementsAre(HasSubstr("texture 3: its picture is in a format that is not supported "
+                                    "(MSFT_texture_dds); ignored")));
+}
+
+// KHR_materials_pbrSpecularGlossiness: the reflectance at normal incidence is the specular colour,
+// of paint that of its index of refraction, 0.04, times a colour.
+TEST_F(GltfMaterials, ReadsSpecularGlossiness) {
+  const auto glossy = [](Json gloss) {
+    return with("KHR_materials_pbrSpecularGlossiness", std::move(gloss));
+  };
+  gltf.json["extensionsUsed"] =
+      gltf.json["extensionsRequired"] = {"KHR_materials_pbrSpecularGlossiness"};
+  Json matt = glossy({{"diffuseFactor", {0.25, 0.5, 0.75, 0.5}},
+                      {"specularFactor", {0, 0, 0}},
+                      {"glossinessFactor", 0.25}});
+  matt["pbrMetallicRoughness"]["baseColorFactor"] = {1, 0, 0, 1};  // for who knows no extension
+  matt["alphaMode"] = "BLEND";
+  const scene::Material m = loaded(matt);
+  EXPECT_THAT(load().notes, IsEmpty());
+  EXPECT_EQ(m.base_color, glm::vec3(0.25f, 0.5f, 0.75f));
+  EXPECT_EQ(m.alpha, 0.5f);
+  EXPECT_EQ(m.metallic, 0);
+  EXPECT_EQ(m.roughness, 0.75f);
+  EXPECT_EQ(m.specular, 0);
+  use(glossy({{"specularFactor", {0.04, 0.04, 0.04}}}));
+  use(glossy({{"diffuseFactor", {0, 0, 0, 1}}, {"specularFactor", {1, 0.75, 0.5}}}));
+  use(glossy({{"specularFactor", {0.01, 0.005, 0}}}));
   const scene::Scene scene = load();
-  EXPECT_EQ(scene.materials.at(0).base_color_texture, scene::no_texture);
-  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("\"EXT_texture_webp\" is not supported; ignored"),
-                                       HasSubstr("texture 0: has no PNG or JPEG image; ignored")));
+  EXPECT_EQ(scene.materials[1].specular_color, glm::vec3(1));
+  EXPECT_EQ(scene.materials[1].roughness, 0);
+  const auto reflectance = [](const scene::Material& of) {
+    return of.specular * 0.04f * of.specular_color;
+  };
+  EXPECT_NEAR(glm::distance(reflectance(scene.materials[2]), {1, 0.75f, 0.5f}), 0, 1e-6);
+  EXPECT_EQ(scene.materials[2].specular, 1);
+  EXPECT_NEAR(glm::distance(reflectance(scene.materials[3]), {0.01f, 0.005f, 0}), 0, 1e-8);
+  EXPECT_EQ(scene.materials[3].specular, 0.25f);
+}
+
+TEST_F(GltfMaterials, ReadsTheTexturesOfSpecularGlossiness) {
+  const int texture = gltf.texture(2, 1, two_texels);
+  const scene::Material m = loaded(with("KHR_materials_pbrSpecularGlossiness",
+                                        {{"diffuseTexture", {{"index", texture}}},
+                                         {"specularGlossinessTexture", {{"index", texture}}},
+                                         {"glossinessFactor", 0.5}}));
+  const scene::Scene scene = load();
+  EXPECT_THAT(scene.notes, IsEmpty());
+  EXPECT_EQ(m.specular_color_texture, m.base_color_texture);
+  EXPECT_EQ(m.roughness, 1);
+  EXPECT_EQ(m.metallic, 0);
+  const auto& texels = scene.textures.at(m.metallic_roughness_texture).texels;
+  EXPECT_EQ(texels[0].g, 0.5f);  // 1 - 0.5 * 1
+  EXPECT_FLOAT_EQ(texels[1].g, 1 - 0.5f * 64 / 255);
 }
 
 }  // namespace previz::test::gltf_material_test

@@ -252,4 +252,77 @@ TEST_F(GltfMesh, ReadsVertexColours) {
   EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("1 vertex colour is outside of 0 to 1")));
 }
 
+// A square with an upright texture (v runs down) and a normal map.
+class GltfTangents : public GltfTest {
+ protected:
+  void SetUp() override {
+    gltf.add("materials", {{"normalTexture", {{"index", gltf.texture(1, 1, {9, 9, 9, 255})}}}});
+    add_mesh({{"POSITION", gltf.positions(square)},
+              {"NORMAL", gltf.normals({4, {0, 0, 1}})},
+              {"TEXCOORD_0", gltf.uvs({{0, 1}, {1, 1}, {1, 0}, {0, 0}})}},
+             {{"indices", gltf.indices({0, 1, 2, 0, 2, 3})}, {"material", 0}});
+  }
+
+  std::vector<glm::vec4> kept(const std::vector<glm::vec4>& given) {
+    first_primitive()["attributes"]["TANGENT"] = gltf.values<glm::vec4>(5126, "VEC4", given);
+    return load().meshes.at(0).tangents;
+  }
+  static glm::vec4 turned(double degrees) {
+    const double angle = glm::radians(degrees);
+    return {std::cos(angle), std::sin(angle), 0, 1};
+  }
+};
+
+// glTF 2.0, 3.7.2.1. +Y of a normal map is up in the picture: cross((0, 0, 1), (1, 0, 0)) * 1.
+TEST_F(GltfTangents, AreKeptWhereTheyAreNotThoseOfTheCoordinates) {
+  EXPECT_THAT(load().meshes.at(0).tangents, IsEmpty());
+  EXPECT_THAT(kept({4, {1, 0, 0, 1}}), IsEmpty());
+  EXPECT_THAT(kept({4, turned(0.5)}), IsEmpty());
+  for (const glm::vec4& other : {turned(2), glm::vec4(-1, 0, 0, -1), glm::vec4(1, 0, 0, -1)})
+    EXPECT_EQ(kept({4, other}), std::vector<glm::vec4>(4, other));
+  EXPECT_EQ(kept({4, {0, 3, 0, 1}}), std::vector<glm::vec4>(4, {0, 1, 0, 1}));
+  const Json uvs = first_primitive()["attributes"]["TEXCOORD_0"];
+  first_primitive()["attributes"].erase("TEXCOORD_0");
+  EXPECT_EQ(kept({4, {1, 0, 0, 1}}).size(), 4u);
+}
+
+TEST_F(GltfTangents, MayBeQuantised) {
+  first_primitive()["attributes"]["TANGENT"] =
+      gltf.accessor(gltf.view({0, 127, 0, 129, 0, 127, 0, 129, 0, 127, 0, 129, 0, 127, 0, 129}),
+                    5120, "VEC4", 4, true);
+  gltf.json["extensionsRequired"] = {"KHR_mesh_quantization"};
+  EXPECT_EQ(load().meshes.at(0).tangents, std::vector<glm::vec4>(4, {0, 1, 0, -1}));
+}
+
+TEST_F(GltfTangents, AreReadOnlyWhereDirectionsMatter) {
+  ASSERT_EQ(kept({4, {0, 1, 0, 1}}).size(), 4u);
+  const Json normals = first_primitive()["attributes"]["NORMAL"];
+  first_primitive()["attributes"].erase("NORMAL");  // to be ignored then
+  EXPECT_THAT(load().meshes.at(0).tangents, IsEmpty());
+  first_primitive()["attributes"]["NORMAL"] = normals;
+  gltf.json["materials"][0] = Json::object();
+  EXPECT_THAT(load().meshes.at(0).tangents, IsEmpty());
+  gltf.json["materials"][0]["extensions"]["KHR_materials_anisotropy"]["anisotropyStrength"] = 0.5;
+  EXPECT_EQ(load().meshes.at(0).tangents.size(), 4u);
+}
+
+TEST_F(GltfTangents, ThatAreNoDirectionOrDeformAreNoted) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(kept({{0, 1, 0, 1}, {0, 0, 0, 1}, {nan, 0, 0, 1}, {0, 1, 0, 0}}),
+            (std::vector<glm::vec4>{{0, 1, 0, 1}, {}, {}, {}}));
+  EXPECT_THAT(load().notes, ElementsAre(HasSubstr("3 tangents are no direction")));
+  first_primitive()["targets"] = {{{"POSITION", gltf.positions(square)}}};
+  gltf.json["meshes"][0]["weights"] = {1};
+  EXPECT_THAT(kept({4, {0, 1, 0, 1}}), IsEmpty());
+  EXPECT_THAT(load().notes, Contains(HasSubstr("deforms, so that its tangents are not used")));
+  EXPECT_THAT(kept({4, {1, 0, 0, 1}}), IsEmpty());
+  EXPECT_THAT(load().notes, Not(Contains(HasSubstr("tangents"))));
+}
+
+// Of a normal that is turned to the front, +Y stays where it was.
+TEST_F(GltfTangents, KeepTheirPlusYWhereANormalIsTurned) {
+  first_primitive()["attributes"]["NORMAL"] = gltf.normals({4, {0, 0, -1}});
+  EXPECT_EQ(kept({4, {0, 1, 0, -1}}), std::vector<glm::vec4>(4, {0, 1, 0, 1}));
+}
+
 }  // namespace previz::test::gltf_mesh_test

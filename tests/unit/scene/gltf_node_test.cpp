@@ -133,6 +133,45 @@ TEST_F(GltfNodes, FiltersByNameWithWhatHangsBelow) {
             (directory / "test.gltf").string() + ": has no node \"iner\"; did you mean \"inner\"?");
 }
 
+// KHR_node_visibility: what is hidden is not there, with all that hangs below; its lamps neither.
+TEST_F(GltfNodes, LeavesOutWhatTheFileHides) {
+  const Json hidden = {{"KHR_node_visibility", {{"visible", false}}}};
+  const Json shown = {{"KHR_node_visibility", {{"visible", true}}}};
+  const int mesh = gltf.triangle_mesh();
+  gltf.json["extensions"]["KHR_lights_punctual"]["lights"] = R"([{"type": "point"}])"_json;
+  Json lamp = hidden;
+  lamp["KHR_lights_punctual"]["light"] = 0;
+  const int child = gltf.add("nodes", {{"name", "child"}, {"mesh", mesh}, {"extensions", shown}});
+  gltf.root("hidden", mesh, {{"children", {child}}, {"extensions", hidden}});
+  gltf.root("lamp", -1, {{"extensions", lamp}});
+  gltf.root("shown", mesh, {{"extensions", shown}});
+  gltf.root("plain", mesh, {{"extensions", {{"KHR_node_visibility", Json::object()}}}});
+  gltf.json["extensionsUsed"] = {"KHR_node_visibility", "KHR_lights_punctual"};
+  for (const bool is_required : {false, true}) {
+    if (is_required) gltf.json["extensionsRequired"] = {"KHR_node_visibility"};
+    const scene::Scene scene = load();
+    EXPECT_THAT(names_in(scene), ElementsAre("shown", "plain"));
+    EXPECT_THAT(scene.lights, IsEmpty());
+    EXPECT_THAT(scene.notes, IsEmpty());
+  }
+  gltf.json["nodes"][3]["extensions"]["KHR_node_visibility"]["visible"] = "no";
+  EXPECT_THAT(load().notes, ElementsAre(HasSubstr("its \"visible\" is neither true nor false")));
+}
+
+TEST_F(GltfNodes, ShowsAHiddenNodeThatTheObjectNames) {
+  const Json hidden = {{"KHR_node_visibility", {{"visible", false}}}};
+  const int mesh = gltf.triangle_mesh();
+  const int inner = gltf.add("nodes", {{"name", "inner"}, {"mesh", mesh}, {"extensions", hidden}});
+  const int child = gltf.add("nodes", {{"name", "child"}, {"mesh", mesh}, {"children", {inner}}});
+  gltf.root("hidden", mesh, {{"children", {child}}, {"extensions", hidden}});
+  object.nodes = {"child"};  // hidden by its parent
+  const scene::Scene scene = load();
+  EXPECT_THAT(names_in(scene), ElementsAre("child"));
+  EXPECT_THAT(scene.notes, ElementsAre(HasSubstr("node 1 \"child\": is hidden by the file")));
+  object.nodes = {"hidden", "inner"};
+  EXPECT_THAT(names_in(load()), ElementsAre("hidden", "child", "inner"));
+}
+
 TEST_F(GltfNodes, OfPhantomsArePrintedTagsByTheirNameOrAnAncestors) {
   const int child = gltf.add("nodes", {{"name", "Plane.002"}, {"mesh", gltf.triangle_mesh()}});
   gltf.root("tag 4", -1, {{"children", {child}}});

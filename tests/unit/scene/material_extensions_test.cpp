@@ -18,6 +18,7 @@ const std::map<std::string, std::set<std::string>> khronos_keys = {
       "clearcoatRoughnessTexture", "clearcoatNormalTexture"}},
     {"KHR_materials_emissive_strength", {}},
     {"KHR_materials_ior", {"ior"}},
+    {"KHR_materials_pbrSpecularGlossiness", {}},
     {"KHR_materials_sheen",
      {"sheenColorFactor", "sheenColorTexture", "sheenRoughnessFactor", "sheenRoughnessTexture"}},
     {"KHR_materials_specular",
