@@ -20,24 +20,28 @@ constexpr double most_times_white = 30;
 constexpr double nearest_m = 1;          // where a sheet is compared; a lamp's housing is nearer
 constexpr double lumens_per_watt = 683;  // glTF-Blender-IO, PBR_WATTS_TO_LUMENS
 
+// What a lamp's emission is, and what of it is compared with white.
 struct Unit {
   const char* in_file;
   const char* in_set;
   const char* what_is_compared;
+  double radiance;  // of that for an emission of 1, at 1 m
+  bool falls_off;   // with the square of the distance
 };
 
 Unit unit_of(set::LightType type) {
+  constexpr double of_white = 1 / std::numbers::pi;
   switch (type) {
     case set::LightType::point:
     case set::LightType::spot:
-      return {"cd", "W/sr", "a white sheet at 1 m"};
+      return {"cd", "W/sr", "a white sheet at 1 m", of_white, true};
     case set::LightType::directional:
-      return {"lux", "W/m^2", "a white sheet that faces it"};
+      return {"lux", "W/m^2", "a white sheet that faces it", of_white, false};
     case set::LightType::rectangle:
     case set::LightType::sphere:
       break;
   }
-  return {"", "W/sr/m^2", "the lamp itself"};
+  return {"", "W/sr/m^2", "the lamp itself", 1, false};
 }
 
 std::string figure(double value) {
@@ -48,20 +52,10 @@ double brightest_channel(const set::Light& light) {
   return std::max({light.emission.r, light.emission.g, light.emission.b});
 }
 
-// Returns the radiance of what Unit names; a sheet of a point or spot is at this distance.
+// Returns the radiance of what is compared, if a sheet is at this distance.
 double radiance_of(const set::Light& light, double distance_m) {
-  const double emission = brightest_channel(light);
-  switch (light.type) {
-    case set::LightType::point:
-    case set::LightType::spot:
-      return emission / std::numbers::pi / (distance_m * distance_m);
-    case set::LightType::directional:
-      return emission / std::numbers::pi;
-    case set::LightType::rectangle:
-    case set::LightType::sphere:
-      break;
-  }
-  return emission;
+  const Unit unit = unit_of(light.type);
+  return brightest_channel(light) * unit.radiance / (unit.falls_off ? distance_m * distance_m : 1);
 }
 
 std::string given_words(const Scene& scene, std::size_t light) {
@@ -138,12 +132,11 @@ struct Bright {
 std::string remark(const Scene& scene, const set::Object& object, const Bright& found,
                    const std::optional<double>& exposure) {
   const set::Light& light = scene.lights[found.light];
-  const bool is_directional = light.type == set::LightType::directional;
   const Unit unit = unit_of(light.type);
   const std::string others =
       found.count > 1 ? fmt::format(" (the worst of {})", found.count) : std::string();
   const std::string where =
-      is_directional ? "that faces it" : fmt::format("at {} m", figure(found.distance_m));
+      unit.falls_off ? fmt::format("at {} m", figure(found.distance_m)) : "that faces it";
   const double in_watts = found.times_white / lumens_per_watt;
   const std::string gains =
       object.lamp_gain == 1 && in_watts <= most_times_white
@@ -179,7 +172,7 @@ std::vector<std::string> remarks_on_bright_lamps(const Scene& scene, const set::
     if (object == no_object || !(radiance_of(light, nearest_m) > most_times_white * white))
       continue;
     double distance_m = nearest_m;
-    if (light.type != set::LightType::directional) {
+    if (unit_of(light.type).falls_off) {
       if (!surroundings) surroundings.emplace(scene, set);
       distance_m = surroundings->distance_m(light, object);
     }
