@@ -81,4 +81,8 @@ std::int64_t start_of(const Take& take) {
   return take.observer_stream->records().front().timestamp_ns;
 }
 
+double first_exposure(const Take& take) {
+  return take.set.observer.exposure.value_or(take.observer_stream->records().front().exposure);
+}
+
 }  // namespace previz::pipeline

@@ -45,6 +45,9 @@ std::string no_light_words();
 // Returns the timestamp (ns) of the take's first observer frame.
 std::int64_t start_of(const Take& take);
 
+// Returns the exposure of the take's first observer frame, or the one that the set gives instead.
+double first_exposure(const Take& take);
+
 // These return a camera's calibration: the set's own, otherwise the session's.
 // observer_calibration() throws previz::Error naming the set file if there is none.
 ObserverCalibration observer_calibration(const set::Set& set, const session::SessionInfo& session);

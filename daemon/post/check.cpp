@@ -35,6 +35,7 @@ set::CheckedSet open(const fs::path& set_or_session, set::Findings& findings,
     checked.set.light_camera.calibration = take.light;
     checked.has_track = !take.session.track.empty();
     checked.is_take = true;
+    checked.exposure = pipeline::first_exposure(take);
     findings.remarks = take.session.missing;
     if (!take.light_stream) checked.set.light_camera.driver = set::no_driver;
     return checked;
@@ -57,6 +58,7 @@ set::CheckedSet open(const fs::path& set_or_session, set::Findings& findings,
   const auto light_session = replayed("light_camera", light.driver, light.device);
   if (!observer.calibration) observer.calibration = observer_session.observer;
   if (!light.calibration) light.calibration = light_session.light;
+  checked.exposure = set::stated_exposure(checked.set);
   return checked;
 }
 
@@ -76,7 +78,7 @@ void describe(const set::CheckedSet& checked, const scene::Scene& scene, std::os
   tracking::describe(set.tracking, out);
   scene::describe_objects(set, scene, out);
   lighting::describe(set, out);
-  scene::describe_lamps(set, scene, out);
+  scene::describe_lamps(checked, scene, out);
   set::describe_estimator(set, out);
   if (!checked.is_take) output::describe(set, out);
   render::describe(set, scene, out);
@@ -101,7 +103,7 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
   if (!findings.problems.empty()) return refuse(findings.problems, out);
 
   set::remark_on_cameras(checked, findings);
-  scene::remark_on(*scene, checked.set, findings);
+  scene::remark_on(*scene, checked, findings);
   describe(checked, *scene, out);
   if (take) {
     const fit::Figure figure = fit_of_model(*take, *scene);

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <chrono>
 #include <cstdio>
+#include <iterator>
 #include <ostream>
 #include <set>
 #include <utility>
@@ -25,6 +26,7 @@
 #include "daemon/post/sums_folders.hpp"
 #include "daemon/report/report.hpp"
 #include "daemon/scene/check.hpp"
+#include "daemon/scene/lamp_strength.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/tracking/pose_judgement.hpp"
@@ -257,7 +259,10 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
                 pipeline::Metrics& metrics, const SumsFolders* sums, RenderReport& report,
                 std::ostream& out) {
   const scene::Scene scene = scene::load_scene(take.set);
-  for (const std::string& note : scene.notes) out << "scene: " << note << std::endl;
+  std::vector<std::string> notes = scene.notes;
+  std::ranges::move(scene::remarks_on_bright_lamps(scene, take.set, pipeline::first_exposure(take)),
+                    std::back_inserter(notes));
+  for (const std::string& note : notes) out << "scene: " << note << std::endl;
   if (hides_tags(take)) {
     out << "tags: printed tags are hidden" << std::endl;
     for (const std::string& remark : scene::remarks_on_hidden_tags(scene, take.set))

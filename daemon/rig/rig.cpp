@@ -10,6 +10,7 @@
 
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/assets.hpp"
+#include "daemon/scene/lamp_strength.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
 
@@ -467,6 +468,11 @@ void Rig::look_at_guides() {
 }
 
 void Rig::show_picture(pipeline::Shot shot) {
+  if (!std::exchange(are_lamps_judged_, true))
+    for (const std::string& what : scene::remarks_on_bright_lamps(
+             loaded_.scene, loaded_.set,
+             loaded_.set.observer.exposure.value_or(shot.frame->exposure)))
+      parts_.kept.reports(report::once({Severity::warning, "scene", what}));
   if (!shot.frozen) aim_.set(aim_of(shot, lens_));
   GuidesOf guides = guides_.look_at(shot);
   parts_.show(std::move(shot), *look_.get(), std::move(guides));

@@ -117,6 +117,7 @@ class Rig {
   int ticks_ = 0;
   std::optional<std::chrono::steady_clock::time_point> stopped_;  // when the stop was noticed
   bool is_take_closed_ = false;
+  bool are_lamps_judged_ = false;  // by the exposure of the first picture that was shown
   std::string reading_for_;  // who wants the set that is being read; empty: its file has changed
   std::string announced_;    // the last announcement that the bus knows of
   std::string fit_said_;     // the last figure that the bus knows of, in words

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/scene/lamp_strength.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/set/names.hpp"
 #include "daemon/set/problems.hpp"
@@ -73,11 +74,16 @@ std::vector<std::string> remarks_on_hidden_tags(const Scene& scene, const set::S
   return remarks;
 }
 
-void remark_on(const Scene& scene, const set::Set& set, set::Findings& findings) {
+void remark_on(const Scene& scene, const set::CheckedSet& checked, set::Findings& findings) {
+  const set::Set& set = checked.set;
   if (set.hides_tags)
     for (const std::string& remark : remarks_on_hidden_tags(scene, set))
       findings.remarks.push_back(remark);
   for (const auto& note : scene.notes) findings.remarks.push_back(note);
+  // What a radiance of 1 is to a live camera that exposes by itself, only its frames say.
+  if (checked.exposure || !set.observer.is_live())
+    for (const auto& remark : remarks_on_bright_lamps(scene, set, checked.exposure))
+      findings.remarks.push_back(remark);
   const auto has = [&](set::Presence presence) {
     return std::ranges::find(set.objects, presence, &set::Object::presence) != set.objects.end();
   };
@@ -120,7 +126,7 @@ void describe_objects(const set::Set& set, const Scene& scene, std::ostream& out
   }
 }
 
-void describe_lamps(const set::Set& set, const Scene& scene, std::ostream& out) {
+void describe_lamps(const set::CheckedSet& checked, const Scene& scene, std::ostream& out) {
   const auto print = [&](const std::string& name, const std::string& kind, double mixed,
                          double real, const glm::dvec3& tint, const std::string& more) {
     const char* change = real == 0                          ? "added"
@@ -134,12 +140,16 @@ void describe_lamps(const set::Set& set, const Scene& scene, std::ostream& out) 
     if (tint != glm::dvec3(1)) out << words(", tint ", tint.r, ' ', tint.g, ' ', tint.b);
     out << more << '\n';
   };
-  for (const auto& light : scene.lights)
+  for (std::size_t i = 0; i < scene.lights.size(); ++i) {
+    const set::Light& light = scene.lights[i];
+    std::string more;
+    if (light.captured) more = "; subtracted from the environment light";
+    more += light.measured ? ", which gives its brightness"
+                           : "; " + strength_words(scene, i, checked.exposure);
     print(light.name, set::name_of(light.type), light.gain_mixed, light.gain_real, light.tint,
-          light.captured ? words("; subtracted from the environment light",
-                                 light.measured ? ", which gives its brightness" : "")
-                         : "");
-  for (const auto& lamp : set.captured_lamps)
+          more);
+  }
+  for (const auto& lamp : checked.set.captured_lamps)
     print(lamp.name,
           words("within ", lamp.cone_rad * 180 / std::numbers::pi,
                 " degrees of its direction in the environment light"),

@@ -18,11 +18,12 @@ std::optional<Scene> check(const set::CheckedSet& checked, set::Findings& findin
 // not known what is under them.
 std::vector<std::string> remarks_on_hidden_tags(const Scene& scene, const set::Set& set);
 
-// Remarks on what was ignored in the files, and on sets whose picture is the plate's.
-void remark_on(const Scene& scene, const set::Set& set, set::Findings& findings);
+// Remarks on what was ignored in the files, on lamps that are too bright, and on sets whose picture
+// is the plate's.
+void remark_on(const Scene& scene, const set::CheckedSet& checked, set::Findings& findings);
 
-// Print the objects with their triangles and variants, and the lamps.
+// Print the objects with their triangles and variants, and the lamps with their strength.
 void describe_objects(const set::Set& set, const Scene& scene, std::ostream& out);
-void describe_lamps(const set::Set& set, const Scene& scene, std::ostream& out);
+void describe_lamps(const set::CheckedSet& checked, const Scene& scene, std::ostream& out);
 
 }  // namespace previz::scene

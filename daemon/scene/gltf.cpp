@@ -84,7 +84,7 @@ struct GltfFile::Loader {
   void keep_looks(std::uint32_t object_index);
   void note_backs();
   void add_light(const PlacedNode& placed, const glm::dmat4& world_from_node,
-                 std::uint32_t presence);
+                 const set::Object& object);
   std::optional<std::uint32_t> use_mesh(const MeshSource& source, const std::string& name,
                                         const std::string& what);
   std::optional<std::uint32_t> add_deformed(const MeshSource& source, const std::string& name,
@@ -145,7 +145,7 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
                  {instance, copies[i], i == 0, object.world_from_file * z_up_from_y_up, deforms});
       }
     }
-    add_light(placed, instance.world_from_object, instance.presence);
+    add_light(placed, instance.world_from_object, object);
     if (!played) continue;
     const std::uint32_t moved = played->use(placed.node, animation.nodes);
     if (moved == no_node) continue;
@@ -370,7 +370,7 @@ std::optional<std::uint32_t> GltfFile::Loader::use_mesh(const MeshSource& source
 
 // KHR_lights_punctual: a light shines along its node's -Z; scale does not change it.
 void GltfFile::Loader::add_light(const PlacedNode& placed, const glm::dmat4& world_from_node,
-                                 std::uint32_t presence) {
+                                 const set::Object& object) {
   const tinygltf::Node& node = model.nodes[static_cast<std::size_t>(placed.node)];
   const double index = number(extension(node.extensions, "KHR_lights_punctual"), "light", -1);
   if (index < 0) return;
@@ -409,12 +409,15 @@ void GltfFile::Loader::add_light(const PlacedNode& placed, const glm::dmat4& wor
   const std::vector<double> color =
       given.color.size() == 3 ? given.color : std::vector<double>{1, 1, 1};
   for (int i = 0; i < 3; ++i)
-    light.emission[i] = within(color[static_cast<std::size_t>(i)] * given.intensity, 0, 1e30,
-                               what + "'s colour or intensity", notes);
+    light.emission[i] =
+        within(color[static_cast<std::size_t>(i)] * given.intensity * object.lamp_gain, 0, 1e30,
+               what + "'s colour or intensity", notes);
   if (given.range > 0) notes.add(what + "'s range is ignored: light falls off with the square");
+  const std::uint32_t presence = presence_bits(object.presence);
   light.gain_mixed = (presence & world_mixed) != 0 ? 1 : 0;
   light.gain_real = (presence & world_real) != 0 ? 1 : 0;
   scene.lights.push_back(std::move(light));
+  scene.file_intensities.push_back(given.intensity);
 }
 
 GltfFile::GltfFile(const std::filesystem::path& file, Scene& scene, Budget& budget)

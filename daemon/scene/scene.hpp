@@ -206,12 +206,14 @@ struct Scene {
   std::vector<Texture> textures;
   // The lights of the set and of KHR_lights_punctual, in world space. Emissive meshes are not here:
   // the renderer finds them. glTF's photometric numbers are taken as radiometric ones, per channel
-  // of linear Rec. 709: candela as W/sr, lux as W/m^2. Gains follow the object's presence: virtual
-  // (1, 0), phantom (1, 1), removed (0, 1).
+  // of linear Rec. 709: candela as W/sr, lux as W/m^2, times the object's lamp_gain. Gains follow
+  // the object's presence: virtual (1, 0), phantom (1, 1), removed (0, 1).
   std::vector<set::Light> lights;
   // For each light, the index of the [[object]] whose file it came with; no_object for the set's
   // own lamps, which come last, in the set's order.
   std::vector<std::uint32_t> light_objects;
+  // For each light of an object, its intensity in the file: candela, or lux if it is directional.
+  std::vector<double> file_intensities;
   std::vector<Animation> animations;      // at most one per object
   std::vector<Deformation> deformations;  // of the meshes whose shape an animation changes
   std::vector<Variants> variants;         // of virtual objects: only they are changed by buttons

@@ -28,6 +28,15 @@ std::string plural(std::uint64_t number, const std::string& noun) {
   return grouped(number) + ' ' + noun + (number == 1 ? "" : "s");
 }
 
+std::optional<double> stated_exposure(const Set& set) {
+  const Observer& observer = set.observer;
+  if (observer.exposure) return observer.exposure;
+  const CameraSettings& settings = observer.camera.settings;
+  if (!settings.exposure_s) return {};
+  return *settings.exposure_s * settings.gain.value_or(1) *
+         (observer.calibration ? observer.calibration->responsivity : 1);
+}
+
 void check_cameras(const CheckedSet& checked, Findings& findings) {
   if (checked.is_take) return;
   for (const std::string& line : other_sizes(checked.set))

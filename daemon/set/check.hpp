@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <iosfwd>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -16,8 +17,9 @@ namespace previz::set {
 // A set with the calibrations in force put into it, and further facts about it.
 struct CheckedSet {
   Set set;
-  bool has_track = false;  // the session has poses
-  bool is_take = false;    // its cameras are recorded
+  bool has_track = false;          // the session has poses
+  bool is_take = false;            // its cameras are recorded
+  std::optional<double> exposure;  // of the film camera's first frame, where it is known
 };
 
 struct Findings {
@@ -40,6 +42,10 @@ std::string words(const Parts&... parts) {
   (text << ... << parts);
   return text.str();
 }
+
+// Returns the exposure that the set gives the film camera, itself or by its shutter time and gain;
+// nothing where only the frames know it.
+std::optional<double> stated_exposure(const Set& set);
 
 // Finds cameras that are set to another size than they are calibrated for, and remarks on what is
 // implausible (implausible.hpp) or has to come with the session.

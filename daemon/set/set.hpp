@@ -49,6 +49,8 @@ struct Observer {
   std::optional<ObserverCalibration> calibration;
   LensFit lens_fit;                // what calibrate tags refines the lens by
   std::optional<double> exposure;  // absolute; overrides the frames' own
+
+  bool is_live() const { return driver != replay_driver && driver != no_driver; }
 };
 
 struct LightCamera {
@@ -90,6 +92,7 @@ struct Object {
   std::string animation;           // name of the file's animation to play; empty: none
   bool loops = true;               // the animation restarts when it ends
   std::string variant;             // of the file's materials; empty: those without a variant
+  double lamp_gain = 1;            // times the emission of the file's lamps
 };
 
 enum class LightType { point, spot, directional, rectangle, sphere };

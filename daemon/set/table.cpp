@@ -180,6 +180,7 @@ Keys object_keys(ObjectDraft& o) {
       {"animation", &o.object.animation, plain, "The animation in the file that is played (nodes, joints of skins and weights of morph targets), in the time of the pictures: its name, its index from \"0\", or \"*\" for all of them at once. A wrong name is answered with a list of what there is. Default: nothing moves.", optional("\"walk\"")},
       {"loops", &o.object.loops, plain, "Loop the animation; false: it stops at its end."},
       {"variant", &o.object.variant, plain, "Material variant to show the object in (KHR_materials_variants); \"\" is the file without a variant. The action next_variant steps through the variants of a virtual object.", optional("\"blue\"")},
+      {"lamp_gain", &o.object.lamp_gain, gain, "Brightness factor of the lamps in the file (KHR_lights_punctual); surfaces that glow keep theirs. Candela are used as W/sr and lux as W/m^2, in the units of the set's radiance: 0.001464 (1 / 683) undoes the lumens per watt of Blender's \"standard\" lighting mode. `previzd check` compares each lamp with white."},
       {"position_m", &o.pose.position, place, "Position of the file's origin in the world.", optional("[0.2, 0.1, 0.0]")},
       {"rotation_deg", &o.pose.rotation, turn, "Rotation about world X, then Y, then Z, applied before the position.", optional("[0.0, 0.0, 45.0]")},
       {"scale", &o.scale, plain.within(1e-9, 1e6), "Scale factor, applied before the rotation."},

@@ -40,14 +40,26 @@ class Check : public testing::Test {
     write("stage.toml", set);
     return check_file("stage.toml");
   }
+  // Writes a file of a triangle and a sun in its plane.
+  void write_sun() {
+    std::string file = triangle("");
+    file.insert(1, R"("extensionsUsed": ["KHR_lights_punctual"], "extensions":
+      {"KHR_lights_punctual": {"lights": [{"type": "directional", "name": "sun",
+                                           "intensity": 100000}]}}, )");
+    const std::string plain = R"("nodes": [{"mesh": 0)";
+    file.replace(file.find(plain), plain.size(),
+                 plain + R"(, "extensions": {"KHR_lights_punctual": {"light": 0}})");
+    write("a.gltf", file);
+  }
   // Exit status for a set of one virtual object of a material, a glTF material's body.
   int check_material(const std::string& material) {
     write("a.gltf", triangle(material));
     return check(object);
   }
 
-  // A take of one black frame of 16x8 pixels by each camera.
-  void write_take(const char* set, const std::vector<std::string>& cameras) {
+  // A take of one black frame of 16x8 pixels by each camera, with the object's file if there is
+  // one.
+  void write_take(const char* set, const std::vector<std::string>& cameras, double exposure = 1) {
     session::SessionInfo info;
     info.set_text = set;
     info.observer.emplace();
@@ -55,11 +67,14 @@ class Check : public testing::Test {
         .width = 16, .height = 8, .fx = 20, .fy = 20, .cx = 7.5, .cy = 3.5};
     info.observer->lens = {.focal_length_m = 0.035, .f_number = 2.8, .focus_distance_m = 1.5};
     session::SessionWriter writer(directory_ / "take", info);
+    if (std::filesystem::exists(directory_ / "a.gltf"))
+      writer.add_asset("a.gltf", directory_ / "a.gltf");
     for (const std::string& camera : cameras) {
       Frame frame;
       frame.source = camera;
       frame.width = 16;
       frame.height = 8;
+      frame.exposure = exposure;
       frame.bytes.resize(frame_bytes(frame.format, frame.width, frame.height));
       writer.write(frame);
     }
@@ -220,6 +235,46 @@ TEST_F(Check, SaysHowMuchMemoryFramesTakeThatAreAveraged) {
     EXPECT_THAT(said_, Not(HasSubstr(words)));
   }
   expect_said("picture in the GPU's memory: about 837 MiB");
+}
+
+// E lux are E / pi times white at exposure 1. A live camera's is its shutter time times its gain
+// and responsivity; while it exposes by itself, nothing is known of its white.
+TEST_F(Check, ComparesLampsWithWhite) {
+  write_sun();
+  const std::string sun =
+      "sun: directional, added, gain 1 in the composite, 0 on the real set; 100000 lux in its "
+      "file: a white sheet that faces it is ";
+  const std::string too_bright = "  object \"a\": with its lamp \"sun\" of 100000 lux";
+  ASSERT_EQ(check(object), 0) << said_;
+  expect_said(sun + "31831 times white at exposure 1\n");
+  expect_said(too_bright);
+  ASSERT_EQ(check(object + "lamp_gain=1e-4\n"), 0) << said_;
+  expect_said(sun + "3.183 times white at exposure 1\n");
+  EXPECT_THAT(said_, Not(HasSubstr(too_bright)));
+  ASSERT_EQ(check("[observer]\nexposure=0.01\n" + object), 0) << said_;
+  expect_said(sun + "318.3 times white\n");
+  expect_said(too_bright);
+  ASSERT_EQ(check(live_set + object), 0) << said_;
+  expect_said(sun + "31831 times white at exposure 1\n");
+  EXPECT_THAT(said_, Not(HasSubstr(too_bright)));
+  ASSERT_EQ(check("[observer]\ndriver='v4l2'\ndevice='usb-camera'\n"
+                  "camera={exposure_s=0.004, gain=2.5}\n[light_camera]\ndriver='none'\n" +
+                  object),
+            0)
+      << said_;
+  expect_said(sun + "318.3 times white\n");
+  expect_said(too_bright);
+  for (const char* gain : {"-1", "inf", "nan", "1e7"})
+    EXPECT_EQ(check(object + "lamp_gain=" + gain + "\n"), 1) << gain;
+}
+
+// The take has the exposure of its frames, and lamp_gain as it was recorded.
+TEST_F(Check, ComparesLampsWithTheWhiteOfATake) {
+  write_sun();
+  write_take((object + "lamp_gain=0.25\n").c_str(), {"observer", "light"}, 0.02);
+  ASSERT_EQ(check_file("take"), 0) << said_;
+  expect_said("100000 lux in its file: a white sheet that faces it is 159.2 times white\n");
+  expect_said("set the object's lamp_gain = 0.00157 (just white)");
 }
 
 // One of a virtual object is chosen by the set, and all are there for the buttons.

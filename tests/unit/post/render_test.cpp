@@ -370,6 +370,29 @@ TEST_F(RenderSession, AnotherSetFileTakesTheSessionsAssetsWhereItHasNoOwn) {
   EXPECT_THAT(out_.str(), Not(HasSubstr("the set recorded with it")));
 }
 
+// Offline and live: a white sheet in 100000 lux is 31831 times white.
+TEST_F(RenderSession, ALampThatIsTooBrightIsSaidOnce) {
+  std::ofstream(directory_ / "sun.gltf") << R"({"asset": {"version": "2.0"},
+    "extensionsUsed": ["KHR_lights_punctual"], "extensions": {"KHR_lights_punctual":
+      {"lights": [{"type": "directional", "name": "sun", "intensity": 100000}]}},
+    "nodes": [{"extensions": {"KHR_lights_punctual": {"light": 0}}}],
+    "scene": 0, "scenes": [{"nodes": [0]}]})";
+  std::ofstream(directory_ / "set.toml", std::ios::app)
+      << "[[object]]\nname = \"lamps\"\nfile = \"sun.gltf\"\npresence = \"virtual\"\n";
+  RenderOptions options = of_frames(0, 1);
+  options.set_file = directory_ / "set.toml";
+  const auto times_said = [&] {
+    const std::string said = out_.str(), words = "is 31831 times white: ";
+    const auto at = said.find(words);
+    return at == std::string::npos ? 0 : said.find(words, at + 1) == std::string::npos ? 1 : 2;
+  };
+  render(options);
+  EXPECT_EQ(times_said(), 1) << out_.str();
+  out_.str("");
+  rig::run_live(live_options(), reports_);
+  EXPECT_EQ(times_said(), 1) << out_.str();
+}
+
 // The set of a take from elsewhere does not choose a folder to write into; the crew does.
 TEST_F(RenderSession, ATakesOwnSetWritesNowhereElse) {
   const std::filesystem::path elsewhere = directory_ / "elsewhere";
