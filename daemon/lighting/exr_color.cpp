@@ -125,10 +125,10 @@ Said named(const std::string& attribute, const std::string& value,
   if (found == space_names.end())
     throw Error(
         says +
-        ", which is not known as linear light; convert the file: oiiotool IN --colorconvert "
-        "\"" +
+        ", which is not known as linear light; convert the file with an OpenColorIO configuration "
+        "that has it: oiiotool --colorconfig CONFIG.ocio IN --colorconvert \"" +
         value.substr(0, 60) +
-        "\" lin_rec709 --eraseattrib \"chromaticities|colorInteropID\" -o OUT.exr");
+        "\" lin_rec709 --eraseattrib chromaticities --eraseattrib colorInteropID -o OUT.exr");
   if (found->space.kind == Space::Kind::data)
     throw Error(says + ", which holds no colours; export the picture of the light instead");
   return {fmt::format("{} \"{}\"", attribute, value), found->space};
@@ -208,7 +208,7 @@ std::optional<ColorMatrix> rec709_from(const Imf::Header& header, ExrChannels ch
       std::ranges::all_of(said, [](const Said& s) { return s.space.kind == Space::Kind::unsaid; }))
     notes.push_back(fmt::format(
         "{}: {} names no colour space; its values are used as linear Rec. 709; convert others: "
-        "oiiotool IN --colorconvert FROM lin_rec709 -o OUT.exr",
+        "oiiotool --colorconfig CONFIG.ocio IN --colorconvert FROM lin_rec709 -o OUT.exr",
         path.string(), said.front().attribute));
   std::erase_if(said, [](const Said& s) { return !s.space.has_primaries(); });
   // A grey of any primaries is a grey of Rec. 709.
