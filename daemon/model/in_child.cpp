@@ -11,6 +11,7 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
+#include <new>
 #include <string_view>
 
 #include "drivers/error.hpp"
@@ -32,16 +33,25 @@ std::string all_of(int pipe) {
 }
 
 // The first letter says what follows: a result, or the words of an error.
-[[noreturn]] void work_and_end(int pipe, const std::function<std::string()>& work) {
-  const rlimit cpu{most_cpu_s, most_cpu_s};
-  ::setrlimit(RLIMIT_CPU, &cpu);
-  const rlimit no_core{0, 0};
-  ::setrlimit(RLIMIT_CORE, &no_core);
+[[noreturn]] void work_and_end(const std::string& subject, int pipe,
+                               const std::function<std::string()>& work) {
+  const auto limit = [](__rlimit_resource_t what, rlim_t most) {
+    const rlimit limits{most, most};
+    ::setrlimit(what, &limits);
+  };
+  limit(RLIMIT_CPU, most_cpu_s);
+  limit(RLIMIT_CORE, 0);
+#ifndef __SANITIZE_ADDRESS__
+  limit(RLIMIT_AS, static_cast<rlim_t>(::sysconf(_SC_PHYS_PAGES)) / 4 * 3 *
+                       static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)));
+#endif
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTERM, SIGINT})
     ::signal(signal, SIG_DFL);
   std::string bytes;
   try {
     bytes = 'r' + work();
+  } catch (const std::bad_alloc&) {
+    bytes = "e" + subject + ": needs more memory than three quarters of this computer's";
   } catch (const std::exception& error) {
     bytes = std::string("e") + error.what();
   }
@@ -62,7 +72,7 @@ std::string in_child(const std::string& subject, const std::function<std::string
   const pid_t child = ::fork();
   if (child == 0) {
     ::close(pipe[0]);
-    work_and_end(pipe[1], work);
+    work_and_end(subject, pipe[1], work);
   }
   ::close(pipe[1]);
   std::string bytes = child > 0 ? all_of(pipe[0]) : std::string();
@@ -79,9 +89,10 @@ std::string in_child(const std::string& subject, const std::function<std::string
         ::strsignal(WTERMSIG(status))));
   if (status != 0 || bytes.empty())
     throw Error(subject + ": the process that reads it ended without a result; try again");
-  const std::string rest = bytes.substr(1);
-  if (bytes[0] == 'e') throw Error(rest);
-  return rest;
+  const bool is_error = bytes[0] == 'e';
+  bytes.erase(0, 1);
+  if (is_error) throw Error(bytes);
+  return bytes;
 }
 
 }  // namespace previz::model

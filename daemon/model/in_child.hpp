@@ -6,9 +6,10 @@
 
 namespace previz::model {
 
-// Returns what `work` returns in a process of its own, which has at most ten minutes of CPU time.
-// A previz::Error that it throws is thrown here. Throws previz::Error, "SUBJECT: ...", if the
-// process ends otherwise. What the work changes is lost.
+// Returns what `work` returns in a process of its own, which has at most ten minutes of CPU time
+// and three quarters of the computer's memory. A previz::Error that it throws is thrown here.
+// Throws previz::Error, "SUBJECT: ...", if the process ends otherwise. What the work changes is
+// lost.
 std::string in_child(const std::string& subject, const std::function<std::string()>& work);
 
 }  // namespace previz::model

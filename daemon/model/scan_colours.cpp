@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
-#include <cstdlib>
 
 #include "daemon/model/scan_text.hpp"
 #include "daemon/scene/named_file.hpp"
@@ -24,9 +22,13 @@ constexpr std::uintmax_t most_texture_bytes = std::uintmax_t{1} << 30;
 std::optional<std::filesystem::path> ScanTextures::find(const std::string& written) {
   const auto found = scene::find_named_file(file_, written, scene::names_in_scans);
   if (!found) return {};
-  if (const std::string note = scene::note_of_other_name(*found, "file", written); !note.empty())
-    notes_.push_back(note);
+  if (const std::string other = scene::note_of_other_name(*found, "file", written); !other.empty())
+    note(other);
   return found->path;
+}
+
+void ScanTextures::note(const std::string& text) {
+  if (std::ranges::find(notes_, text) == notes_.end()) notes_.push_back(text);
 }
 
 int ScanTextures::named(const std::string& written) {

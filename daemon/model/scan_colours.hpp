@@ -45,6 +45,7 @@ class ScanTextures {
   std::optional<std::filesystem::path> find(const std::string& written);
 
   std::vector<ScanPicture> take() { return std::move(pictures_); }
+  void note(const std::string& text);  // each once
   const std::vector<std::string>& notes() const { return notes_; }
 
  private:

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <cstring>
 #include <glm/mat4x4.hpp>
+#include <glm/matrix.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -81,7 +82,7 @@ class Unpacker {
   void list(T& values) {
     std::uint64_t count = 0;
     (*this)(count);
-    if (count > rest_.size()) fail();
+    if (count > rest_.size() / sizeof(values[0])) fail();
     values.resize(count);
     take(values.data(), count * sizeof(values[0]));
   }
@@ -163,10 +164,11 @@ class FbxReader {
       const aiColor4D& c = mesh.mColors[0][v];
       found_.luma.back() = luma_of({c.r, c.g, c.b}, false);
     }
+    const bool is_mirrored = glm::determinant(to_file) < 0;  // then faces are turned
     for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
       const aiFace& face = mesh.mFaces[f];
       for (unsigned k = 0; k < face.mNumIndices; ++k) {
-        const unsigned index = face.mIndices[k];
+        const unsigned index = face.mIndices[is_mirrored ? face.mNumIndices - 1 - k : k];
         const bool is_there = index < mesh.mNumVertices;
         found_.corners.push_back(is_there ? first + index : no_index);
         found_.corner_uvs.push_back(is_there && has_uvs ? first_uv + index : no_index);

@@ -25,8 +25,8 @@ class GltfScanReader {
   GltfScanReader(const std::filesystem::path& path, ScanTextures* textures)
       : path_(path.string()),
         textures_(textures),
-        about_looks_(path_),
-        model_(scene::read_gltf(path, about_looks_, names_in_gltf)),
+        about_file_(path_),
+        model_(scene::read_gltf(path, about_file_, names_in_gltf)),
         notes_(path_) {}
 
   FoundSurface read(ScanFile& file) {
@@ -41,7 +41,10 @@ class GltfScanReader {
     }
     file.unit_m = 1;
     file.up = {0, 1, 0};
-    file.notes = notes_.lines();
+    for (std::string& note : about_file_.lines())
+      if (note.find(": the extension \"") == std::string::npos)  // most are about looks
+        file.notes.push_back(std::move(note));
+    for (std::string& note : notes_.lines()) file.notes.push_back(std::move(note));
     return std::move(found_);
   }
 
@@ -104,29 +107,28 @@ class GltfScanReader {
     const scene::LookTexture used =
         scene::look_texture(model_.materials[static_cast<std::size_t>(material)], what, notes_);
     if (used.texture < 0) return {};
-    const auto [at, is_new] = pictures_.try_emplace(used.texture, colourless);
-    if (is_new) at->second = picture(used.texture);
-    return {at->second, used.mapping};
+    return {picture(used.texture), used.mapping};
   }
 
   int picture(int texture) {
     const auto [image, missing] = scene::image_of(model_, texture, path_);
+    if (const auto known = pictures_.find(image); known != pictures_.end()) return known->second;
     if (image < 0) {
       notes_.add(missing + "; the scan has no colours there");
       return colourless;
     }
     const scene::EncodedImage encoded = scene::encoded_image(model_, image, path_, names_in_gltf);
     if (!encoded.note.empty()) notes_.add(encoded.note);
-    return textures_->encoded(encoded.bytes, encoded.name);
+    return pictures_[image] = textures_->encoded(encoded.bytes, encoded.name);
   }
 
   std::string path_;
   ScanTextures* textures_;
-  scene::Notes about_looks_;  // of extensions that change nothing but what a scan looks like
+  scene::Notes about_file_;
   tinygltf::Model model_;
   scene::Notes notes_;
   scene::Budget budget_;
-  std::map<int, int> pictures_;  // of textures
+  std::map<int, int> pictures_;  // of images
   FoundSurface found_;
 };
 

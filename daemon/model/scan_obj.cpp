@@ -30,45 +30,25 @@ struct ObjMaterial {
 };
 using ObjMaterials = std::map<std::string, ObjMaterial>;
 
-// Options of maps, and how many words follow each; of the last three there may be fewer.
-struct MapOption {
-  std::string_view name;
-  int words;
-  std::optional<double> neutral = {};  // numbers that move nothing
-};
-constexpr std::array map_options{
-    MapOption{"-blendu", 1},  MapOption{"-blendv", 1}, MapOption{"-boost", 1},
-    MapOption{"-bm", 1},      MapOption{"-cc", 1},     MapOption{"-clamp", 1},
-    MapOption{"-imfchan", 1}, MapOption{"-mm", 2},     MapOption{"-texres", 1},
-    MapOption{"-type", 1},    MapOption{"-o", 3, 0},   MapOption{"-s", 3, 1},
-    MapOption{"-t", 3, 0}};
-
-bool is_number(std::string_view word) {
-  double number = 0;
-  const auto read = std::from_chars(word.data(), word.data() + word.size(), number);
-  return read.ec == std::errc() && read.ptr == word.data() + word.size();
-}
-
+// Options have a word behind them, -mm two, and those that move the texture up to three numbers.
 ObjMap map_of(std::string_view line) {
   ObjMap map;
   for (;;) {
     std::string_view rest = line;
-    const std::string word = in_lower_case(next_word(rest));
-    const auto option = std::ranges::find(map_options, word, &MapOption::name);
-    if (option == map_options.end()) break;
-    line = rest;
-    for (int k = 0; k < option->words; ++k) {
-      const std::string_view value = next_word(rest);
-      if (option->neutral && !is_number(value)) break;
-      if (option->neutral && std::abs(number_in(value).value_or(0) - *option->neutral) > 1e-6)
-        map.is_moved = true;
+    const std::string option = in_lower_case(next_word(rest));
+    if (!option.starts_with('-') || option.find('.') != std::string::npos) break;
+    const bool moves = option == "-o" || option == "-s" || option == "-t";
+    const double neutral = option == "-s" ? 1 : 0;
+    for (int k = 0; k < (moves ? 3 : option == "-mm" ? 2 : 1); ++k) {
+      line = rest;
+      const std::string_view word = next_word(rest);
+      const auto number = number_in(word);
+      if (moves && (!number || word.find_first_not_of("+-.,0123456789eE") < word.size())) break;
+      if (moves && std::abs(*number - neutral) > 1e-6) map.is_moved = true;
       line = rest;
     }
   }
-  std::string_view name = trimmed(line);
-  if (name.size() > 1 && name.starts_with('"') && name.ends_with('"'))
-    name = name.substr(1, name.size() - 2);
-  map.file = name;
+  map.file = without_quotes(line.substr(0, line.find(" #")));
   return map;
 }
 
@@ -96,25 +76,31 @@ class ObjReader {
     if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
     std::string joined;
     while (!text.empty()) {
-      std::string_view line = next_line(text);
-      if (trimmed(line).ends_with('\\')) {
-        joined = line;
-        do {
-          joined.resize(trimmed(joined).data() + trimmed(joined).size() - 1 - joined.data());
-          joined.append(" ").append(next_line(text));
-        } while (!text.empty() && trimmed(joined).ends_with('\\'));
-        line = joined;
+      std::string_view part = next_line(text);
+      if (!continues(part) || trimmed(part).starts_with('#')) {
+        read_line(part);
+        continue;
       }
-      read_line(line);
+      joined.clear();
+      for (;; part = next_line(text)) {
+        joined.append(part.substr(0, continues(part) ? part.rfind('\\') : part.size())).append(" ");
+        if (!continues(part) || text.empty()) break;
+      }
+      read_line(joined);
     }
     if (textures_) {
       find_textures();
       if (has_colours_) colours_.finish(found_.luma);
     }
+    found_.step = steps_.step();
+    found_.is_step_of_text = true;
     return std::move(found_);
   }
 
  private:
+  // Returns whether the next line belongs to this one.
+  static bool continues(std::string_view line) { return trimmed(line).ends_with('\\'); }
+
   void read_line(std::string_view line) {
     const std::string_view word = next_word(line);
     if (word == "v") {
@@ -130,23 +116,26 @@ class ObjReader {
       const std::string name(trimmed(line));
       material_ = names_.try_emplace(name, static_cast<int>(names_.size())).first->second;
     } else if (word == "mtllib") {
-      read_library(trimmed(line));
+      read_library(without_quotes(line));
     }
   }
 
   // x y z, x y z w, or x y z r g b.
   void read_vertex(std::string_view line) {
     std::array<double, 6> numbers{};
+    std::array<std::string_view, 3> words;
     std::size_t count = 0;
     while (count < numbers.size()) {
       const std::string_view word = next_word(line);
       const auto number = word.starts_with('#') ? std::nullopt : number_in(word);
       if (!number) break;
+      if (count < words.size()) words[count] = word;
       numbers[count++] = *number;
     }
     glm::dvec3 p(numbers[0], numbers[1], numbers[2]);
     if (count < 3) p = glm::dvec3(std::numeric_limits<double>::quiet_NaN());
     if (count == 4 && numbers[3] != 0) p /= numbers[3];
+    for (std::size_t k = 0; k < words.size(); ++k) steps_.add(k, numbers[k], words[k]);
     found_.points.push_back(p);
     if (!textures_) return;
     has_colours_ |= count == numbers.size();
@@ -206,13 +195,13 @@ class ObjReader {
   }
 
   int picture_of(const std::string& name) {
-    auto material = materials_.find(name);
-    if (material == materials_.end())
-      material = std::ranges::find_if(materials_, [&](const auto& entry) {
-        return in_lower_case(entry.first) == in_lower_case(name);
-      });
-    if (material == materials_.end()) return colourless;
-    const auto& [colour, emission] = material->second;
+    if (lower_.empty())
+      for (const auto& [known, material] : materials_)
+        lower_.try_emplace(in_lower_case(known), &material);
+    const auto exact = materials_.find(name);
+    const auto similar = lower_.find(in_lower_case(name));
+    if (exact == materials_.end() && similar == lower_.end()) return colourless;
+    const auto& [colour, emission] = exact != materials_.end() ? exact->second : *similar->second;
     const ObjMap& map = colour.file.empty() ? emission : colour;
     if (map.file.empty()) return colourless;
     if (map.is_moved)
@@ -226,6 +215,8 @@ class ObjReader {
   const std::filesystem::path& file_;
   ScanTextures* textures_;
   ObjMaterials materials_;
+  std::map<std::string, const ObjMaterial*> lower_;  // by their names in small letters
+  TextSteps steps_;
   std::set<std::filesystem::path> libraries_;
   std::map<std::string, int> names_;  // that usemtl has, numbered
   int material_ = colourless;         // number of the name in use

@@ -179,9 +179,10 @@ class PlyHeaderReader {
   }
 
   static void add_picture(std::string_view line, Header& header) {
-    const std::string word = in_lower_case(next_word(line));
+    std::string word = in_lower_case(next_word(line));
+    if (word.ends_with(':')) word.pop_back();
     if (word != "texturefile" && word != "texture_file") return;
-    if (const std::string_view name = trimmed(line); !name.empty())
+    if (const std::string_view name = without_quotes(line); !name.empty())
       header.pictures.emplace_back(name);
   }
 
@@ -190,6 +191,9 @@ class PlyHeaderReader {
     element.name = in_lower_case(next_word(line));
     if (element.name == "vertices") element.name = "vertex";
     if (element.name == "faces") element.name = "face";
+    if (element.name == "vertex" &&
+        std::ranges::find(header.elements, element.name, &Element::name) != header.elements.end())
+      fail("its header has two elements of vertices");
     const std::string_view word = next_word(line);
     const auto count = number_in(word);
     if (!count || !(*count >= 0 && *count < 1e15) || *count != std::floor(*count))
@@ -267,6 +271,9 @@ class PlyValues {
     return std::min<std::uint64_t>(count, bytes_.size() / least_bytes);
   }
 
+  // Returns the last value as a text has it.
+  std::string_view word() const { return word_; }
+
   // Begins with an element's values, whose line in a text may have more values than the last
   // element had properties.
   void begin_element() {
@@ -292,7 +299,8 @@ class PlyValues {
   }
 
   double next_word_as_number() {
-    const std::optional<double> number = number_in(next_word(bytes_));
+    word_ = next_word(bytes_);
+    const std::optional<double> number = number_in(word_);
     if (!number) fail();
     is_in_line_ = true;
     return *number;
@@ -302,6 +310,7 @@ class PlyValues {
   Format format_;
   std::string_view bytes_;
   bool is_in_line_ = false;
+  std::string_view word_;
 };
 
 // The colours of vertices, of which text and binary files have integers or floats.
@@ -392,12 +401,18 @@ class PlyReader {
     }
     colours.finish(found_.luma);
     if (is_single) found_.step = single_step * farthest;
+    if (header_.format == Format::text) found_.step = steps_.step();
+    found_.is_step_of_text = header_.format == Format::text;
   }
 
   // A single value goes to `values`; a list goes to corners_ and uvs_.
   void read(const Property& property, std::array<double, roles>& values) {
     if (!property.count) {
-      values[static_cast<std::size_t>(property.role)] = values_.next(property.type);
+      const double value = values_.next(property.type);
+      values[static_cast<std::size_t>(property.role)] = value;
+      if (property.role >= Role::x && property.role <= Role::z && header_.format == Format::text)
+        steps_.add(static_cast<std::size_t>(property.role) - static_cast<std::size_t>(Role::x),
+                   value, values_.word());
       return;
     }
     std::vector<double>* const list = property.role == Role::corners      ? &corners_
@@ -439,8 +454,12 @@ class PlyReader {
   }
 
   int picture_of(double number) const {
-    if (!(number >= 0 && number < static_cast<double>(pictures_.size()))) return colourless;
-    return pictures_[static_cast<std::size_t>(number)];
+    if (pictures_.size() == 1) return pictures_[0];
+    if (number >= 0 && number < static_cast<double>(pictures_.size()))
+      return pictures_[static_cast<std::size_t>(number)];
+    if (!pictures_.empty())
+      textures_->note("faces whose texnumber has no texture in the header have no colour");
+    return colourless;
   }
 
   void add_corner(std::size_t k) {
@@ -481,6 +500,7 @@ class PlyReader {
   std::vector<int> pictures_;
   bool has_vertex_uvs_ = false;
   std::vector<double> corners_, uvs_;
+  TextSteps steps_;
   FoundSurface found_;
 };
 

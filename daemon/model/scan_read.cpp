@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <fstream>
 #include <string>
 
 #include "daemon/model/scan_fbx.hpp"
@@ -17,8 +18,19 @@
 namespace previz::model {
 namespace {
 
+// Returns the ending of a file's name, or that of the format that its first bytes are of.
+std::string ending_by_content(const std::filesystem::path& path) {
+  std::string head(18, '\0');
+  std::ifstream(path, std::ios::binary)
+      .read(head.data(), static_cast<std::streamsize>(head.size()));
+  if (head.starts_with("ply\n") || head.starts_with("ply\r")) return ".ply";
+  if (head == "Kaydara FBX Binary") return ".fbx";
+  if (head.starts_with("glTF")) return ".glb";
+  return in_lower_case(path.extension().string());
+}
+
 FoundSurface found_in(const std::filesystem::path& path, ScanTextures* textures, ScanFile& file) {
-  const std::string extension = in_lower_case(path.extension().string());
+  const std::string extension = ending_by_content(path);
   if (extension == ".obj") return read_obj(path, scan_bytes(path), textures);
   if (extension == ".ply") return read_ply(path, scan_bytes(path), textures);
   if (extension == ".stl") return read_stl(path, scan_bytes(path));

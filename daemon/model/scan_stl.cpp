@@ -46,6 +46,7 @@ FoundSurface read_binary(std::string_view bytes, std::size_t facets) {
 
 FoundSurface read_text(const std::filesystem::path& file, std::string_view text) {
   FoundSurface found;
+  TextSteps steps;
   while (!text.empty()) {
     const std::string word = in_lower_case(next_word(text));
     if (word == "solid" || word == "endsolid") {
@@ -53,10 +54,12 @@ FoundSurface read_text(const std::filesystem::path& file, std::string_view text)
     } else if (word == "vertex") {
       glm::dvec3 p;
       for (glm::length_t k = 0; k < 3; ++k) {
-        const auto number = number_in(next_word(text));
+        const std::string_view digits = next_word(text);
+        const auto number = number_in(digits);
         if (!number)
           throw Error(file.string() + ": has a vertex without three numbers; export it again");
         p[k] = *number;
+        steps.add(static_cast<std::size_t>(k), *number, digits);
       }
       found.corners.push_back(static_cast<std::uint32_t>(found.points.size()));
       found.points.push_back(p);
@@ -64,6 +67,8 @@ FoundSurface read_text(const std::filesystem::path& file, std::string_view text)
       found.end_face(colourless);
     }
   }
+  found.step = steps.step();
+  found.is_step_of_text = true;
   return found;
 }
 
@@ -74,6 +79,7 @@ FoundSurface read_stl(const std::filesystem::path& file, std::string_view bytes)
   const std::size_t fit = bytes.size() < head_bytes ? 0 : (bytes.size() - head_bytes) / facet_bytes;
   if (bytes.size() >= head_bytes && bytes.size() == head_bytes + facet_bytes * facets)
     return read_binary(bytes, facets);
+  if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
   std::string_view start = bytes.substr(0, 1000);
   if (in_lower_case(next_word(start)) == "solid" &&
       in_lower_case(bytes.substr(0, 2000)).find("facet") != std::string::npos)

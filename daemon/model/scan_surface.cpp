@@ -77,9 +77,12 @@ class Polygon {
     const std::size_t n = left.size();
     const std::size_t a = left[(i + n - 1) % n], b = left[i], c = left[(i + 1) % n];
     if (!(turn(a, b, c) > 0)) return false;
+    const auto is_corner =
+        [&](std::size_t p) {  // holes are joined to the border by two equal edges
+          return flat_[p] == flat_[a] || flat_[p] == flat_[b] || flat_[p] == flat_[c];
+        };
     return std::ranges::none_of(left, [&](std::size_t p) {
-      return p != a && p != b && p != c && turn(a, b, p) >= 0 && turn(b, c, p) >= 0 &&
-             turn(c, a, p) >= 0;
+      return !is_corner(p) && turn(a, b, p) >= 0 && turn(b, c, p) >= 0 && turn(c, a, p) >= 0;
     });
   }
 
@@ -152,6 +155,7 @@ class Builder {
     file_.colours.uvs.shrink_to_fit();
     file_.colours.luma.shrink_to_fit();
     file_.step = found_.step;
+    file_.is_step_of_text = found_.is_step_of_text;
   }
 
  private:
@@ -185,7 +189,8 @@ class Builder {
     next_.push_back(no_index);
     if (has_colours_) {
       file_.colours.uvs.push_back(uv);
-      file_.colours.luma.push_back(found_.luma.empty() ? std::uint8_t{0} : found_.luma[point]);
+      file_.colours.luma.push_back(point < found_.luma.size() ? found_.luma[point]
+                                                              : std::uint8_t{0});
     }
     return added;
   }

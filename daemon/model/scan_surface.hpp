@@ -28,6 +28,7 @@ struct FoundSurface {
   std::vector<std::uint32_t> ends;        // of faces among the corners; empty: all are triangles
   std::vector<int> sources;               // of faces (ScanColours); empty: they have no texture
   double step = 0;                        // as ScanFile::step
+  bool is_step_of_text = false;           // likewise
 
   // Ends a face of the corners that were added since the last one.
   void end_face(int source);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <fstream>
 #include <limits>
@@ -49,6 +50,12 @@ std::string_view trimmed(std::string_view line) {
   return line.substr(0, line.find_last_not_of(white) + 1);
 }
 
+std::string_view without_quotes(std::string_view name) {
+  name = trimmed(name);
+  const bool is_quoted = name.size() > 1 && name.starts_with('"') && name.ends_with('"');
+  return is_quoted ? name.substr(1, name.size() - 2) : name;
+}
+
 std::string in_lower_case(std::string_view text) {
   std::string lower(text);
   std::ranges::transform(lower, lower.begin(),
@@ -64,7 +71,7 @@ std::optional<double> number_in(std::string_view word) {
     word = {with_point.data(), word.size()};
   }
   if (word.starts_with('+')) word.remove_prefix(1);
-  if (word.find('#') != std::string_view::npos) return std::numeric_limits<double>::quiet_NaN();
+  if (word.find(".#") != std::string_view::npos) return std::numeric_limits<double>::quiet_NaN();
   double number = 0;
   const auto read = std::from_chars(word.data(), word.data() + word.size(), number);
   if (read.ec == std::errc::result_out_of_range)
@@ -75,6 +82,36 @@ std::optional<double> number_in(std::string_view word) {
                : 0.0;
   if (read.ec != std::errc()) return {};
   return number;
+}
+
+void TextSteps::add(std::size_t axis, double value, std::string_view word) {
+  const std::size_t point = word.find_first_of(".,"), exponent = word.find_first_of("eE");
+  int last_digit = 0;  // the power of ten of the last digit
+  if (point < word.size())
+    last_digit = -static_cast<int>(std::min(exponent, word.size()) - point - 1);
+  if (exponent < word.size()) {
+    const char* const from =
+        word.data() + exponent + (word.substr(exponent + 1).starts_with('+') ? 2 : 1);
+    int power = 0;
+    std::from_chars(from, word.data() + word.size(), power);
+    last_digit += std::clamp(power, -300, 300);
+  }
+  Axis& a = axes_.at(axis);
+  a.finest = std::min(a.finest, std::pow(10.0, last_digit));
+  if (!std::isfinite(value)) return;
+  a.low = std::min(a.low, value);
+  a.high = std::max(a.high, value);
+}
+
+double TextSteps::step() const {
+  constexpr double far = 16;  // extents
+  double coarsest = 0;
+  for (const Axis& a : axes_) {
+    const double farthest = std::max(std::abs(a.low), std::abs(a.high));
+    if (a.high > a.low && farthest > far * (a.high - a.low))
+      coarsest = std::max(coarsest, a.finest);
+  }
+  return coarsest;
 }
 
 }  // namespace previz::model

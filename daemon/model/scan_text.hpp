@@ -1,7 +1,9 @@
 // Takes the files of scans apart into lines, words and numbers.
 #pragma once
 
+#include <array>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,11 +24,32 @@ std::string_view next_word(std::string_view& line);
 // Returns a line without white space at its ends.
 std::string_view trimmed(std::string_view line);
 
+// Returns a trimmed name without the quotation marks that some programs put around it.
+std::string_view without_quotes(std::string_view name);
+
 std::string in_lower_case(std::string_view text);
 
 // Returns the number that a word begins with, whose decimal sign may be a comma; what is written
 // for infinity and for what is not a number, 1.#IND for example, is not finite. Returns nothing
 // for other words.
 std::optional<double> number_in(std::string_view word);
+
+// The steps of coordinates that are written with few digits.
+class TextSteps {
+ public:
+  // Adds a coordinate along axis 0, 1 or 2 as it is written.
+  void add(std::size_t axis, double value, std::string_view word);
+
+  // Returns the finest step along the axis where it is coarsest, of those along which the scan is
+  // far from the origin: on others few digits mean little. 0 if there is none.
+  double step() const;
+
+ private:
+  struct Axis {
+    double finest = std::numeric_limits<double>::infinity();
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+  };
+  std::array<Axis, 3> axes_;
+};
 
 }  // namespace previz::model

@@ -154,12 +154,14 @@ void insist_on_fine_steps(const std::string& subject, const ScanPart& part, cons
                                  : most_step_without_unit * diagonal;
   if (file.step <= most) return;
   throw Error(fmt::format(
-      "{}: {} keeps its coordinates in single precision, which as far from the origin as {} to {} "
-      "has steps of {:.2g} units, so that its surface is no longer smooth; subtract {} from its "
-      "coordinates in the program that made it before it is exported, or export it as OBJ, or as "
-      "PLY with coordinates of type double",
-      subject, part.file.filename().string(), in_words(low, diagonal), in_words(high, diagonal),
-      file.step, in_words(glm::round(0.5 * (low + high)), 1e4)));
+      "{}: {} keeps its coordinates {}, which as far from the origin as {} to {} has steps of "
+      "{:.2g} units, so that its surface is no longer smooth; subtract {} from its coordinates in "
+      "the program that made it before it is exported, or export it {}",
+      subject, part.file.filename().string(),
+      file.is_step_of_text ? "with few digits" : "in single precision", in_words(low, diagonal),
+      in_words(high, diagonal), file.step, in_words(glm::round(0.5 * (low + high)), 1e4),
+      file.is_step_of_text ? "with more digits"
+                           : "as OBJ with all digits, or as PLY with coordinates of type double"));
 }
 
 // The mesh must have triangles; both are in the file's unit.
