@@ -219,7 +219,10 @@ LinearPicture read(const std::filesystem::path& path, std::vector<std::string>& 
           : rec709_from(header, chosen.kind, path, notes);
   LinearPicture picture = pixels_of(file, chosen, windows, path, reading, notes);
   if (chosen.kind == ExrChannels::xyz) insist_on_light(header, picture.radiance, path);
-  if (matrix) convert(picture.radiance, *matrix);
+  if (matrix && reading.is_plate)
+    convert(picture.radiance, *matrix);
+  else if (matrix)
+    convert_light(picture.radiance, *matrix, path, notes);
   picture.pixel_aspect = header.pixelAspectRatio();
   return picture;
 }
