@@ -7,7 +7,8 @@ namespace previz::lighting {
 
 struct ExrReading {
   bool keeps_primaries = false;  // for a caller that knows what the numbers mean
-  // A frame of footage, whose caller clips what is outside of 0 to 1, negative values too.
+  // A frame of footage, whose caller clips what is outside of 0 to 1, negative values too. It may
+  // lack an eighth of its rows and columns, and notes are alike for frames of the same kind.
   bool is_plate = false;
   std::int64_t most_kept = most_kept_pixels;
 };
