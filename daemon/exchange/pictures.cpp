@@ -254,6 +254,7 @@ class PictureFiles final : public Footage {
     const lighting::LinearPicture light =
         lighting::read_exr_picture(name, oddities,
                                    {.keeps_primaries = read_as_.primaries.has_value(),
+                                    .is_plate = true,
                                     .most_kept = static_cast<std::int64_t>(most_pixels)});
     for (const std::string& oddity : oddities)
       note(name, oddity.substr(std::min(oddity.size(), name.size() + 2)));

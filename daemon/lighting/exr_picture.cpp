@@ -136,22 +136,32 @@ std::int64_t area(const Imath::Box2i& box) {
   return side(box, 0) * side(box, 1);
 }
 
-Windows windows_of(const Imf::Header& header, const std::filesystem::path& path,
+Windows windows_of(const Imf::Header& header, const std::filesystem::path& path, bool is_plate,
                    std::vector<std::string>& notes) {
   const Imath::Box2i &data = header.dataWindow(), &shown = header.displayWindow();
   check_size(path, side(data, 0), side(data, 1));
   check_size(path, side(shown, 0), side(shown, 1));
   const Imath::Box2i common{{std::max(data.min.x, shown.min.x), std::max(data.min.y, shown.min.y)},
                             {std::min(data.max.x, shown.max.x), std::min(data.max.y, shown.max.y)}};
-  // A file may claim any window, and a picture that is mostly missing is no light.
-  constexpr std::int64_t most_missing = 4;
-  if (common.isEmpty() || area(common) * most_missing < area(shown))
+  // A file may claim any window. A light may lack three quarters of its picture, because its nadir
+  // and sides often do; a plate an eighth of its rows and of its columns, as thin margins are.
+  constexpr std::int64_t parts_of_light = 4, parts_of_side = 8;
+  const auto lacks_more = [&](unsigned axis) {
+    return side(common, axis) * parts_of_side < side(shown, axis) * (parts_of_side - 1);
+  };
+  if (common.isEmpty() || area(common) * parts_of_light < area(shown) ||
+      (is_plate && (lacks_more(0) || lacks_more(1))))
     throw Error(fmt::format(
         "{}: its pixels are a part of {}x{} at ({}, {}) of a picture of {}x{}; a full picture is "
-        "needed: export it whole, or use the part alone: oiiotool IN --fullpixels -o OUT.exr",
+        "needed: export it whole,{} or use the part alone: oiiotool IN --fullpixels -o OUT.exr",
         path.string(), side(data, 0), side(data, 1), data.min.x, data.min.y, side(shown, 0),
-        side(shown, 1)));
-  if (area(common) < area(shown))
+        side(shown, 1),
+        is_plate ? " fill it with black (oiiotool IN --croptofull -o OUT.exr)," : ""));
+  if (area(common) < area(shown) && is_plate)  // the same words for every frame
+    notes.push_back(
+        path.string() +
+        ": lacks at most an eighth of its rows and columns; they are filled with black");
+  else if (area(common) < area(shown))
     notes.push_back(fmt::format(
         "{}: has {}x{} of its {}x{} pixels; the others are filled with black (left {}, right {}, "
         "above {}, below {})",
@@ -211,7 +221,7 @@ LinearPicture read(const std::filesystem::path& path, std::vector<std::string>& 
   check_exr_header(path);
   Imf::InputFile file(path.c_str());
   const Imf::Header& header = file.header();
-  const Windows windows = windows_of(header, path, notes);
+  const Windows windows = windows_of(header, path, reading.is_plate, notes);
   const Chosen chosen = choose_channels(header.channels(), path, notes);
   const std::optional<ColorMatrix> matrix =
       reading.keeps_primaries && chosen.kind != ExrChannels::xyz
@@ -219,7 +229,10 @@ LinearPicture read(const std::filesystem::path& path, std::vector<std::string>& 
           : rec709_from(header, chosen.kind, path, notes);
   LinearPicture picture = pixels_of(file, chosen, windows, path, reading, notes);
   if (chosen.kind == ExrChannels::xyz) insist_on_light(header, picture.radiance, path);
-  if (matrix) convert(picture.radiance, *matrix);
+  if (matrix && reading.is_plate)
+    convert(picture.radiance, *matrix);
+  else if (matrix)
+    convert_light(picture.radiance, *matrix, path, notes);
   picture.pixel_aspect = header.pixelAspectRatio();
   return picture;
 }

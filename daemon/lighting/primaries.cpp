@@ -1,5 +1,7 @@
 #include "daemon/lighting/primaries.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -75,6 +77,30 @@ void convert(std::span<glm::vec3> pixels, const ColorMatrix& m) {
                               m[6] * p.r + m[7] * p.g + m[8] * p.b);
     if (std::isfinite(p.r + p.g + p.b)) pixel = converted;
   }
+}
+
+void convert_light(std::span<glm::vec3> pixels, const ColorMatrix& matrix,
+                   const std::filesystem::path& path, std::vector<std::string>& notes) {
+  constexpr float rounding = 1.0f / 256;  // of RGBE, by the brightest channel
+  std::size_t saturated = 0;
+  for (glm::vec3& pixel : pixels) {
+    const glm::vec3 own = pixel;
+    convert({&pixel, 1}, matrix);
+    const float least = -rounding * std::max({pixel.r, pixel.g, pixel.b});
+    bool is_saturated = false;
+    for (int c = 0; c < 3; ++c)
+      if (pixel[c] < 0 && own[c] >= 0) {
+        is_saturated |= pixel[c] < least;
+        pixel[c] = 0;
+      }
+    saturated += is_saturated;
+  }
+  if (saturated > 0)
+    notes.push_back(
+        fmt::format("{}: {} of {} pixels {} more saturated than Rec. 709 can show, and {} shown at "
+                    "its edge",
+                    path.string(), saturated, pixels.size(), saturated == 1 ? "is" : "are",
+                    saturated == 1 ? "is" : "are"));
 }
 
 }  // namespace previz::lighting

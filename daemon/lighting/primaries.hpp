@@ -2,9 +2,12 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
 #include <glm/vec3.hpp>
 #include <optional>
 #include <span>
+#include <string>
+#include <vector>
 
 namespace previz::lighting {
 
@@ -27,5 +30,10 @@ bool is_rec709(const Chromaticities& chromaticities);
 // Converts the pixels in place, but those with a value that is no number or infinite: a sum of
 // those would hide a sun that overflowed.
 void convert(std::span<glm::vec3> pixels, const ColorMatrix& matrix);
+// The same for the pixels of a light, of which a channel is 0 where only the conversion makes it
+// negative. Pixels of which this is more than a rounding are counted in `notes`. What the file has
+// as negative stays for repair().
+void convert_light(std::span<glm::vec3> pixels, const ColorMatrix& matrix,
+                   const std::filesystem::path& path, std::vector<std::string>& notes);
 
 }  // namespace previz::lighting

@@ -199,7 +199,6 @@ void to_rec709(LinearPicture& picture, const Header& header, const std::filesyst
   if (!header.is_xyz && !header.primaries) return;
   const auto matrix =
       header.is_xyz ? rec709_from_xyz(equal_energy) : rec709_from(*header.primaries);
-  if (matrix) convert(picture.radiance, *matrix);
   notes.push_back(path.string() +
                   (!matrix         ? ": its PRIMARIES span no colours; its values are used "
                                      "as linear Rec. 709"
@@ -207,6 +206,7 @@ void to_rec709(LinearPicture& picture, const Header& header, const std::filesyst
                                      "white"
                                    : ": has other PRIMARIES than those of Rec. 709; it is "
                                      "converted, white to white"));
+  if (matrix) convert_light(picture.radiance, *matrix, path, notes);
 }
 
 }  // namespace

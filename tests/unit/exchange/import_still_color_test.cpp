@@ -1,9 +1,4 @@
 // Stills that say what their colours mean, or are not what they seem.
-#include <ImfChannelList.h>
-#include <ImfFrameBuffer.h>
-#include <ImfHeader.h>
-#include <ImfOutputFile.h>
-#include <ImfStringAttribute.h>
 #include <lcms2.h>
 #include <libdeflate.h>
 #include <tiffio.h>
@@ -560,42 +555,6 @@ TEST(ImportStills, OpenExrIsLight) {
   shoot.json["observer"]["read_as"] = {{"transfer", "srgb"}};
   std::filesystem::remove_all(shoot.session());
   EXPECT_THAT(shoot.error(), HasSubstr("read_as can name its primaries only"));
-}
-
-// What it says of its colours and windows holds, unless FRAMES.json says other primaries.
-TEST(ImportStills, OpenExrOfOtherColoursIsConverted) {
-  Shoot shoot;
-  Imf::Header header(8, 8);
-  header.dataWindow() = {{0, 0}, {7, 6}};
-  header.insert("colorInteropID", Imf::StringAttribute("lin_p3d65_scene"));
-  Imf::FrameBuffer buffer;
-  std::vector<std::vector<float>> samples;
-  for (const auto& [channel, light] : {std::pair{"R", 0.5f}, {"G", 0.18f}, {"B", 0.02f}}) {
-    samples.emplace_back(56, light);
-    header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
-    buffer.insert(channel, Imf::Slice::Make(Imf::FLOAT, samples.back().data(), header.dataWindow(),
-                                            sizeof(float), 8 * sizeof(float)));
-  }
-  {
-    Imf::OutputFile file((shoot.folder() / "a.exr").c_str(), header);
-    file.setFrameBuffer(buffer);
-    file.writePixels(7);
-  }
-  shoot.json["observer"]["pictures"] = {"a.exr"};
-  const ImportReport report = shoot.import();
-  EXPECT_THAT(report.notes, testing::Contains(HasSubstr("is linear P3-D65 (by colorInteropID")));
-  EXPECT_THAT(report.notes, testing::Contains(HasSubstr("has 8x7 of its 8x8 pixels")));
-  const auto sample = [&](std::size_t i) {
-    const FramePtr frame = shoot.open()->read(0);
-    return reinterpret_cast<const std::uint16_t*>(frame->bytes.data())[i] / 257.0;
-  };
-  EXPECT_NEAR(sample(0), encoded(from_p3[0] * 0.5 + from_p3[1] * 0.18), 0.01);
-  EXPECT_EQ(sample(3 * 56), 0);
-
-  shoot.json["observer"]["read_as"] = {{"primaries", "bt709"}};
-  std::filesystem::remove_all(shoot.session());
-  shoot.import();
-  EXPECT_NEAR(sample(0), encoded(0.5), 0.01);
 }
 
 }  // namespace previz::exchange::import_still_color_test

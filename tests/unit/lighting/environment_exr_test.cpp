@@ -133,6 +133,42 @@ TEST_F(ExrEnvironment, ALinearSpaceByNameIsConvertedWhiteToWhite) {
   }
 }
 
+// Half of ACEScg's green is (-0.31090, 0.57040, -0.06449) in linear Rec. 709.
+TEST_F(ExrEnvironment, AColourThatRec709CannotShowIsAtItsEdge) {
+  const Imf::Header header = naming("colorInteropID", "lin_ap1_scene");
+  const glm::vec3 green(0, 0.5f, 0), edge(0, 0.57040f, 0);
+  write(header, plain(green));
+  Lighting lighting = load();
+  for (const glm::vec3& texel : lighting.environment.radiance)
+    ASSERT_LT(glm::length(texel - edge), 5e-4f);
+  EXPECT_THAT(lighting.report.notes,
+              ElementsAre(HasSubstr("is ACEScg"),
+                          HasSubstr("2048 of 2048 pixels are more saturated than Rec. 709 can "
+                                    "show, and are shown at its edge")));
+
+  // No light comes into it from a grey beside it: every texel is a mean of the two.
+  write(header, [&](int x, int) { return x < 32 ? glm::vec3(0.5f) : green; });
+  lighting = load();
+  std::size_t greens = 0;
+  for (const glm::vec3& texel : lighting.environment.radiance) {
+    ASSERT_NEAR(texel.g, edge.g + texel.r * (0.5f - edge.g) / 0.5f, 5e-4f);
+    ASSERT_NEAR(texel.b, texel.r, 5e-4f);
+    greens += texel.r < 1e-4f;
+  }
+  EXPECT_GT(greens, lighting.environment.radiance.size() * 4 / 10);
+  EXPECT_THAT(lighting.report.notes, testing::Contains(HasSubstr("1024 of 2048 pixels are more")));
+
+  // What the file has as negative is still repaired; roundings are neither.
+  write(header,
+        [](int x, int y) { return glm::vec3(0.5f, x == 9 && y == 9 ? -0.1f : 0.5f, 0.5f); });
+  EXPECT_LT(read().at(9, 9).g, -0.18f);
+  EXPECT_THAT(load().report.notes,
+              ElementsAre(HasSubstr("is ACEScg"), HasSubstr("1 of 2048 pixels is negative")));
+  write(header, plain({0.2f, 0.0227f, 0.0066f}));  // (0.32634, -0.00023, -0.00012)
+  EXPECT_EQ(read().radiance[0].g, 0);
+  EXPECT_THAT(notes, ElementsAre(HasSubstr("is ACEScg")));
+}
+
 TEST_F(ExrEnvironment, TheContainerOfAcesAndChromaticitiesAreConverted) {
   Imf::Header header = header_of();
   header.insert("acesImageContainerFlag", Imf::IntAttribute(1));
@@ -191,9 +227,9 @@ TEST_F(ExrEnvironment, CurvesAndUnknownSpacesAreRefusedWithTheCommand) {
        {"sRGB", "srgb_rec709_scene", "g22_ap1_scene", "ARRI LogC3", "Rec709", "studio:secret"})
     for (const char* attribute : {"colorInteropID", "oiio:ColorSpace"}) {
       write(naming(attribute, name), plain(glm::vec3(0.5f)));
-      EXPECT_THAT(refusal(), AllOf(HasSubstr(std::string(attribute) + " is \"" + name + "\""),
-                                   HasSubstr("IN --colorconvert \"" + std::string(name) +
-                                             "\" lin_rec709")));
+      EXPECT_THAT(refusal(),
+                  AllOf(HasSubstr(std::string(attribute) + " is \"" + name + "\""),
+                        HasSubstr("IN --colorconvert \"" + std::string(name) + "\" lin_rec709")));
     }
   write(naming("colorInteropID", "data"), plain(glm::vec3(0.5f)));
   EXPECT_THAT(refusal(), HasSubstr("which holds no colours"));

@@ -128,6 +128,13 @@ TEST_F(PictureFormats, OtherPrimariesOfRadianceAreConverted) {
   expect_near(with_primaries("0.708 0.292 0.170 0.797 0.131 0.046 0.3127 0.3290"),
               {1.6605 - 0.5876 * 0.5 - 0.0728 * 0.25, -0.1246 + 1.1329 * 0.5 - 0.0083 * 0.25,
                -0.0182 - 0.1006 * 0.5 + 1.1187 * 0.25});
+  // Its green has a red of -0.5876 and a blue of -0.1006.
+  const Lighting green =
+      with_primaries("0.708 0.292 0.170 0.797 0.131 0.046 0.3127 0.3290", {0, 128, 0, 129});
+  for (const glm::vec3& texel : green.environment.radiance)
+    ASSERT_LT(glm::length(texel - glm::vec3(0, 1.1329f, 0)), 3e-4f);
+  EXPECT_THAT(green.report.notes, ElementsAre(HasSubstr("white to white"),
+                                              HasSubstr("128 of 128 pixels are more saturated")));
   // Radiance's own, whose white has equal energy.
   const char* radiance = "0.640 0.330 0.290 0.600 0.150 0.060 0.333 0.333";
   expect_near(with_primaries(radiance, {128, 128, 128, 129}), glm::vec3(1));
