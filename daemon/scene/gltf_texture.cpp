@@ -243,10 +243,13 @@ void GltfTextures::decode() {
   pending_.clear();
   if (reduced == 0) return;
   if (reduced > most_named) names += " and " + std::to_string(reduced - most_named) + " more";
-  const int side = static_cast<int>(std::sqrt(static_cast<double>(budget_.most_texels()) / 2));
+  const double of_two = static_cast<double>(budget_.most_texels()) / 2;
+  const bool has_levels = budget_.has_levels();  // which have a third of the pixels
+  const int side = static_cast<int>(std::sqrt(has_levels ? of_two * 3 / 4 : of_two));
   notes_.add((reduced == 1 ? "1 texture is" : std::to_string(reduced) + " textures are") +
              " reduced, " + names + ": the textures of the scene have more than " +
-             std::to_string(budget_.most_texels()) + " pixels together, as two of " +
+             std::to_string(budget_.most_texels()) + " pixels together" +
+             (has_levels ? " with their smaller levels" : "") + ", as two of " +
              in_words({side, side}) +
              " have; to choose their sizes, use gltf-transform resize IN OUT --width " +
              std::to_string(widest.width) + " --height " + std::to_string(widest.height));

@@ -20,8 +20,8 @@ std::vector<PictureSize> fitted_sizes(std::vector<PictureSize> sizes, bool has_l
 // Averages a picture over the areas of fewer texels, row by row.
 class AreaAverage {
  public:
-  // `to` is no larger than `from` on either side, and at least 1.
-  // By alpha, a colour counts as much as its texel covers; where none covers, all count alike.
+  // `to` is no larger than `from` on either side, and at least 1. `by_alpha`, a colour counts as
+  // much as its texel covers; where none covers, all count alike.
   AreaAverage(PictureSize from, PictureSize to, bool by_alpha = false);
   // Adds the next row of `from`.
   void add(std::span<const glm::vec4> row);
