@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
 #include <map>
@@ -300,6 +301,7 @@ void GltfFile::Loader::note_backs() {
   const std::map<std::uint32_t, std::size_t> one_sided = materials.one_sided();
   std::set<std::vector<std::uint32_t>> judged;  // meshes of a node
   std::set<std::size_t> seen;                   // materials of the file
+  std::uint64_t tries = 4'000'000;              // as long as reading so many triangles takes
   for (auto first = scene.instances.begin(), last = first; first != scene.instances.end();
        first = last) {
     last = std::find_if(first, scene.instances.end(), [&](const Instance& instance) {
@@ -316,7 +318,7 @@ void GltfFile::Loader::note_backs() {
       is_new |= at != one_sided.end() && !seen.contains(at->second);
     }
     if (!is_new || !judged.insert(meshes_of_node).second) continue;
-    const std::vector<bool> behind = are_seen_from_behind(surfaces);
+    const std::vector<bool> behind = are_seen_from_behind(surfaces, tries);
     for (std::size_t i = 0; i < behind.size(); ++i) {
       const auto at = one_sided.find(first[static_cast<std::ptrdiff_t>(i)].material);
       if (behind[i] && at != one_sided.end()) seen.insert(at->second);

@@ -14,15 +14,17 @@
 namespace previz::scene {
 namespace {
 
-enum class Support { read, ignored, refused };
+// The last is of extensions that say what a material looks like in place of glTF's own words.
+enum class Support { read, ignored, refused, replaces };
 
 struct Extension {
   std::string_view name;
   Support support;
-  std::string_view text;  // ignored: what is different; refused: what can be done
+  std::string_view text;  // ignored: what is different; others: what can be done
 };
 
 constexpr std::string_view plain_textures = "export the file with textures in PNG, JPEG or WebP";
+constexpr std::string_view own_materials = "export the file with glTF's own materials";
 constexpr std::string_view plain_meshes =
     "export the object as a mesh of triangles with its materials";
 
@@ -46,9 +48,12 @@ constexpr Extension extensions[] = {
     {"CESIUM_RTC", Support::refused, "export the file with its place in the nodes' translations"},
     {"EXT_texture_avif", Support::refused, plain_textures},
     {"KHR_gaussian_splatting", Support::refused, plain_meshes},
-    {"KHR_techniques_webgl", Support::refused, "export the file with glTF's own materials"},
+    {"KHR_materials_cmnBlinnPhong", Support::replaces, own_materials},
+    {"KHR_materials_common", Support::replaces, own_materials},
+    {"KHR_techniques_webgl", Support::replaces, own_materials},
     {"KHR_texture_basisu", Support::refused, plain_textures},
-    {"MSFT_texture_dds", Support::refused, plain_textures}};
+    {"MSFT_texture_dds", Support::refused, plain_textures},
+    {"NV_materials_mdl", Support::replaces, own_materials}};
 
 std::optional<Extension> find(std::string_view name) {
   for (const MaterialExtension& of_material : material_extensions())
@@ -84,6 +89,11 @@ std::string in_brackets(const tinygltf::Model& model, const std::vector<std::siz
   return " (materials: " + names + ")";
 }
 
+bool replaces_materials(const std::string& extension) {
+  const std::optional<Extension> known = find(extension);
+  return known && known->support == Support::replaces;
+}
+
 void check_required_extensions(const nlohmann::json& root, const std::string& file) {
   const auto required = root.find("extensionsRequired");
   if (required == root.end() || !required->is_array()) return;
@@ -91,7 +101,7 @@ void check_required_extensions(const nlohmann::json& root, const std::string& fi
     if (!element.is_string()) continue;
     const std::string name = element.get<std::string>();
     const std::optional<Extension> known = find(name);
-    if (known && known->support != Support::refused) continue;
+    if (known && known->support < Support::refused) continue;
     std::string message =
         file + ": requires the extension \"" + set::one_line(name) + "\", which is not supported";
     message.append("; ").append(known ? known->text : "export the file without it");
@@ -105,6 +115,9 @@ void note_extensions(const tinygltf::Model& model, Notes& notes) {
   std::vector<std::string> used = model.extensionsUsed;
   for (const std::string& name : required)
     if (std::ranges::find(used, name) == used.end()) used.push_back(name);
+  for (const tinygltf::Material& material : model.materials)  // some forget to say so
+    for (const auto& [name, content] : material.extensions)
+      if (!find(name) && std::ranges::find(used, name) == used.end()) used.push_back(name);
   for (const std::string& name : used) {
     const std::optional<Extension> known = find(name);
     if (known && known->support == Support::read) continue;

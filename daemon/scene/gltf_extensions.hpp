@@ -19,10 +19,15 @@ namespace previz::scene {
 // different.
 void check_required_extensions(const nlohmann::json& root, const std::string& file);
 
+// Whether an extension that is not read says what a material looks like in place of glTF's own
+// words, so that the material is white without it.
+bool replaces_materials(const std::string& extension);
+
 // Returns the names of these materials of the file, in brackets and at most three; "" of none.
 std::string in_brackets(const tinygltf::Model& model, const std::vector<std::size_t>& materials);
 
-// Notes the extensions that the file uses and previzd does not read.
+// Notes the extensions that the file uses, or a material without the file saying so, and previzd
+// does not read.
 void note_extensions(const tinygltf::Model& model, Notes& notes);
 
 }  // namespace previz::scene

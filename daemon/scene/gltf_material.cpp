@@ -8,6 +8,7 @@
 #include <utility>
 #include <variant>
 
+#include "daemon/scene/gltf_extensions.hpp"
 #include "daemon/scene/gltf_value.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
@@ -17,6 +18,7 @@ namespace {
 
 constexpr double max_radiance = 1e30;
 constexpr const char* specular_glossiness = "KHR_materials_pbrSpecularGlossiness";
+constexpr const char* gloss_texture = "specularGlossinessTexture";
 
 // A reference to a texture, from the core of glTF or from an extension.
 struct TextureInfo {
@@ -90,6 +92,10 @@ void forget(const MaterialExtension& row, Material& material) {
   for (const LayerTexture& texture : row.textures) material.*texture.texture = no_texture;
 }
 
+float strongest(const glm::vec3& color) {
+  return std::max({color.r, color.g, color.b});
+}
+
 // The header says why. Paint of the default index of refraction reflects 0.04, which the specular
 // colour multiplies.
 void read_gloss(const tinygltf::Value& gloss, const std::string& what, Material& material,
@@ -97,12 +103,12 @@ void read_gloss(const tinygltf::Value& gloss, const std::string& what, Material&
   constexpr float reflectance = 0.04f;
   const glm::vec3 specular = color_within(numbers(gloss, "specularFactor", {1, 1, 1}), 1,
                                           what + ": specularFactor", notes);
-  const float strongest = std::max({specular.r, specular.g, specular.b});
+  const float most = strongest(specular);
   material.metallic = 0;
   material.roughness =
       1 - within(number(gloss, "glossinessFactor", 1), 0, 1, what + ": glossinessFactor", notes);
-  material.specular = std::min(strongest / reflectance, 1.0f);
-  if (strongest > 0) material.specular_color = specular / (reflectance * material.specular);
+  material.specular = std::min(most / reflectance, 1.0f);
+  if (most > 0) material.specular_color = specular / (reflectance * material.specular);
 }
 
 AlphaMode alpha_mode(const std::string& mode, const std::string& what, Notes& notes) {
@@ -113,8 +119,8 @@ AlphaMode alpha_mode(const std::string& mode, const std::string& what, Notes& no
   return AlphaMode::opaque;
 }
 
-// Throws previz::Error beginning with `where` for a material of which nothing is said but by an
-// extension that is unknown: it would be white.
+// Throws previz::Error beginning with `where` for a material whose look is in what is not read: it
+// would be white.
 void refuse_foreign(const tinygltf::Material& given, const std::string& where) {
   const auto has = [&](const char* key) { return given.values.contains(key); };
   if (has("baseColorTexture") && given.pbrMetallicRoughness.baseColorTexture.index < 0)
@@ -124,17 +130,15 @@ void refuse_foreign(const tinygltf::Material& given, const std::string& where) {
   if (!given.values.empty() || given.emissiveTexture.index >= 0 ||
       given.emissiveFactor != std::vector<double>{0, 0, 0})
     return;
-  std::string unknown;
+  std::string foreign;
   for (const auto& [name, content] : given.extensions) {
     const auto row =
         std::ranges::find_if(material_extensions(), [&](const auto& r) { return name == r.name; });
-    if (row == material_extensions().end())
-      unknown = name;
-    else if (!row->ignored)
-      return;
+    if (row != material_extensions().end() && !row->ignored) return;
+    if (replaces_materials(name)) foreign = name;
   }
-  if (!unknown.empty())
-    throw Error(where + ": has nothing but the extension \"" + set::one_line(unknown) +
+  if (!foreign.empty())
+    throw Error(where + ": its look is in the extension \"" + foreign +
                 "\", which is not supported, and without it the surface would be white; export the "
                 "file with glTF's own materials");
 }
@@ -192,9 +196,12 @@ class GltfMaterials::Textures {
             const std::string& which, std::optional<float> glossiness = {}) {
     if (info.index < 0) return true;
     const UvMapping wanted = read_mapping(info, what_ + ", " + which, notes_);
-    const bool white =
-        texture == &Material::base_color_texture || texture == &Material::emission_texture;
-    material_.*texture = textures_.use(info.index, encoding, white, glossiness);
+    const bool white = texture == &Material::base_color_texture ||
+                       texture == &Material::emission_texture ||
+                       (which == gloss_texture && strongest(material_.specular_color) > 1);
+    const bool cuts_out =
+        texture == &Material::base_color_texture && material_.alpha_mode != AlphaMode::opaque;
+    material_.*texture = textures_.use(info.index, encoding, white, glossiness, cuts_out);
     if (material_.*texture == no_texture) return false;
     const auto at = std::ranges::find(mappings, wanted) - mappings.begin();
     if (at == std::ssize(mappings)) mappings.push_back(wanted);
@@ -206,7 +213,7 @@ class GltfMaterials::Textures {
   // KHR_materials_pbrSpecularGlossiness: one texture of the specular colour and, in its alpha, the
   // glossiness.
   void take_gloss(const tinygltf::Value& gloss) {
-    const std::string key = "specularGlossinessTexture";
+    const std::string key = gloss_texture;
     const TextureInfo info = info_of(gloss, key);
     const float glossiness = 1 - material_.roughness;
     take(info, Encoding::srgb, &Material::specular_color_texture, key);

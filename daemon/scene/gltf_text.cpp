@@ -11,6 +11,7 @@
 #include "daemon/scene/other_format.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
+#include "drivers/letters.hpp"
 
 namespace previz::scene {
 namespace {
@@ -65,9 +66,8 @@ std::size_t letter_size(std::string_view text) {
 
 // Whether a word is a number that is not finite as some program writes it: NaN, -Infinity,
 // -nan(ind) and 1.#INF, or one that no double can hold.
-bool is_not_finite(std::string word) {
-  for (char& c : word)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+bool is_not_finite(std::string_view written) {
+  std::string word = lower_case(written);
   if (!word.empty() && (word[0] == '-' || word[0] == '+')) word.erase(0, 1);
   if (word.starts_with("nan") || word.starts_with("inf") || word.find(".#") != std::string::npos)
     return true;
@@ -99,7 +99,7 @@ std::string mended(std::string_view text) {
       in_string = text[i] == '"';
     } else {
       size = std::min(text.find_first_of(around_words, i), text.size()) - i;
-      const std::string word(text.substr(i, size));
+      const std::string_view word = text.substr(i, size);
       if (is_not_finite(word)) {
         result += "\"\\u0001";
         for (const char c : word) result += c > ' ' && c != '\\' && c < 0x7f ? c : '?';
@@ -262,18 +262,22 @@ std::string in_words(const JsonPlace* place) {
 }
 
 GltfJson parsed_json(std::string_view text, const std::string& file) {
-  if (nesting_depth(text) > max_json_depth)
-    throw Error(file + ": its JSON is nested more than " + std::to_string(max_json_depth) +
-                " levels deep");
-  GltfJson json;
-  json.root = Json::parse(text, nullptr, false);
-  if (json.root.is_object()) return json;
   if (text.starts_with(byte_order_mark)) text.remove_prefix(byte_order_mark.size());
   const std::size_t start = text.find_first_not_of(" \t\r\n");
   if (start == std::string_view::npos)
     throw Error(file + ": is not a valid glTF file: it is empty; export it again");
+  constexpr std::string_view beginnings = "{[/";  // a comment is damage of JSON
+  if (beginnings.find(text[start]) != std::string_view::npos &&
+      nesting_depth(text) > max_json_depth)
+    throw Error(file + ": its JSON is nested more than " + std::to_string(max_json_depth) +
+                " levels deep");
+  GltfJson json;
+  if (text[start] == '{') json.root = Json::parse(text, nullptr, false);
+  if (json.root.is_object()) return json;
   if (text[start] != '{') {
     refuse_other_format({reinterpret_cast<const unsigned char*>(text.data()), text.size()}, file);
+    if (text.substr(start).starts_with("//") || text.substr(start).starts_with("/*"))
+      refuse_text(text, file);
     throw Error(file +
                 ": is not a valid glTF file: it is neither binary glTF nor JSON; an object is glTF "
                 "2.0 (.glb or .gltf)");

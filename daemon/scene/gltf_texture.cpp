@@ -29,10 +29,10 @@ Wrap wrap(int gltf) {
 }
 
 // Returns the texels of a picture of four samples a pixel, averaged in linear light where `to` is
-// smaller.
+// smaller; where the alpha cuts out, the colours by it.
 template <typename Sample>
 std::vector<glm::vec4> linearise(const Sample* samples, PictureSize from, PictureSize to,
-                                 Encoding encoding) {
+                                 Encoding encoding, bool cuts_out) {
   constexpr std::size_t values = std::size_t{std::numeric_limits<Sample>::max()} + 1;
   std::vector<float> color(values), data(values);
   for (std::size_t i = 0; i < values; ++i) {
@@ -52,7 +52,13 @@ std::vector<glm::vec4> linearise(const Sample* samples, PictureSize from, Pictur
     read(linear);
     return linear;
   }
-  AreaAverage average(from, to);
+  const auto is_see_through = [&] {
+    const std::size_t texels = width * static_cast<std::size_t>(from.height);
+    for (std::size_t i = 0; i < texels; ++i)
+      if (samples[4 * i + 3] < std::numeric_limits<Sample>::max()) return true;
+    return false;
+  };
+  AreaAverage average(from, to, cuts_out && is_see_through());
   std::vector<glm::vec4> row(width);
   for (int y = 0; y < from.height; ++y) {
     read(row);
@@ -63,12 +69,12 @@ std::vector<glm::vec4> linearise(const Sample* samples, PictureSize from, Pictur
 
 // Returns the texels of a picture of the size that its header says.
 std::vector<glm::vec4> decoded(const EncodedImage& image, PictureSize from, PictureSize to,
-                               Encoding encoding) {
+                               Encoding encoding, bool cuts_out) {
   if (is_webp(image.bytes)) {
     const WebpTexels webp = decoded_webp(image.bytes);
     if (!webp.rgba || webp.size != from)
       throw Error(image.where + ": cannot be decoded: it is a damaged WebP");
-    return linearise(webp.rgba.get(), from, to, encoding);
+    return linearise(webp.rgba.get(), from, to, encoding, cuts_out);
   }
   const int size = static_cast<int>(image.bytes.size());
   int width = 0, height = 0, channels = 0;
@@ -78,13 +84,14 @@ std::vector<glm::vec4> decoded(const EncodedImage& image, PictureSize from, Pict
     const std::unique_ptr<std::remove_pointer_t<decltype(loaded)>, decltype(free)> samples(loaded,
                                                                                            free);
     if (samples && PictureSize{width, height} == from)
-      texels = linearise(samples.get(), from, to, encoding);
+      texels = linearise(samples.get(), from, to, encoding, cuts_out);
   };
   if (stbi_is_16_bit_from_memory(image.bytes.data(), size))
     take(stbi_load_16_from_memory(image.bytes.data(), size, &width, &height, &channels, 4));
   else
     take(stbi_load_from_memory(image.bytes.data(), size, &width, &height, &channels, 4));
-  if (texels.empty()) throw Error(image.where + ": cannot be decoded: " + picture_failure());
+  if (texels.empty())
+    throw Error(image.where + ": cannot be decoded: " + picture_failure(image.bytes));
   return texels;
 }
 
@@ -117,17 +124,42 @@ EncodedImage encoded_image(const tinygltf::Model& model, int index, const std::s
   return encoded;
 }
 
-TextureImage image_of(const tinygltf::Model& model, int index, const std::string& file) {
+namespace {
+
+// Returns why an image of a model cannot be read, without the file's name; "" of one that can.
+std::string unreadable(const tinygltf::Model& model, int index, const std::string& file,
+                       NameRules rules) {
+  try {
+    const EncodedImage image = encoded_image(model, index, file, rules);
+    checked_picture_size(image.bytes, image.where);
+  } catch (const Error& error) {
+    return std::string(error.what()).substr(file.size() + 2);
+  }
+  return "";
+}
+
+}  // namespace
+
+TextureImage image_of(const tinygltf::Model& model, int index, const std::string& file,
+                      NameRules rules) {
   const std::string name = "texture " + std::to_string(index);
   if (index < 0 || static_cast<std::size_t>(index) >= model.textures.size())
     throw Error(file + ": a material uses " + name + ", which does not exist");
   const tinygltf::Texture& texture = model.textures[static_cast<std::size_t>(index)];
   int image = texture.source;
   const double webp = number(extension(texture.extensions, "EXT_texture_webp"), "source", -1);
-  if (webp >= 0) image = static_cast<int>(std::min(webp, 2e9));
+  std::string left_out;
+  if (webp >= 0) {
+    const int preferred = static_cast<int>(std::min(webp, 2e9));
+    if (image >= 0) left_out = unreadable(model, preferred, file, rules);
+    if (left_out.empty())
+      image = preferred;
+    else
+      left_out = name + ": its WebP is left out for its other picture: " + left_out;
+  }
   if (image >= 0 && static_cast<std::size_t>(image) >= model.images.size())
     throw Error(file + ": " + name + ": no image " + std::to_string(image));
-  if (image >= 0) return {image, ""};
+  if (image >= 0) return {image, left_out};
   for (const auto& [extension, content] : texture.extensions)
     return {-1, name + ": its picture is in a format that is not supported (" +
                     set::one_line(extension) + ")"};
@@ -135,8 +167,8 @@ TextureImage image_of(const tinygltf::Model& model, int index, const std::string
 }
 
 std::uint32_t GltfTextures::use(int index, Encoding encoding, bool white,
-                                std::optional<float> glossiness) {
-  const auto [image, missing] = image_of(model_, index, file_);
+                                std::optional<float> glossiness, bool cuts_out) {
+  const auto [image, missing] = image_of(model_, index, file_, names_in_objects);
   if (image < 0 && white)
     throw Error(file_ + ": " + missing +
                 ", and without it a surface would be white; export the file with textures in PNG, "
@@ -145,6 +177,7 @@ std::uint32_t GltfTextures::use(int index, Encoding encoding, bool white,
     notes_.add(missing + "; ignored");
     return no_texture;
   }
+  if (!missing.empty()) notes_.add(missing);
   const std::string name = "texture " + std::to_string(index);
   const tinygltf::Texture& texture = model_.textures[static_cast<std::size_t>(index)];
   tinygltf::Sampler sampler;
@@ -158,13 +191,18 @@ std::uint32_t GltfTextures::use(int index, Encoding encoding, bool white,
   const bool nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
   const auto [at, is_new] =
       used_.try_emplace({image, encoding, wrap_u, wrap_v, nearest, glossiness}, no_texture);
-  if (!is_new) return at->second;
+  if (!is_new) {
+    const auto same = std::ranges::find(pending_, at->second, &Pending::texture);
+    if (cuts_out && same != pending_.end()) same->cuts_out = true;
+    return at->second;
+  }
   Pending pending{scene_.textures.size(),
                   0,
                   encoded_image(model_, image, file_, names_in_objects),
                   {},
                   encoding,
-                  glossiness};
+                  glossiness,
+                  cuts_out};
   if (!pending.image.note.empty()) notes_.add(pending.image.note);
   pending.size = checked_picture_size(pending.image.bytes, pending.image.where);
   pending.in_budget = budget_.add_texture(pending.size);
@@ -183,23 +221,38 @@ void GltfTextures::decode() {
   const auto in_words = [](PictureSize size) {
     return std::to_string(size.width) + " x " + std::to_string(size.height);
   };
+  constexpr std::size_t most_named = 3;
+  std::size_t reduced = 0;
+  std::string names;
+  PictureSize widest{0, 0};
   for (const Pending& pending : pending_) {
     const auto [width, height] = budget_.fitted_texture(pending.in_budget);
     Texture& texture = scene_.textures[pending.texture];
     texture.width = width;
     texture.height = height;
-    texture.texels = decoded(pending.image, pending.size, {width, height}, pending.encoding);
+    texture.texels =
+        decoded(pending.image, pending.size, {width, height}, pending.encoding, pending.cuts_out);
     if (pending.glossiness)
       for (glm::vec4& texel : texture.texels) texel = {1, 1 - *pending.glossiness * texel.a, 1, 1};
     if (pending.size == PictureSize{width, height}) continue;
-    notes_.add("texture \"" + set::one_line(texture.name) + "\" of " + in_words(pending.size) +
-               " pixels is reduced to " + in_words({width, height}) +
-               ": the textures of the scene have more than " +
-               std::to_string(budget_.most_texels()) +
-               " together; to choose their sizes, use gltf-transform resize IN OUT --width " +
-               std::to_string(width) + " --height " + std::to_string(height));
+    widest = {std::max(widest.width, width), std::max(widest.height, height)};
+    if (++reduced > most_named) continue;
+    names += (reduced > 1 ? ", \"" : "\"") + set::one_line(texture.name) + "\" of " +
+             in_words(pending.size) + " pixels to " + in_words({width, height});
   }
   pending_.clear();
+  if (reduced == 0) return;
+  if (reduced > most_named) names += " and " + std::to_string(reduced - most_named) + " more";
+  const double of_two = static_cast<double>(budget_.most_texels()) / 2;
+  const bool has_levels = budget_.has_levels();  // which have a third of the pixels
+  const int side = static_cast<int>(std::sqrt(has_levels ? of_two * 3 / 4 : of_two));
+  notes_.add((reduced == 1 ? "1 texture is" : std::to_string(reduced) + " textures are") +
+             " reduced, " + names + ": the textures of the scene have more than " +
+             std::to_string(budget_.most_texels()) + " pixels together" +
+             (has_levels ? " with their smaller levels" : "") + ", as two of " +
+             in_words({side, side}) +
+             " have; to choose their sizes, use gltf-transform resize IN OUT --width " +
+             std::to_string(widest.width) + " --height " + std::to_string(widest.height));
 }
 
 }  // namespace previz::scene

@@ -26,13 +26,15 @@ struct EncodedImage {
   std::string note;   // of a picture that is read from a file of another name; "" mostly
 };
 
-// The image of a texture of a model: that of EXT_texture_webp, else its source.
+// The image of a texture of a model: that of EXT_texture_webp, else its source, also where that of
+// the extension cannot be read.
 struct TextureImage {
   int image = -1;
-  std::string missing;  // where there is none: why, "texture 3: ..."
+  std::string missing;  // what cannot be had and why, "texture 3: ..."; "" mostly
 };
 // Throws previz::Error naming `file` if the texture or the image does not exist.
-TextureImage image_of(const tinygltf::Model& model, int texture, const std::string& file);
+TextureImage image_of(const tinygltf::Model& model, int texture, const std::string& file,
+                      NameRules rules = names_in_objects);
 
 // Returns the picture of an image of a model that read_gltf() has read from `file`, be it in a
 // buffer view, in a data URI or in a file that the rules let it name. Throws previz::Error naming
@@ -49,13 +51,14 @@ class GltfTextures {
 
   // Returns an index in Scene::textures, or no_texture with a note where the texture has no image
   // that is read (image_of()). With a glossiness the texture's green is roughness: 1 - glossiness *
-  // alpha. Throws previz::Error naming file and image if the image cannot be read, or, where
-  // without the texture the surface would be `white`, if there is none.
+  // alpha. Where its alpha `cuts_out` its colours, they count by it when it is reduced. Throws
+  // previz::Error naming file and image if the image cannot be read, or, where without the texture
+  // the surface would be `white`, if there is none.
   std::uint32_t use(int texture, Encoding encoding, bool white = false,
-                    std::optional<float> glossiness = {});
+                    std::optional<float> glossiness = {}, bool cuts_out = false);
 
   // Decodes what was used since the last call, smaller where the budget has no place for all of it,
-  // with a note. All files of the scene have added theirs to the budget before. Throws
+  // with one note. All files of the scene have added theirs to the budget before. Throws
   // previz::Error naming file and image.
   void decode();
 
@@ -69,6 +72,7 @@ class GltfTextures {
     PictureSize size;
     Encoding encoding;
     std::optional<float> glossiness;
+    bool cuts_out = false;
   };
 
   const tinygltf::Model& model_;

@@ -9,6 +9,7 @@
 
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
+#include "drivers/letters.hpp"
 #include "drivers/session/files.hpp"
 
 namespace previz::scene {
@@ -71,7 +72,7 @@ bool is_data_uri(const std::string& uri) {
   constexpr std::string_view scheme = "data:";
   return uri.size() >= scheme.size() &&
          std::ranges::equal(scheme, std::string_view(uri).substr(0, scheme.size()), {}, {},
-                            [](char c) { return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c; });
+                            [](char c) { return lower_case(c); });
 }
 
 std::vector<unsigned char> data_of(const std::string& uri, const std::string& where) {
@@ -80,11 +81,10 @@ std::vector<unsigned char> data_of(const std::string& uri, const std::string& wh
     throw Error(where + ": its data URI has no comma before its data; export the file again");
   std::string type = uri.substr(0, comma), data = uri.substr(comma + 1);
   std::erase_if(type, is_space);
-  std::ranges::transform(type, type.begin(), [](char c) {
-    return static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
-  });
   if (data.find('%') != std::string::npos) data = without_escapes(data);
-  if (!type.ends_with(";base64")) return {data.begin(), data.end()};
+  // The last parameter by the standard; some programs write a charset after it.
+  if ((lower_case(type) + ';').find(";base64;") == std::string::npos)
+    return {data.begin(), data.end()};
   std::erase_if(data, is_space);
   std::ranges::replace(data, '-', '+');  // the alphabet for URLs (RFC 4648, 5)
   std::ranges::replace(data, '_', '/');

@@ -44,6 +44,7 @@ class Budget {
   // Returns the size that a texture may have so that all fit, its own where they do.
   PictureSize fitted_texture(std::size_t texture);
   std::uint64_t most_texels() const { return most_texels_; }
+  bool has_levels() const { return has_levels_; }
   // Counts the vertices of one mesh once for each morph target and each set of joints.
   void add_deformed(std::uint64_t count, const std::string& where);
   // Counts the joints of a skin for each node that has it.

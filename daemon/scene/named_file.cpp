@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <charconv>
+#include <climits>
 #include <cstdint>
 #include <fstream>
+#include <utility>
 
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/problems.hpp"
+#include "drivers/letters.hpp"
 
 namespace previz::scene {
 namespace {
@@ -22,27 +25,26 @@ bool is_file(const fs::path& path) {
   return fs::is_regular_file(path, ignored);
 }
 
-std::string lower_case(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
-
-// Appends the files below the folder whose path differs at most by the case of its letters.
-void append_alike(const fs::path& folder, fs::path::const_iterator part,
-                  const fs::path::const_iterator end, std::vector<fs::path>& alike) {
-  if (part == end) {
-    if (is_file(folder)) alike.push_back(folder);
-    return;
+// Returns the files below the folder whose path differs at most by the case of its letters.
+std::vector<fs::path> alike_files(const fs::path& folder, const fs::path& name) {
+  std::vector<fs::path> alike{folder};
+  for (const fs::path& part : name.lexically_normal()) {
+    std::vector<fs::path> below;
+    const std::string lower = lower_case(part.string());
+    for (const fs::path& above : alike) {
+      if (part == ".." || part == ".") {
+        below.push_back(above / part);
+        continue;
+      }
+      std::error_code error;
+      for (fs::directory_iterator entry(above, error), last; !error && entry != last;
+           entry.increment(error))
+        if (lower_case(entry->path().filename().string()) == lower) below.push_back(entry->path());
+    }
+    alike = std::move(below);
   }
-  const fs::path wanted = *part++;
-  if (wanted == ".." || wanted == ".") return append_alike(folder / wanted, part, end, alike);
-  const std::string lower = lower_case(wanted.string());
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), last; !error && entry != last;
-       entry.increment(error))
-    if (lower_case(entry->path().filename().string()) == lower)
-      append_alike(entry->path(), part, end, alike);
+  std::erase_if(alike, [](const fs::path& path) { return !is_file(path); });
+  return alike;
 }
 
 }  // namespace
@@ -56,7 +58,8 @@ std::optional<NamedFile> find_named_file(const fs::path& file, const std::string
     std::ranges::replace(spellings.back(), '\\', '/');
   }
   std::erase_if(spellings, [](const std::string& spelling) {
-    return spelling.empty() || spelling.find('\0') != std::string::npos;
+    return spelling.empty() || spelling.size() >= PATH_MAX ||
+           spelling.find('\0') != std::string::npos;
   });
 
   const fs::path folder = file.parent_path();
@@ -71,11 +74,14 @@ std::optional<NamedFile> find_named_file(const fs::path& file, const std::string
   for (const fs::path& bare : bare_names)
     if (is_file(folder / bare)) return NamedFile{folder / bare, true};
   for (const fs::path& written : names) {
-    std::vector<fs::path> alike;
-    append_alike(folder.empty() ? "." : folder, written.begin(), written.end(), alike);
+    const std::vector<fs::path> alike = alike_files(folder.empty() ? "." : folder, written);
     if (alike.size() == 1) return NamedFile{alike[0], true};
   }
-  return {};
+  const std::size_t path_end = name.find_first_of("?#");  // RFC 3986, 3: a query or a fragment
+  if (!rules.is_uri || path_end == std::string::npos) return {};
+  std::optional<NamedFile> found = find_named_file(file, name.substr(0, path_end), rules);
+  if (found) found->has_other_name = true;
+  return found;
 }
 
 std::string without_escapes(const std::string& text) {

@@ -23,8 +23,8 @@ struct NamedFile {
 
 // Finds the regular file that the scene or scan `file` calls `name`: as written, with %20 and the
 // like decoded, and with \ as /; then by its bare name beside `file`, where the path is another
-// computer's; and last by letters A to Z of another case, if one file alone has such a name.
-// Returns nothing if there is none.
+// computer's; then by letters A to Z of another case, if one file alone has such a name; and last,
+// of a URI, without what follows ? or #. Returns nothing if there is none.
 std::optional<NamedFile> find_named_file(const std::filesystem::path& file, const std::string& name,
                                          NameRules rules);
 

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "drivers/error.hpp"
+#include "drivers/letters.hpp"
 
 namespace previz::scene {
 namespace {
@@ -87,13 +88,6 @@ constexpr std::array packed = {
     Mistake{"\x1f\x8b", "compressed by gzip: unpack it by \"gunzip\""},
     Mistake{"\x28\xb5\x2f\xfd", "compressed by Zstandard: unpack it by \"unzstd\""},
 };
-
-std::string lower_case(std::string_view text) {
-  std::string lower(text);
-  for (char& c : lower)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return lower;
-}
 
 bool has_bytes(std::string_view head, std::string_view bytes, std::size_t offset) {
   if (bytes.empty()) return false;

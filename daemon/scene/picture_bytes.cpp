@@ -66,8 +66,22 @@ PictureSize stb_size(std::span<const unsigned char> bytes, const std::string& wh
   if (!stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height,
                              &channels) ||
       width < 1 || height < 1)
-    throw Error(where + ": cannot be decoded: " + picture_failure());
+    throw Error(where + ": cannot be decoded: " + picture_failure(bytes));
   return {width, height};
+}
+
+constexpr const char* too_large_in_16_bits =
+    "is too large with 16 bits; export it with 8 bits, or 8192 wide";
+
+// A PNG's first chunk has its bits per sample and its kind of colour behind its size.
+bool has_16_bits(std::span<const unsigned char> bytes) {
+  constexpr std::size_t bits_at = 24;
+  return begins_with(bytes, png_signature) && bytes.size() > bits_at && bytes[bits_at] == 16;
+}
+bool has_16_bits_and_alpha(std::span<const unsigned char> bytes) {
+  constexpr std::size_t color_at = 25;
+  constexpr unsigned char rgba = 6;
+  return has_16_bits(bytes) && bytes.size() > color_at && bytes[color_at] == rgba;
 }
 
 }  // namespace
@@ -83,9 +97,16 @@ WebpTexels decoded_webp(std::span<const unsigned char> bytes) {
   return {{rgba, WebPFree}, {width, height}};
 }
 
-std::string picture_failure() {
-  const char* reason = stbi_failure_reason();
-  return reason ? reason : "damaged";
+std::string picture_failure(std::span<const unsigned char> bytes) {
+  const char* const given = stbi_failure_reason();
+  const std::string reason = given ? given : "";
+  if (has_16_bits(bytes) && (reason == "outofmem" || reason == "too large"))
+    return std::string("it ") + too_large_in_16_bits;
+  // stb_image tries the formats in turn, and a failed try stays its reason where none follows.
+  const bool is_of_a_try = begins_with(bytes, png_signature)
+                               ? reason == "no SOI"
+                               : reason == "bad png sig" || reason == "unknown image type";
+  return reason.empty() || is_of_a_try ? "damaged" : reason;
 }
 
 PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std::string& where) {
@@ -100,6 +121,9 @@ PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std
     throw Error(where + ": is " + std::to_string(width) + "x" + std::to_string(height) +
                 "; a side is at most " + std::to_string(max_texture_side));
   const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  if (has_16_bits_and_alpha(bytes) &&  // which stb_image counts in an int
+      texels * 8 > static_cast<std::size_t>(std::numeric_limits<int>::max()))
+    throw Error(where + ": " + too_large_in_16_bits);
   const bool is_small = is_webp(bytes) && texels <= most_texels_of_few_bytes;
   if (!is_small && texels / max_texels_a_byte > bytes.size()) throw Error(where + ": is cut short");
   return {width, height};
@@ -135,7 +159,7 @@ std::vector<std::uint8_t> decoded_luma(std::span<const unsigned char> bytes, Pic
                             &channels, 1),
       free);
   if (!samples || width != size.width || height != size.height)
-    throw Error(where + ": cannot be decoded: " + picture_failure());
+    throw Error(where + ": cannot be decoded: " + picture_failure(bytes));
   const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
   return {samples.get(), samples.get() + texels};
 }

@@ -21,8 +21,8 @@ PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std
 
 bool is_webp(std::span<const unsigned char> bytes);
 
-// Returns why the last picture of this thread, which was not a WebP, could not be decoded.
-std::string picture_failure();
+// Returns why the last picture of this thread, a PNG or JPEG of these bytes, could not be decoded.
+std::string picture_failure(std::span<const unsigned char> bytes);
 
 // The texels of a WebP, four bytes each, RGBA, row-major from the top; null where it is damaged.
 // The size is that which the bytes say.

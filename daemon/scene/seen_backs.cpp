@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <glm/geometric.hpp>
 #include <limits>
+#include <map>
 #include <numbers>
 
 namespace previz::scene {
@@ -12,7 +13,7 @@ namespace {
 
 constexpr double most_of_front = 0.125;  // of what is seen
 // Each is tried on all triangles of an object: fewer than takes as long as reading it.
-constexpr std::size_t rays_of_a_part = 24, most_rays = 96;
+constexpr std::size_t rays_of_a_part = 24, most_rays = 96, fewest_rays = 8;
 
 struct Outermost {
   double distance = -std::numeric_limits<double>::infinity();
@@ -52,8 +53,20 @@ glm::dvec3 direction_of(std::size_t ray, std::size_t rays) {
 
 }  // namespace
 
-std::vector<bool> are_seen_from_behind(std::span<const Mesh* const> parts) {
-  const std::size_t rays = std::min(rays_of_a_part * parts.size(), most_rays);
+std::vector<bool> are_seen_from_behind(std::span<const Mesh* const> meshes, std::uint64_t& tries) {
+  std::map<const Mesh*, std::size_t> place;
+  std::vector<const Mesh*> parts;
+  std::uint64_t triangles = 0;
+  for (const Mesh* const mesh : meshes) {
+    if (!place.emplace(mesh, parts.size()).second) continue;
+    parts.push_back(mesh);
+    triangles += mesh->triangles.size();
+  }
+  const std::uint64_t rays_left = tries / std::max<std::uint64_t>(triangles, 1);
+  const std::size_t rays =
+      std::min<std::uint64_t>(std::min(rays_of_a_part * parts.size(), most_rays), rays_left);
+  if (rays < fewest_rays) return std::vector<bool>(meshes.size());
+  tries -= rays * triangles;
   std::vector<std::size_t> seen(parts.size()), backs(parts.size());
   for (std::size_t ray = 0; ray < rays; ++ray) {
     const Mesh& aim = *parts[ray % parts.size()];
@@ -69,9 +82,11 @@ std::vector<bool> are_seen_from_behind(std::span<const Mesh* const> parts) {
     ++seen[found.part];
     backs[found.part] += found.is_back ? 1 : 0;
   }
-  std::vector<bool> result(parts.size());
-  for (std::size_t i = 0; i < parts.size(); ++i)
-    result[i] = static_cast<double>(backs[i]) > most_of_front * static_cast<double>(seen[i]);
+  std::vector<bool> result;
+  for (const Mesh* const mesh : meshes) {
+    const std::size_t i = place.at(mesh);
+    result.push_back(static_cast<double>(backs[i]) > most_of_front * static_cast<double>(seen[i]));
+  }
   return result;
 }
 

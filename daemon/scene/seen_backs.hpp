@@ -5,6 +5,7 @@
 // stands for a thing that has a back.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -14,7 +15,8 @@ namespace previz::scene {
 
 // Returns for each of these meshes, which are one object, whether someone around them sees more of
 // it from behind than an eighth: a sheet, a room from outside, a hull that is turned inside out,
-// but no solid with a few holes.
-std::vector<bool> are_seen_from_behind(std::span<const Mesh* const> parts);
+// but no solid with a few holes. `tries` is how many triangles may still be tried, each by each
+// ray, and is made less by those that were; where too few are left for an answer, none is seen.
+std::vector<bool> are_seen_from_behind(std::span<const Mesh* const> meshes, std::uint64_t& tries);
 
 }  // namespace previz::scene

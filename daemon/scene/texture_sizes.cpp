@@ -7,6 +7,8 @@
 namespace previz::scene {
 namespace {
 
+constexpr double least_cover = 1e-6;  // what a texel counts of alpha 0
+
 std::uint64_t texels_of(PictureSize size, bool has_levels) {
   std::uint64_t count = 0;
   for (;;) {
@@ -52,15 +54,19 @@ std::vector<PictureSize> fitted_sizes(std::vector<PictureSize> sizes, bool has_l
   return sizes;
 }
 
-AreaAverage::AreaAverage(PictureSize from, PictureSize to)
+AreaAverage::AreaAverage(PictureSize from, PictureSize to, bool by_alpha)
     : from_(from),
       to_(to),
+      by_alpha_(by_alpha),
       narrow_(static_cast<std::size_t>(to.width)),
       unfinished_(static_cast<std::size_t>(to.width)) {
   texels_.reserve(static_cast<std::size_t>(to.width) * static_cast<std::size_t>(to.height));
 }
 
 void AreaAverage::finish_row() {
+  if (by_alpha_)
+    for (glm::dvec4& sum : unfinished_)
+      sum = glm::dvec4(glm::dvec3(sum) / (sum.a + least_cover), sum.a);
   texels_.insert(texels_.end(), unfinished_.begin(), unfinished_.end());
   std::ranges::fill(unfinished_, glm::dvec4(0));
 }
@@ -69,7 +75,8 @@ void AreaAverage::add(std::span<const glm::vec4> row) {
   std::ranges::fill(narrow_, glm::dvec4(0));
   for (int x = 0; x < from_.width; ++x) {
     const Overlap at = overlap(x, from_.width, to_.width);
-    const glm::dvec4 texel(row[static_cast<std::size_t>(x)]);
+    glm::dvec4 texel(row[static_cast<std::size_t>(x)]);
+    if (by_alpha_) texel = glm::dvec4((texel.a + least_cover) * glm::dvec3(texel), texel.a);
     narrow_[at.first] += at.in_first * texel;
     if (at.in_next > 0) narrow_[at.first + 1] += at.in_next * texel;
   }

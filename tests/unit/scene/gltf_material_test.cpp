@@ -516,8 +516,9 @@ TEST_F(GltfMaterials, RefusesColoursInFormatsThatAreNotRead) {
                                {"emissiveTexture", in_format("EXT_texture_avif")}};
   EXPECT_THAT(error(), HasSubstr("(EXT_texture_avif), and without it a surface would be white"));
   gltf.json["materials"][0] = {{"extensions", {{"KHR_techniques_webgl", {{"technique", 0}}}}}};
-  EXPECT_THAT(error(), HasSubstr("material 0: has nothing but the extension "
-                                 "\"KHR_techniques_webgl\", which is not supported"));
+  EXPECT_THAT(error(),
+              HasSubstr("material 0: its look is in the extension \"KHR_techniques_webgl\", "
+                        "which is not supported, and without it the surface would be"));
   gltf.json["materials"][0] = {{"doubleSided", true},
                                {"normalTexture", in_format("MSFT_texture_dds")}};
   EXPECT_THAT(load().notes,

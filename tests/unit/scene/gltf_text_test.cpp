@@ -1,5 +1,7 @@
 #include "daemon/scene/gltf_text.hpp"
 
+#include <random>
+
 #include "tests/support/gltf_test.hpp"
 #include "tests/support/session_fixture.hpp"
 
@@ -90,6 +92,10 @@ TEST_F(GltfText, OtherDamageIsRefusedByItsPlace) {
       "copy it or export it again");
   EXPECT_THAT(error_of_bytes(with("\"chair\"", "\"a\tb\"")), HasSubstr("nodes[0].name"));
   EXPECT_THAT(error_of_bytes("{" + std::string(300, 'x') + "}"), HasSubstr("line 1, column 2"));
+  for (const char* comment : {"// made by x\n", "/* made by x */\n"})
+    EXPECT_THAT(error_of_bytes(comment + sound),
+                AllOf(HasSubstr("its JSON is damaged in line 1, column 1, at \"/"),
+                      HasSubstr("made by x")));
   EXPECT_THAT(error_of_bytes(" \n"), HasSubstr("it is empty; export it again"));
   EXPECT_THAT(error_of_bytes("hello there"), HasSubstr("it is neither binary glTF nor JSON"));
 }
@@ -137,6 +143,15 @@ TEST_F(GltfText, FilesOfOtherFormatsAreNamed) {
            {"\x89PNG\r\n\x1a\n" + junk, "chair.glb",
             "is a picture (PNG); an object is glTF 2.0 (.glb or .gltf)"}})
     EXPECT_EQ(error_of_bytes(bytes, name), words);
+  // As much as a scene has; its bytes happen to be brackets, too.
+  std::minstd_rand random(1);
+  std::string noise(1u << 20u, '\0');
+  for (char& c : noise) c = static_cast<char>(random() >> 8u & 255u);
+  noise[0] = '\2';
+  EXPECT_EQ(error_of_bytes("BLENDER-v300" + noise, "chair"), is("a Blender file") + blender);
+  EXPECT_EQ(error_of_bytes("Ogawa" + noise, "chair"), is("an Alembic file") + blender);
+  EXPECT_EQ(error_of_bytes(noise, "chair.mb"), is("a Maya file") + own);
+  EXPECT_THAT(error_of_bytes(noise, "chair"), HasSubstr("it is neither binary glTF nor JSON"));
   EXPECT_EQ(load_bytes(sound, "chair.obj").instances.size(), 1u);  // what it holds decides
 }
 

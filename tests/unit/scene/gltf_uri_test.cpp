@@ -81,6 +81,11 @@ TEST(GltfData, IsDecodedInEveryFormOfBase64) {
   for (const char* code :
        {"+//+QQ==", "-__-QQ==", "%2B%2F%2f%2BQQ%3D%3D", "+//+QQ", "+// +\n QQ=="})
     EXPECT_EQ(scene::data_of(std::string("data:;base64,") + code, "x"), bytes) << code;
+  for (const char* type :
+       {";base64;charset=utf-8", "image/png;Base64;charset=utf-8", ";a=b;base64"})
+    EXPECT_EQ(scene::data_of(std::string("data:") + type + ",+//+QQ==", "x"), bytes) << type;
+  for (const char* type : {";name=base64", "base64", ";base64=1"})
+    EXPECT_EQ(scene::data_of(std::string("data:") + type + ",QQ==", "x").size(), 4u) << type;
   EXPECT_EQ(scene::data_of("data:,a%20b+c%zz%4", "x"),
             (std::vector<unsigned char>{'a', ' ', 'b', '+', 'c', '%', 'z', 'z', '%', '4'}));
   for (const char* code : {"+//+Q", "a*bc", "ab==cd=\xff", "="})

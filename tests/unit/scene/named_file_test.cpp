@@ -75,6 +75,29 @@ TEST_F(NamedFiles, WithoutSenseAreNotFound) {
     EXPECT_EQ(found(name), "") << name;
 }
 
+TEST_F(NamedFiles, OfAnyLengthTakeLittleMemory) {
+  put("scene/X.mtl");
+  std::string dots, folders;
+  for (int i = 0; i < 20000; ++i) dots += "./", folders += "m/../";
+  for (const std::string& name : {dots + "x.mtl", folders + "x.mtl"}) {
+    EXPECT_EQ(found(name), "");  // no system has such a name
+    EXPECT_EQ(found(name.substr(name.size() - 4005)), "scene/X.mtl?");
+    EXPECT_EQ(found(name + "/"), "");
+  }
+}
+
+// RFC 3986, 3.4 and 3.5.
+TEST_F(NamedFiles, OfUrisMayHaveAQueryOrAFragment) {
+  put("scene/maps/a.png");
+  for (const char* name : {"maps/a.png?v=3", "maps/a.png#b", "maps/a.png?v=3#b", "MAPS/A.png?v"}) {
+    EXPECT_EQ(found(name, scene::names_in_objects), "scene/maps/a.png?") << name;
+    EXPECT_EQ(found(name, scene::names_in_scans), "") << name;
+  }
+  put("scene/maps/a.png#b");
+  EXPECT_EQ(found("maps/a.png#b"), "scene/maps/a.png#b");
+  EXPECT_EQ(found("?a"), "");
+}
+
 // RFC 3986: what a URI decodes to comes first.
 TEST_F(NamedFiles, AreDecodedFirstWhereTheyAreUris) {
   for (const char* name : {"scene/a b.png", "scene/a%20b.png"}) put(name);

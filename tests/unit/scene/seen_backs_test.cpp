@@ -41,4 +41,18 @@ TEST_F(SeenBacks, AreNotThoseOfSolidsButOfThoseTurnedInsideOut) {
   EXPECT_THAT(load().notes, ElementsAre(HasSubstr("(materials: \"leaf\")")));
 }
 
+TEST(SeenBacksOf, ManyTrianglesTakeABoundedTime) {
+  scene::Mesh sheet;
+  sheet.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  sheet.triangles.assign(10000, {0, 1, 2});
+  const std::vector<const scene::Mesh*> same(400, &sheet);
+  std::uint64_t tries = 1'000'000;
+  EXPECT_EQ(scene::are_seen_from_behind(same, tries), std::vector<bool>(400, true));
+  EXPECT_EQ(tries, 1'000'000u - 24u * 10000u);  // once
+  tries = 100'000;
+  EXPECT_EQ(scene::are_seen_from_behind(same, tries), std::vector<bool>(400, true));
+  EXPECT_EQ(tries, 0u);
+  EXPECT_EQ(scene::are_seen_from_behind(same, tries), std::vector<bool>(400));
+}
+
 }  // namespace previz::test::seen_backs_test

@@ -42,6 +42,21 @@ TEST(TextureSizes, AverageAreasOfAnyShape) {
     for (int c = 0; c < 4; ++c) EXPECT_NEAR(texels[i][c], expected[i][c], 1e-6) << i << c;
 }
 
+// What is not covered has no colour: a leaf on black keeps its green. Where nothing is covered,
+// its colours count alike.
+TEST(TextureSizes, AverageColoursByWhatTheyCover) {
+  scene::AreaAverage average({2, 4}, {1, 2}, true);
+  const std::vector<glm::vec4> leaf = {{0, 0.5f, 0, 1}, {0, 0, 0, 0}};
+  const std::vector<glm::vec4> half = {{1, 0.5f, 0, 0.5f}, {0, 0, 0, 0}};
+  const std::vector<glm::vec4> nothing = {{1, 0, 0, 0}, {0, 0, 0, 0}};
+  for (const auto& row : {leaf, half, nothing, nothing}) average.add(row);
+  const auto texels = average.take();
+  ASSERT_EQ(texels.size(), 2u);
+  const glm::vec4 expected[] = {{1 / 3.0f, 0.5f, 0, 0.375f}, {0.5f, 0, 0, 0}};
+  for (int i = 0; i < 2; ++i)
+    for (int c = 0; c < 4; ++c) EXPECT_NEAR(texels[i][c], expected[i][c], 1e-5) << i << c;
+}
+
 class TextureBudget : public GltfTest {
  protected:
   // A texture of white and black columns, and its material.
@@ -77,14 +92,39 @@ TEST_F(TextureBudget, WhatIsOverItIsReducedInLinearLightWithANote) {
   EXPECT_EQ(reduced.textures[1].height, 4);
   EXPECT_THAT(reduced.textures[1].texels, ::testing::Each(glm::vec4(0.5f, 0.5f, 0.5f, 1)));
   const auto said = HasSubstr(
-      "texture \"image 1\" of 8 x 8 pixels is reduced to 4 x 4: the textures of the scene have "
-      "more "
-      "than 143 together; to choose their sizes, use gltf-transform resize IN OUT --width 4 "
-      "--height 4");
+      "1 texture is reduced, \"image 1\" of 8 x 8 pixels to 4 x 4: the textures of the scene have "
+      "more than 143 pixels together, as two of 8 x 8 have; to choose their sizes, use "
+      "gltf-transform resize IN OUT --width 4 --height 4");
   EXPECT_THAT(whole.notes, Not(Contains(said)));
   EXPECT_THAT(reduced.notes, Contains(said));
   // Half of the area is white: half of the light, whatever the code of that is.
   EXPECT_THAT(load_with(3).textures.at(0).texels, ElementsAre(glm::vec4(0.5f, 0.5f, 0.5f, 1)));
+}
+
+TEST_F(TextureBudget, ManyAreSaidInOneNote) {
+  for (int i = 0; i < 5; ++i) use(8, "baseColorTexture");
+  const auto notes = load_with(100).notes;
+  EXPECT_THAT(notes, Contains(HasSubstr("5 textures are reduced, \"image 0\" of 8 x 8 pixels to 4 "
+                                        "x 4, \"image 1\" of 8 x 8 pixels to 4 x 4, \"image 2\" of "
+                                        "8 x 8 pixels to 4 x 4 and 2 more: ")));
+  EXPECT_EQ(std::ranges::count_if(
+                notes, [](const std::string& note) { return note.find("reduced") != note.npos; }),
+            1);
+}
+
+// An opaque material shows the colours of texels whose alpha is 0.
+TEST_F(TextureBudget, AlphaCountsWhereItCutsOut) {
+  const int texture = gltf.texture(2, 1, {0, 255, 0, 255, 0, 0, 0, 0});
+  const auto green = [&](const char* mode) {
+    gltf.json["materials"] = {
+        {{"alphaMode", mode},
+         {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}}};
+    return load_with(1).textures.at(0).texels.at(0).g;
+  };
+  gltf.root("a", gltf.triangle_mesh(0));
+  EXPECT_EQ(green("OPAQUE"), 0.5f);
+  EXPECT_NEAR(green("MASK"), 1, 1e-5);
+  EXPECT_NEAR(green("BLEND"), 1, 1e-5);
 }
 
 }  // namespace previz::test::texture_sizes_test
