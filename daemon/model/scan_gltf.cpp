@@ -111,12 +111,13 @@ class GltfScanReader {
   }
 
   int picture(int texture) {
-    const auto [image, missing] = scene::image_of(model_, texture, path_);
+    const auto [image, missing] = scene::image_of(model_, texture, path_, names_in_gltf);
     if (const auto known = pictures_.find(image); known != pictures_.end()) return known->second;
     if (image < 0) {
       notes_.add(missing + "; the scan has no colours there");
       return colourless;
     }
+    if (!missing.empty()) notes_.add(missing);
     const scene::EncodedImage encoded = scene::encoded_image(model_, image, path_, names_in_gltf);
     if (!encoded.note.empty()) notes_.add(encoded.note);
     return pictures_[image] = textures_->encoded(encoded.bytes, encoded.name);

@@ -16,6 +16,7 @@
 #include "daemon/model/scan_text.hpp"
 #include "drivers/error.hpp"
 #include "drivers/keys/value.hpp"
+#include "drivers/letters.hpp"
 
 namespace previz::model {
 namespace {
@@ -35,7 +36,7 @@ ObjMap map_of(std::string_view line) {
   ObjMap map;
   for (;;) {
     std::string_view rest = line;
-    const std::string option = in_lower_case(next_word(rest));
+    const std::string option = lower_case(next_word(rest));
     if (!option.starts_with('-') || option.find('.') != std::string::npos) break;
     const bool moves = option == "-o" || option == "-s" || option == "-t";
     const double neutral = option == "-s" ? 1 : 0;
@@ -58,7 +59,7 @@ void read_mtl(std::string_view text, ObjMaterials& materials) {
   ObjMaterial* material = nullptr;
   while (!text.empty()) {
     std::string_view line = next_line(text);
-    const std::string word = in_lower_case(next_word(line));
+    const std::string word = lower_case(next_word(line));
     if (word == "newmtl") material = &materials[std::string(trimmed(line))];
     if (material && word == "map_kd" && material->colour.file.empty())
       material->colour = map_of(line);
@@ -197,9 +198,9 @@ class ObjReader {
   int picture_of(const std::string& name) {
     if (lower_.empty())
       for (const auto& [known, material] : materials_)
-        lower_.try_emplace(in_lower_case(known), &material);
+        lower_.try_emplace(lower_case(known), &material);
     const auto exact = materials_.find(name);
-    const auto similar = lower_.find(in_lower_case(name));
+    const auto similar = lower_.find(lower_case(name));
     if (exact == materials_.end() && similar == lower_.end()) return colourless;
     const auto& [colour, emission] = exact != materials_.end() ? exact->second : *similar->second;
     const ObjMap& map = colour.file.empty() ? emission : colour;

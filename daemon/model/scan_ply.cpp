@@ -15,6 +15,7 @@
 #include "daemon/model/scan_text.hpp"
 #include "drivers/error.hpp"
 #include "drivers/keys/value.hpp"
+#include "drivers/letters.hpp"
 
 namespace previz::model {
 namespace {
@@ -138,10 +139,10 @@ class PlyHeaderReader {
       // Behind end_header there may be data that look like the end of a line.
       std::string_view line = bytes_.substr(0, bytes_.find(is_macintosh ? '\r' : '\n'));
       bytes_.remove_prefix(std::min(line.size() + 1, bytes_.size()));
-      const std::string word = in_lower_case(next_word(line));
+      const std::string word = lower_case(next_word(line));
       if (word == "end_header") break;
       if (word == "format") {
-        header.format = format_of(in_lower_case(next_word(line)));
+        header.format = format_of(lower_case(next_word(line)));
         has_format = true;
       } else if (word == "comment" || word == "obj_info") {
         add_picture(line, header);
@@ -173,13 +174,13 @@ class PlyHeaderReader {
   }
 
   Type type_of(std::string_view word) const {
-    const auto at = std::ranges::find(type_names, in_lower_case(word), &TypeName::name);
+    const auto at = std::ranges::find(type_names, lower_case(word), &TypeName::name);
     if (at == type_names.end()) fail(fmt::format("its type \"{}\" is unknown", shown(word)));
     return at->type;
   }
 
   static void add_picture(std::string_view line, Header& header) {
-    std::string word = in_lower_case(next_word(line));
+    std::string word = lower_case(next_word(line));
     if (word.ends_with(':')) word.pop_back();
     if (word != "texturefile" && word != "texture_file") return;
     if (const std::string_view name = without_quotes(line); !name.empty())
@@ -188,7 +189,7 @@ class PlyHeaderReader {
 
   void add_element(std::string_view line, Header& header) const {
     Element element;
-    element.name = in_lower_case(next_word(line));
+    element.name = lower_case(next_word(line));
     if (element.name == "vertices") element.name = "vertex";
     if (element.name == "faces") element.name = "face";
     if (element.name == "vertex" &&
@@ -206,12 +207,12 @@ class PlyHeaderReader {
     if (header.elements.empty()) fail("its header has a property before an element");
     Property property;
     std::string_view word = next_word(line);
-    if (in_lower_case(word) == "list") {
+    if (lower_case(word) == "list") {
       property.count = type_of(next_word(line));
       word = next_word(line);
     }
     property.type = type_of(word);
-    const std::string name = in_lower_case(next_word(line));
+    const std::string name = lower_case(next_word(line));
     property.role = role_of(header.elements.back(), name);
     const bool needs_list = property.role == Role::corners || property.role == Role::corner_uvs;
     if (needs_list != property.count.has_value()) property.role = Role::other;

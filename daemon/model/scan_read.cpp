@@ -14,6 +14,7 @@
 #include "daemon/model/scan_text.hpp"
 #include "daemon/scene/other_format.hpp"
 #include "drivers/error.hpp"
+#include "drivers/letters.hpp"
 
 namespace previz::model {
 namespace {
@@ -26,7 +27,7 @@ std::string ending_by_content(const std::filesystem::path& path) {
   if (head.starts_with("ply\n") || head.starts_with("ply\r")) return ".ply";
   if (head == "Kaydara FBX Binary") return ".fbx";
   if (head.starts_with("glTF")) return ".glb";
-  return in_lower_case(path.extension().string());
+  return lower_case(path.extension().string());
 }
 
 FoundSurface found_in(const std::filesystem::path& path, ScanTextures* textures, ScanFile& file) {
@@ -59,7 +60,7 @@ FoundSurface found_in(const std::filesystem::path& path, ScanTextures* textures,
 
 ScanFile read_scan(const std::filesystem::path& path, Colouring colouring) {
   constexpr std::array formats{".obj", ".ply", ".stl", ".fbx", ".gltf", ".glb"};
-  const std::string ending = in_lower_case(path.extension().string());
+  const std::string ending = lower_case(path.extension().string());
   if (std::ranges::find(formats, ending) == formats.end()) refuse_ending(path, ending);
   if (!std::filesystem::is_regular_file(path)) throw Error(path.string() + ": file not found");
   ScanTextures textures(path);

@@ -8,6 +8,7 @@
 
 #include "daemon/model/scan_text.hpp"
 #include "drivers/error.hpp"
+#include "drivers/letters.hpp"
 
 namespace previz::model {
 namespace {
@@ -48,7 +49,7 @@ FoundSurface read_text(const std::filesystem::path& file, std::string_view text)
   FoundSurface found;
   TextSteps steps;
   while (!text.empty()) {
-    const std::string word = in_lower_case(next_word(text));
+    const std::string word = lower_case(next_word(text));
     if (word == "solid" || word == "endsolid") {
       next_line(text);  // a name of any words
     } else if (word == "vertex") {
@@ -81,8 +82,8 @@ FoundSurface read_stl(const std::filesystem::path& file, std::string_view bytes)
     return read_binary(bytes, facets);
   if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
   std::string_view start = bytes.substr(0, 1000);
-  if (in_lower_case(next_word(start)) == "solid" &&
-      in_lower_case(bytes.substr(0, 2000)).find("facet") != std::string::npos)
+  if (lower_case(next_word(start)) == "solid" &&
+      lower_case(bytes.substr(0, 2000)).find("facet") != std::string::npos)
     return read_text(file, bytes);
   if (facets > 0 && facets <= fit) return read_binary(bytes, facets);
   throw Error(file.string() +

@@ -56,13 +56,6 @@ std::string_view without_quotes(std::string_view name) {
   return is_quoted ? name.substr(1, name.size() - 2) : name;
 }
 
-std::string in_lower_case(std::string_view text) {
-  std::string lower(text);
-  std::ranges::transform(lower, lower.begin(),
-                         [](char c) { return c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c; });
-  return lower;
-}
-
 std::optional<double> number_in(std::string_view word) {
   std::array<char, 64> with_point{};
   if (const std::size_t comma = word.find(','); comma < word.size() && word.size() < 64) {

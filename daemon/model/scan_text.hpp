@@ -27,8 +27,6 @@ std::string_view trimmed(std::string_view line);
 // Returns a trimmed name without the quotation marks that some programs put around it.
 std::string_view without_quotes(std::string_view name);
 
-std::string in_lower_case(std::string_view text);
-
 // Returns the number that a word begins with, whose decimal sign may be a comma; what is written
 // for infinity and for what is not a number, 1.#IND for example, is not finite. Returns nothing
 // for other words.

@@ -155,7 +155,7 @@ TextureImage image_of(const tinygltf::Model& model, int index, const std::string
     if (left_out.empty())
       image = preferred;
     else
-      left_out = name + ": its WebP is left out for its other picture: " + left_out;
+      left_out = name + ": its WebP is ignored for its other picture: " + left_out;
   }
   if (image >= 0 && static_cast<std::size_t>(image) >= model.images.size())
     throw Error(file + ": " + name + ": no image " + std::to_string(image));
