@@ -54,7 +54,7 @@ TEST_F(GltfLooks, ReadsTheOtherPictureWhereTheWebpCannotBeRead) {
         {{"source", 0}, {"extensions", {{"EXT_texture_webp", {{"source", image}}}}}}};
     const scene::Scene scene = load();
     EXPECT_EQ(scene.textures.at(0).width, 1) << image;
-    EXPECT_THAT(scene.notes, Contains(HasSubstr("texture 0: its WebP is left out for its other "
+    EXPECT_THAT(scene.notes, Contains(HasSubstr("texture 0: its WebP is ignored for its other "
                                                 "picture: ")))
         << image;
     gltf.json["textures"][0].erase("source");
