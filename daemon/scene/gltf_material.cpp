@@ -131,7 +131,8 @@ void refuse_foreign(const tinygltf::Material& given, const std::string& where) {
       given.emissiveFactor != std::vector<double>{0, 0, 0})
     return;
   std::string foreign;
-  for (const auto& [name, content] : given.extensions) {
+  for (const auto& extension_of_material : given.extensions) {
+    const std::string& name = extension_of_material.first;
     const auto row =
         std::ranges::find_if(material_extensions(), [&](const auto& r) { return name == r.name; });
     if (row != material_extensions().end() && !row->ignored) return;
