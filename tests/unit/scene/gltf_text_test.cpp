@@ -113,7 +113,7 @@ TEST_F(GltfText, FilesOfOtherFormatsAreNamed) {
   for (const auto& [bytes, name, words] : std::vector<Try>{
            {"# chair\no Chair\nv 0 0 0\n", "chair.obj", is("an OBJ file") + blender},
            {"mtllib a.mtl\n", "chair", is("an OBJ file") + blender},
-           {"Kaydara FBX Binary  \0\x1a" + junk, "chair", is("an FBX file") + blender},
+           {"Kaydara FBX Binary  " + junk, "chair", is("an FBX file") + blender},
            {"; FBX 7.4.0 project file\n", "chair.glb", is("an FBX file") + blender},
            {"#usda 1.0\n", "chair.usd", is("a USD file") + blender},
            {"PXR-USDC" + junk, "chair.glb", is("a USD file") + blender},
