@@ -469,7 +469,7 @@ TEST_F(GltfMaterials, ReadsWebpWhetherItIsRequiredOrNot) {
 
 TEST_F(GltfMaterials, RefusesWebpThatIsDamagedAnimatedOrTooLarge) {
   use_image(Json::object());
-  const auto message_of = [&](std::vector<unsigned char> bytes) {
+  const auto message_of = [&](const std::vector<unsigned char>& bytes) {
     return error_with("/images/0", {{"uri", "data:image/webp;base64," + base64(bytes)}});
   };
   // A canvas of width and height less 1 in 24 bits each, with flags (Google's "WebP Container
