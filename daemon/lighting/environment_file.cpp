@@ -171,7 +171,7 @@ bool has_like_halves(const LinearPicture& picture, bool beside) {
   const float median = std::max(sorted[sorted.size() / 2], 1e-20f);
   // A lamp in one block does not outweigh the others.
   const auto seen = [&](float value) { return value / (std::abs(value) + median); };
-  // What is near is elsewhere for the other eye, by a block at most.
+  // The other eye sees near things elsewhere, by a block at most.
   float difference = 0;
   for (std::size_t i = 0; i < one.size(); ++i) {
     float least = std::abs(seen(one[i]) - seen(other[i]));

@@ -124,7 +124,7 @@ void insist_on_light(const Imf::Header& header, const std::vector<glm::vec3>& pi
                  : fmt::format("{} of {} pixels are no light", impossible, pixels.size())));
 }
 
-// Where the pixels that the file has lie in the picture that it shows.
+// The rectangles of the pixels that the file has, of the picture that it shows, and of both.
 struct Windows {
   Imath::Box2i data, shown, common;
 };

@@ -13,9 +13,9 @@ namespace previz::lighting {
 
 class PictureRows {
  public:
-  // Of a picture of this size no more than `most_kept` pixels are kept, by an equal number of
-  // pixels for each along both sides, whole where that keeps the picture's shape. The file has this
-  // many bytes. Throws previz::Error naming the file where no smaller picture has its shape.
+  // Keeps at most `most_kept` pixels of a picture of this size: each stands for equally many
+  // along both sides, a whole number where that keeps the picture's shape. The file has this many
+  // bytes. Throws previz::Error naming the file where no smaller picture has its shape.
   PictureRows(const std::filesystem::path& path, int width, int height, std::int64_t most_kept);
 
   // Appends the next row from the top, `width` pixels, to the area means of the picture. A value of

@@ -44,7 +44,7 @@ struct FbxTexture {
   std::string path, bytes;
 };
 
-// What is read in another process. Its surface's sources are indices of the textures.
+// A file's content, as another process reads it. The surface's sources are indices of `textures`.
 struct FbxContent {
   FoundSurface found;
   std::vector<FbxTexture> textures;

@@ -38,7 +38,7 @@ constexpr std::array type_names{
 
 enum class Format { text, little_endian, big_endian };
 
-// What a property is to a scan.
+// The part that a property has in a scan.
 enum class Role {
   other,
   x,

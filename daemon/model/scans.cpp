@@ -125,7 +125,7 @@ struct Bounds {
   glm::dvec3 low{std::numeric_limits<double>::infinity()}, high{-low};
 };
 
-// In the file's coordinates.
+// Returns the bounds in the file's coordinates.
 Bounds bounds_of(const ScanFile& file) {
   Bounds bounds;
   for (const glm::vec3& p : file.mesh.positions) {

@@ -19,8 +19,8 @@ namespace previz::scene {
 // different.
 void check_required_extensions(const nlohmann::json& root, const std::string& file);
 
-// Whether an extension that is not read says what a material looks like in place of glTF's own
-// words, so that the material is white without it.
+// Returns whether an extension that is not read says what a material looks like in place of glTF's
+// own words, so that the material is white without it.
 bool replaces_materials(const std::string& extension);
 
 // Returns the names of these materials of the file, in brackets and at most three; "" of none.

@@ -61,7 +61,7 @@ class GltfMaterials {
   // the file. What lets light through is seen from both sides.
   std::map<std::uint32_t, std::size_t> one_sided() const;
 
-  // As GltfTextures::decode().
+  // Decodes the textures of the materials used so far (GltfTextures::decode()).
   void decode_textures() { textures_.decode(); }
 
  private:

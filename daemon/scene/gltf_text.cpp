@@ -42,29 +42,14 @@ int nesting_depth(std::string_view json) {
   return deepest;
 }
 
-// Returns how many bytes the letter at the beginning has; 0 if it is not UTF-8 (RFC 3629, 4).
-std::size_t letter_size(std::string_view text) {
-  const auto at = [&](std::size_t i) {
-    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u;
-  };
-  const auto follows = [&](std::size_t i, unsigned low = 0x80, unsigned high = 0xbf) {
-    return at(i) >= low && at(i) <= high;
-  };
-  const unsigned first = at(0);
-  if (first < 0x80) return 1;
-  if (first >= 0xc2 && first <= 0xdf) return follows(1) ? 2 : 0;
-  if (first >= 0xe0 && first <= 0xef)
-    return follows(1, first == 0xe0 ? 0xa0 : 0x80, first == 0xed ? 0x9f : 0xbf) && follows(2) ? 3
-                                                                                              : 0;
-  if (first >= 0xf0 && first <= 0xf4)
-    return follows(1, first == 0xf0 ? 0x90 : 0x80, first == 0xf4 ? 0x8f : 0xbf) && follows(2) &&
-                   follows(3)
-               ? 4
-               : 0;
-  return 0;
+// Returns the text with U+FFFD in place of bytes that are not UTF-8.
+std::string utf8_of(std::string_view text) {
+  const Json string = text;
+  return Json::parse(string.dump(-1, ' ', false, Json::error_handler_t::replace))
+      .get<std::string>();
 }
 
-// Whether a word is a number that is not finite as some program writes it: NaN, -Infinity,
+// Returns whether a word is a number that is not finite, as some program writes it: NaN, -Infinity,
 // -nan(ind) and 1.#INF, or one that no double can hold.
 bool is_not_finite(std::string_view written) {
   std::string word = lower_case(written);
@@ -76,40 +61,28 @@ bool is_not_finite(std::string_view written) {
   return !word.empty() && word[0] >= '0' && word[0] <= '9' && *end == '\0' && std::isinf(number);
 }
 
-// Returns the text with U+FFFD for bytes of strings that are not UTF-8, and with marked strings for
-// numbers that are not finite.
-std::string mended(std::string_view text) {
+// Returns the text with U+FFFD for bytes that are not UTF-8, and with marked strings for numbers
+// that are not finite.
+std::string mended(std::string_view bytes) {
   constexpr std::string_view around_words = " \t\r\n{}[],:\"";
+  const std::string text = utf8_of(bytes);
   std::string result;
   result.reserve(text.size() + text.size() / 8);
   bool in_string = false;
-  for (std::size_t i = 0; i < text.size();) {
-    std::size_t size = 1;
-    if (in_string) {
-      size = text[i] == '\\' && i + 1 < text.size() ? 1 : letter_size(text.substr(i));
-      if (size == 0) {
-        result += replacement;
-        ++i;
-        continue;
-      }
-      if (text[i] == '\\' && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0x80)
-        size = 2;
-      in_string = text[i] != '"';
-    } else if (around_words.find(text[i]) != std::string_view::npos) {
-      in_string = text[i] == '"';
-    } else {
+  for (std::size_t i = 0, size = 1; i < text.size(); i += size) {
+    const bool ends_word = around_words.find(text[i]) != std::string_view::npos;
+    size = in_string && text[i] == '\\' && i + 1 < text.size() ? 2 : 1;
+    if (!in_string && !ends_word)
       size = std::min(text.find_first_of(around_words, i), text.size()) - i;
-      const std::string_view word = text.substr(i, size);
-      if (is_not_finite(word)) {
-        result += "\"\\u0001";
-        for (const char c : word) result += c > ' ' && c != '\\' && c < 0x7f ? c : '?';
-        result += '"';
-        i += size;
-        continue;
-      }
+    if (text[i] == '"') in_string = !in_string;
+    const std::string word = text.substr(i, size);
+    if (in_string || ends_word || !is_not_finite(word)) {
+      result += word;
+      continue;
     }
-    result += text.substr(i, size);
-    i += size;
+    result += "\"\\u0001";
+    for (const char c : word) result += c > ' ' && c != '\\' && c < 0x7f ? c : '?';
+    result += '"';
   }
   return result;
 }

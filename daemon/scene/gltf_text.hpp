@@ -16,7 +16,7 @@ struct GltfJson {
   std::vector<std::string> notes;  // of what the text had that JSON does not have
 };
 
-// Where something is in the JSON; it is put into words only for a message, "nodes[0].name".
+// A place in the JSON; it is put into words, "nodes[0].name", only for a message.
 struct JsonPlace {
   const JsonPlace* above;
   std::string key;        // of a member; empty: an element

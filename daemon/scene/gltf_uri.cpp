@@ -37,7 +37,7 @@ Json* array_of(GltfJson& json, const char* key) {
   return array != json.root.end() && array->is_array() ? &*array : nullptr;
 }
 
-// Whether tinygltf decodes the URI as it is.
+// Returns whether tinygltf decodes the URI as it is.
 bool is_plain(std::string_view uri) {
   if (!uri.starts_with(plain_data)) return false;
   std::string_view code = uri.substr(plain_data.size());

@@ -67,7 +67,7 @@ constexpr std::array formats = {
     Format{"an STL file", Way::blender, "solid", ".stl."},
 };
 
-// What is in the place of a scene by mistake, with what to do about it.
+// A file that is named in the place of a scene by mistake, with what to do about it.
 struct Mistake {
   std::string_view bytes, what;
   std::size_t offset = 0;

@@ -131,7 +131,7 @@ PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std
 
 namespace {
 
-// By the weights of stb_image: a scan has the same luma in each format.
+// Returns luma by the weights of stb_image, so that a scan has the same luma in each format.
 std::vector<std::uint8_t> webp_luma(std::span<const unsigned char> bytes, PictureSize size,
                                     const std::string& where) {
   const WebpTexels decoded = decoded_webp(bytes);
