@@ -145,8 +145,10 @@ TEST(Parallax, ALampIsWhereTheSetSeesIt) {
   }
 }
 
-// The default is the middle of tag 0, which lies on the table. A hand's breadth above, at 0.1 m of
-// walls 2.5 m away and more, the room looks the same to a few degrees.
+// The place is the middle of tag 0 by default, which lies on the table. One centimetre above it,
+// walls 2.3 m away and more are seen within 0.25 degrees of where they were: the ring in which the
+// light changes by 2, at 60 degrees from the zenith, moves by at most 0.024 sr, less than 0.01 of
+// the flux of 4 pi sr with at least half of them lit by 1.
 TEST(Parallax, APlaceOnTheFloorKeepsTheMeasuredLight) {
   LightCameraCalibration camera = test::fisheye_camera(128, test::looking(0, 90));
   camera.world_from_camera[3] = glm::dvec4(0.5, 0.2, 1, 1);
@@ -161,8 +163,8 @@ TEST(Parallax, APlaceOnTheFloorKeepsTheMeasuredLight) {
                           .environment)
         .g;
   };
-  EXPECT_NEAR(flux_from(0) / flux_from(1e-2), 1, 0.02);
-  EXPECT_NEAR(flux_from(-1e-4) / flux_from(1e-2), 1, 0.02);
+  EXPECT_NEAR(flux_from(0) / flux_from(1e-2), 1, 0.01);
+  EXPECT_NEAR(flux_from(-1e-4) / flux_from(1e-2), 1, 0.01);
 }
 
 TEST(Parallax, AUniformRoomIsUniform) {

@@ -248,7 +248,8 @@ class GltfScanRead : public ScanRead {
   }
 };
 
-// The codecs keep 14 bits of positions or all of them; the extent is 2.
+// Draco keeps 14 bits of positions, whose extent is 2: a corner is off by 6e-5 along each axis, a
+// triangle's sides of 0.25 and more by at most 5e-4 of themselves, and its area by twice that.
 TEST_F(GltfScanRead, CompressedMeshesAreThoseOfPlainOnes) {
   const std::vector<glm::dvec3> plain = scan_corners(read(plain_grid()));
   ASSERT_EQ(plain.size(), grid().indices.size());
