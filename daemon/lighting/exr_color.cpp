@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "drivers/error.hpp"
+#include "drivers/letters.hpp"
 
 namespace previz::lighting {
 namespace {
@@ -98,10 +99,8 @@ constexpr auto space_names = std::to_array<Name>({{"linrec709", linear_rec709},
 std::string plain(std::string_view name) {
   if (const std::size_t colon = name.rfind(':'); colon != std::string_view::npos)
     name.remove_prefix(colon + 1);
-  std::string letters;
-  for (const char c : name)
-    if (std::isalnum(static_cast<unsigned char>(c)))
-      letters += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  std::string letters = lower_case(name);
+  std::erase_if(letters, [](unsigned char c) { return std::isalnum(c) == 0; });
   for (const auto& [word, shorter] :
        {std::pair{"linear", "lin"}, {"utility", ""}, {"scene", ""}, {"display", ""}})
     if (const std::size_t at = letters.find(word); at != std::string::npos)

@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <exception>
@@ -19,6 +18,7 @@
 #include "daemon/lighting/exr_header.hpp"
 #include "daemon/lighting/picture_rows.hpp"
 #include "drivers/error.hpp"
+#include "drivers/letters.hpp"
 
 namespace previz::lighting {
 namespace {
@@ -45,8 +45,7 @@ bool has_all(const Imf::ChannelList& channels, const std::array<std::string, 3>&
 
 // Returns whether a layer or a part of this name holds numbers that are no light.
 bool names_data(std::string_view name) {
-  std::string lower;
-  for (const char c : name) lower += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string lower = lower_case(name);
   if (lower == "p" || lower == "n" || lower == "pref" || lower == "st") return true;
   return std::ranges::any_of(
       std::array{"position", "normal", "motion", "vector", "velocity", "depth", "uv", "crypto"},

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
@@ -40,70 +39,37 @@ PictureRows::PictureRows(const std::filesystem::path& path, int width, int heigh
           path.string(), width, height, most_kept));
     picture_.width = width / measure * count;
     picture_.height = height / measure * count;
-    scale_ = static_cast<double>(measure) / count;
-    across_.resize(static_cast<std::size_t>(picture_.width));
-    sums_.resize(across_.size());
+    picture_.pixels_of_file = static_cast<double>(measure) / count;
+    average_.emplace(width, height, picture_.width, picture_.height);
   }
   reserve_pixels(picture_, std::filesystem::file_size(path));
 }
 
 void PictureRows::append(std::span<const glm::vec3> row) {
-  if (across_.empty())
-    picture_.radiance.insert(picture_.radiance.end(), row.begin(), row.end());
-  else
-    add(row);
-  ++rows_;
-}
-
-void PictureRows::add(std::span<const glm::vec3> row) {
-  std::ranges::fill(across_, glm::dvec3(0));
-  // The parts of a pixel, or of a row, that lie before and behind the end of a coarse one.
-  const auto share = [&](int pixel, auto&& body) {
-    const auto first = static_cast<std::size_t>(pixel / scale_ + 1e-9);
-    const double end = static_cast<double>(first + 1) * scale_;
-    const double before = std::min(end - pixel, 1.0);
-    body(first, before / scale_);
-    if (before < 1 - 1e-9) body(first + 1, (1 - before) / scale_);
+  const auto keep = [this](auto pixels) {
+    picture_.radiance.insert(picture_.radiance.end(), pixels.begin(), pixels.end());
   };
-  for (int x = 0; x < width_; ++x) {
+  if (!average_) return keep(row);
+  const auto finite = [&](int x) {
     glm::dvec3 light(row[static_cast<std::size_t>(x)]);
     for (int c = 0; c < 3; ++c)
       if (std::isinf(light[c]) && light[c] > 0) {
         light[c] = largest_half;
         ++overflowed_;
       }
-    share(x, [&](std::size_t column, double part) {
-      if (column < across_.size()) across_[column] += part * light;
-    });
-  }
-  const auto is_last = [&](std::size_t coarse) {
-    return static_cast<double>(coarse + 1) * scale_ <= rows_ + 1 + 1e-9;
+    return light;
   };
-  share(rows_, [&](std::size_t coarse, double part) {
-    for (std::size_t i = 0; i < sums_.size(); ++i) sums_[i] += part * across_[i];
-    if (is_last(coarse)) finish_row();
-  });
-}
-
-void PictureRows::finish_row() {
-  if (picture_.radiance.size() ==
-      static_cast<std::size_t>(picture_.width) * static_cast<std::size_t>(picture_.height))
-    return;
-  for (glm::dvec3& sum : sums_) {
-    picture_.radiance.emplace_back(sum);
-    sum = glm::dvec3(0);
-  }
+  average_->add(finite, keep);
 }
 
 LinearPicture PictureRows::picture(std::vector<std::string>& notes) && {
-  if (!across_.empty())
+  if (average_)
     notes.push_back(fmt::format(
         "{}: has {}x{} pixels, which are read as {}x{} by their means{}; light needs no more",
         path_.string(), width_, height_, picture_.width, picture_.height,
         overflowed_ == 0
             ? std::string()
             : fmt::format(" ({} values of +Inf count as {})", overflowed_, largest_half)));
-  picture_.pixels_of_file = scale_;
   return std::move(picture_);
 }
 

@@ -3,11 +3,14 @@
 #pragma once
 
 #include <filesystem>
+#include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "daemon/lighting/linear_picture.hpp"
+#include "drivers/convert/area_average.hpp"
 
 namespace previz::lighting {
 
@@ -25,17 +28,11 @@ class PictureRows {
   LinearPicture picture(std::vector<std::string>& notes) &&;
 
  private:
-  void add(std::span<const glm::vec3> row);
-  void finish_row();
-
   std::filesystem::path path_;
   int width_, height_;
   LinearPicture picture_;
-  double scale_ = 1;                // pixels of the file for one of the picture, along a side
-  int rows_ = 0;                    // appended so far
-  std::int64_t overflowed_ = 0;     // values of +Inf
-  std::vector<glm::dvec3> across_;  // means of the last row over the picture's columns
-  std::vector<glm::dvec3> sums_;    // of the picture's unfinished row
+  std::optional<convert::AreaAverage<glm::dvec3>> average_;  // where it is made coarser
+  std::int64_t overflowed_ = 0;                              // values of +Inf
 };
 
 }  // namespace previz::lighting

@@ -6,7 +6,6 @@
 #include <array>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -223,14 +222,6 @@ class PlyHeaderReader {
   std::string_view& bytes_;
 };
 
-template <typename T>
-double loaded(const char* bytes, bool is_swapped) {
-  std::array<char, sizeof(T)> raw{};
-  std::memcpy(raw.data(), bytes, sizeof(T));
-  if (is_swapped) std::ranges::reverse(raw);
-  return static_cast<double>(std::bit_cast<T>(raw));
-}
-
 // Reads values one after the other.
 class PlyValues {
  public:
@@ -294,7 +285,7 @@ class PlyValues {
     if (bytes_.size() < sizeof(T)) fail();
     const bool is_swapped =
         (format_ == Format::big_endian) != (std::endian::native == std::endian::big);
-    const double value = loaded<T>(bytes_.data(), is_swapped);
+    const double value = binary_number<T>(bytes_.data(), is_swapped);
     bytes_.remove_prefix(sizeof(T));
     return value;
   }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <string>
 
 #include "daemon/model/scan_text.hpp"
@@ -16,13 +15,6 @@ namespace {
 constexpr std::size_t head_bytes = 84, facet_bytes = 50;
 static_assert(std::endian::native == std::endian::little, "binary STL is little-endian");
 
-template <typename T>
-T loaded(std::string_view bytes, std::size_t at) {
-  T value;
-  std::memcpy(&value, bytes.data() + at, sizeof value);
-  return value;
-}
-
 FoundSurface read_binary(std::string_view bytes, std::size_t facets) {
   FoundSurface found;
   found.points.reserve(3 * facets);
@@ -34,7 +26,7 @@ FoundSurface read_binary(std::string_view bytes, std::size_t facets) {
       for (std::size_t k = 0; k < 3; ++k) {
         const std::size_t number = 3 + 3 * corner + k;  // behind the normal
         const double value =
-            double{loaded<float>(bytes, head_bytes + facet_bytes * facet + 4 * number)};
+            binary_number<float>(bytes.data() + head_bytes + facet_bytes * facet + 4 * number);
         p[static_cast<glm::length_t>(k)] = value;
         if (std::isfinite(value)) farthest = std::max(farthest, std::abs(value));
       }
@@ -76,7 +68,9 @@ FoundSurface read_text(const std::filesystem::path& file, std::string_view text)
 }  // namespace
 
 FoundSurface read_stl(const std::filesystem::path& file, std::string_view bytes) {
-  const std::size_t facets = bytes.size() < head_bytes ? 0 : loaded<std::uint32_t>(bytes, 80);
+  const double claimed =
+      bytes.size() < head_bytes ? 0 : binary_number<std::uint32_t>(bytes.data() + 80);
+  const auto facets = static_cast<std::size_t>(claimed);
   const std::size_t fit = bytes.size() < head_bytes ? 0 : (bytes.size() - head_bytes) / facet_bytes;
   if (bytes.size() >= head_bytes && bytes.size() == head_bytes + facet_bytes * facets)
     return read_binary(bytes, facets);

@@ -1,7 +1,10 @@
 // Takes the files of scans apart into lines, words and numbers.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <bit>
+#include <cstring>
 #include <filesystem>
 #include <limits>
 #include <optional>
@@ -31,6 +34,15 @@ std::string_view without_quotes(std::string_view name);
 // for infinity and for what is not a number, 1.#IND for example, is not finite. Returns nothing
 // for other words.
 std::optional<double> number_in(std::string_view word);
+
+// Returns the number of type T whose bytes begin here, in this machine's order or the other one.
+template <typename T>
+double binary_number(const char* bytes, bool is_swapped = false) {
+  std::array<char, sizeof(T)> raw{};
+  std::memcpy(raw.data(), bytes, sizeof(T));
+  if (is_swapped) std::ranges::reverse(raw);
+  return static_cast<double>(std::bit_cast<T>(raw));
+}
 
 // The steps of coordinates that are written with few digits.
 class TextSteps {

@@ -17,6 +17,7 @@
 #include "daemon/scene/picture_bytes.hpp"
 #include "daemon/scene/texture_sizes.hpp"
 #include "daemon/set/problems.hpp"
+#include "drivers/convert/area_average.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::scene {
@@ -27,6 +28,8 @@ Wrap wrap(int gltf) {
   if (gltf == TINYGLTF_TEXTURE_WRAP_MIRRORED_REPEAT) return Wrap::mirror;
   return Wrap::repeat;
 }
+
+constexpr double least_cover = 1e-6;  // what a texel counts of alpha 0
 
 // Returns the texels of a picture of four samples a pixel, averaged in linear light where `to` is
 // smaller; where the alpha cuts out, the colours by it.
@@ -58,13 +61,23 @@ std::vector<glm::vec4> linearise(const Sample* samples, PictureSize from, Pictur
       if (samples[4 * i + 3] < std::numeric_limits<Sample>::max()) return true;
     return false;
   };
-  AreaAverage average(from, to, cuts_out && is_see_through());
-  std::vector<glm::vec4> row(width);
+  const bool by_alpha = cuts_out && is_see_through();
+  convert::AreaAverage<glm::dvec4> average(from.width, from.height, to.width, to.height);
+  std::vector<glm::vec4> row(width), smaller;
+  const auto weighted = [&](int x) {
+    const glm::dvec4 texel(row[static_cast<std::size_t>(x)]);
+    return by_alpha ? glm::dvec4((texel.a + least_cover) * glm::dvec3(texel), texel.a) : texel;
+  };
+  const auto keep = [&](std::span<const glm::dvec4> sums) {
+    for (const glm::dvec4& sum : sums)
+      smaller.emplace_back(by_alpha ? glm::dvec4(glm::dvec3(sum) / (sum.a + least_cover), sum.a)
+                                    : sum);
+  };
   for (int y = 0; y < from.height; ++y) {
     read(row);
-    average.add(row);
+    average.add(weighted, keep);
   }
-  return average.take();
+  return smaller;
 }
 
 // Returns the texels of a picture of the size that its header says.

@@ -26,37 +26,6 @@ TEST(TextureSizes, CountTheLevelsOfTexturesThatAreFiltered) {
             (std::vector<PictureSize>{{8192, 4096}}));
 }
 
-// Each texel of 5 x 3 reaches over 2/5 x 1/3 of a texel of 2 x 1: the middle column is shared.
-TEST(TextureSizes, AverageAreasOfAnyShape) {
-  scene::AreaAverage average({5, 3}, {2, 1});
-  for (int y = 0; y < 3; ++y) {
-    std::vector<glm::vec4> row;
-    for (int x = 0; x < 5; ++x) row.emplace_back(x, y, x * y, 1);
-    average.add(row);
-  }
-  const auto texels = average.take();
-  ASSERT_EQ(texels.size(), 2u);
-  const float left = (0 + 1 + 0.5f * 2) / 2.5f, right = (0.5f * 2 + 3 + 4) / 2.5f;
-  const glm::vec4 expected[] = {{left, 1, left, 1}, {right, 1, right, 1}};
-  for (int i = 0; i < 2; ++i)
-    for (int c = 0; c < 4; ++c) EXPECT_NEAR(texels[i][c], expected[i][c], 1e-6) << i << c;
-}
-
-// What is not covered has no colour: a leaf on black keeps its green. Where nothing is covered,
-// its colours count alike.
-TEST(TextureSizes, AverageColoursByWhatTheyCover) {
-  scene::AreaAverage average({2, 4}, {1, 2}, true);
-  const std::vector<glm::vec4> leaf = {{0, 0.5f, 0, 1}, {0, 0, 0, 0}};
-  const std::vector<glm::vec4> half = {{1, 0.5f, 0, 0.5f}, {0, 0, 0, 0}};
-  const std::vector<glm::vec4> nothing = {{1, 0, 0, 0}, {0, 0, 0, 0}};
-  for (const auto& row : {leaf, half, nothing, nothing}) average.add(row);
-  const auto texels = average.take();
-  ASSERT_EQ(texels.size(), 2u);
-  const glm::vec4 expected[] = {{1 / 3.0f, 0.5f, 0, 0.375f}, {0.5f, 0, 0, 0}};
-  for (int i = 0; i < 2; ++i)
-    for (int c = 0; c < 4; ++c) EXPECT_NEAR(texels[i][c], expected[i][c], 1e-5) << i << c;
-}
-
 class TextureBudget : public GltfTest {
  protected:
   // A texture of white and black columns, and its material.
@@ -125,6 +94,26 @@ TEST_F(TextureBudget, AlphaCountsWhereItCutsOut) {
   EXPECT_EQ(green("OPAQUE"), 0.5f);
   EXPECT_NEAR(green("MASK"), 1, 1e-5);
   EXPECT_NEAR(green("BLEND"), 1, 1e-5);
+}
+
+// What is not covered has no colour: a leaf on black keeps its green, a fifth of red counts a
+// fifth. Where nothing is covered, the colours count alike.
+TEST_F(TextureBudget, AverageColoursByWhatTheyCover) {
+  const std::vector<unsigned char> leaf = {0, 255, 0, 255, 0, 0, 0, 0};
+  const std::vector<unsigned char> glaze = {255, 0, 0, 51, 0, 0, 0, 0};
+  const std::vector<unsigned char> nothing = {255, 0, 0, 0, 0, 0, 0, 0};
+  std::vector<unsigned char> rgba;
+  for (const auto& row : {leaf, glaze, nothing, nothing})
+    rgba.insert(rgba.end(), row.begin(), row.end());
+  gltf.json["materials"] = {
+      {{"alphaMode", "MASK"},
+       {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", gltf.texture(2, 4, rgba)}}}}}}};
+  gltf.root("a", gltf.triangle_mesh(0));
+  const auto texels = load_with(2).textures.at(0).texels;
+  ASSERT_EQ(texels.size(), 2u);
+  const glm::vec4 expected[] = {{1 / 6.0f, 5 / 6.0f, 0, 0.3f}, {0.5f, 0, 0, 0}};
+  for (int i = 0; i < 2; ++i)
+    for (int c = 0; c < 4; ++c) EXPECT_NEAR(texels[i][c], expected[i][c], 1e-5) << i << c;
 }
 
 }  // namespace previz::test::texture_sizes_test
