@@ -5,6 +5,7 @@
 #include "drivers/error.hpp"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
@@ -286,6 +287,24 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
 
 }  // namespace
 
+namespace {
+
+// A range lets "nan" pass, as no comparison with it holds, and what is computed with it is lost.
+void refuse_what_is_no_number(CLI::App& app) {
+  const auto refusal = [](const std::string& text) -> std::string {
+    double number = 0;
+    if (!CLI::detail::lexical_cast(text, number) || std::isfinite(number)) return {};
+    return text + " is not a number that can be used; give a finite one";
+  };
+  for (CLI::Option* option : app.get_options([](CLI::Option*) { return true; }))
+    if (option->get_type_name().starts_with("FLOAT"))
+      option->check(CLI::Validator(refusal, ""));
+  for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; }))
+    refuse_what_is_no_number(*command);
+}
+
+}  // namespace
+
 void add_commands(CLI::App& app, CommandLine& said) {
   app.set_version_flag("--version", "previzd " PREVIZ_VERSION, "Print the version");
   app.require_subcommand(1);
@@ -311,6 +330,7 @@ void add_commands(CLI::App& app, CommandLine& said) {
                        "(default: the set's output.directory)");
   });
   add_takes(app, said.takes);
+  refuse_what_is_no_number(app);
 }
 
 std::string meant_option(const CLI::App& app) {

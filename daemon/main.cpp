@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <iostream>
 #include <optional>
 
@@ -22,6 +23,7 @@
 #include "daemon/signals.hpp"
 #include "daemon/trade/page.hpp"
 #include "drivers/error.hpp"
+#include "drivers/standard_output.hpp"
 
 namespace {
 
@@ -39,7 +41,7 @@ void report_end(const std::exception& error) {
 int do_devices(bool learn, bool rules, const StopOnSignal& stop) {
   if (rules) return print_device_rules(std::cout), 0;
   learn ? learn_buttons(std::cout, stop.token()) : list_devices(std::cout);
-  return stop.received() ? 128 + stop.received() : 0;
+  return 0;
 }
 
 int do_export(exchange::ExportOptions& options, const StopOnSignal& stop) {
@@ -54,9 +56,7 @@ int do_track(exchange::TrackOptions& options, const StopOnSignal& stop) {
 }
 
 int do_farm(const CLI::App& app, farm::Commands& commands, const StopOnSignal& stop) {
-  const int status =
-      farm::do_farm(app, commands, isatty(STDOUT_FILENO) != 0, std::cout, stop.token());
-  return stop.received() ? 128 + stop.received() : status;
+  return farm::do_farm(app, commands, isatty(STDOUT_FILENO) != 0, std::cout, stop.token());
 }
 
 int do_import(const exchange::ImportOptions& options) {
@@ -68,24 +68,20 @@ int do_import(const exchange::ImportOptions& options) {
   return 0;
 }
 
-int do_render_takes(const post::RenderOptions& options, post::WhichTakes which,
-                    const StopOnSignal& stop) {
+int do_render_takes(const post::RenderOptions& options, post::WhichTakes which) {
   const post::TakesReport report = post::render_takes(options, which, std::cout);
   std::cout << report.rendered.size() << " takes rendered";
   if (!report.failures.empty()) std::cout << ", " << report.failures.size() << " failed";
   std::cout << (report.interrupted ? "; stopped; run the same command to continue" : "")
             << std::endl;
-  if (report.interrupted) return 128 + stop.received();
   return report.failures.empty() ? 0 : 1;
 }
 
-// Returns the exit status of a render of one take that `stop` may have ended.
-int do_render_take(const post::RenderOptions& options, const StopOnSignal& stop) {
+int do_render_take(const post::RenderOptions& options) {
   const post::RenderReport report = post::render_session(options, std::cout);
   std::cout << report.directory.string() << ": " << report.frames.size() << " frames"
             << (report.interrupted ? "; stopped; run the same command to continue" : "")
             << std::endl;
-  if (report.interrupted) return 128 + stop.received();
   if (report.failures.empty()) return 0;
   throw Error(std::to_string(report.failures.size()) +
               (report.failures.size() == 1 ? " frame was" : " frames were") + " not made, " +
@@ -96,8 +92,8 @@ int do_render(post::RenderOptions& options, std::optional<post::WhichTakes> whic
               const StopOnSignal& stop) {
   options.stop = stop.token();
   options.terminal = isatty(STDOUT_FILENO) != 0;
-  if (which) return do_render_takes(options, *which, stop);
-  return do_render_take(options, stop);
+  if (which) return do_render_takes(options, *which);
+  return do_render_take(options);
 }
 
 int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
@@ -113,7 +109,7 @@ int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
               << (answer.is_met ? " (--with " + answer.file.string() + ")" : "") << "\n";
   if (!report.page.empty())
     std::cout << "\n" << report.csv.string() << "\n" << report.page.string() << std::endl;
-  return report.interrupted ? 128 + stop.received() : 0;
+  return 0;
 }
 
 int do_bench(bench::BenchOptions& options, const StopOnSignal& stop) {
@@ -122,7 +118,7 @@ int do_bench(bench::BenchOptions& options, const StopOnSignal& stop) {
   for (const auto& file : {options.json, options.page})
     if (file) std::cout << file->string() << "\n";
   std::cout << std::flush;
-  return report.interrupted ? 128 + stop.received() : 0;
+  return 0;
 }
 
 int do_run(rig::LiveOptions& options, const StopOnSignal& stop) {
@@ -141,32 +137,46 @@ int do_run(rig::LiveOptions& options, const StopOnSignal& stop) {
   return 0;  // a rig runs until it is stopped
 }
 
-}  // namespace
+int do_command(const CLI::App& app, CommandLine& said, const StopOnSignal& stop) {
+  if (app.got_subcommand("bench")) return do_bench(said.bench, stop);
+  if (app.got_subcommand("check")) return post::check_set(said.check, std::cout);
+  if (app.got_subcommand("calibrate"))
+    return calibrate::do_calibrate(app, said.calibrate, std::cout);
+  if (app.got_subcommand("merge")) return do_render(said.merge, std::nullopt, stop);
+  if (app.got_subcommand("model")) return model::make_model(said.model, std::cout), 0;
+  if (app.got_subcommand("devices")) return do_devices(said.learn, said.rules, stop);
+  if (app.got_subcommand("export")) return do_export(said.export_take, stop);
+  if (app.got_subcommand("farm")) return do_farm(app, said.farm, stop);
+  if (app.got_subcommand("import")) return do_import(said.import_session);
+  if (app.got_subcommand("print")) return print::do_print(app, said.print, std::cout);
+  if (app.got_subcommand("render")) return do_render(said.render, said.render_takes, stop);
+  if (app.got_subcommand("takes")) return do_takes(app, said.takes, std::cout, stop.token());
+  if (app.got_subcommand("track")) return do_track(said.track, stop);
+  if (app.got_subcommand("trade")) return do_trade(said.trade, stop);
+  return do_run(said.run, stop);
+}
 
-int main(int argc, char** argv) {
+// Commands end within two seconds of a signal. A rig takes as long as its take needs to be closed,
+// and a stop is its orderly end.
+int do_stoppable(const CLI::App& app, CommandLine& said) {
+  constexpr std::chrono::milliseconds patience(1500);
+  const bool is_rig = app.got_subcommand("run");
+  const StopOnSignal stop(is_rig ? std::nullopt : std::optional(patience));
+  int status = 1;
+  try {
+    status = do_command(app, said, stop);
+  } catch (const std::exception& error) {
+    report_end(error);
+  }
+  return stop.received() != 0 && !is_rig ? 128 + stop.received() : status;
+}
+
+int do_line(int argc, char** argv) {
   CLI::App app{"Path-traced previsualization for a camera rig", "previzd"};
   CommandLine said;
   try {
     add_commands(app, said);
     app.parse(argc, argv);
-    report::start_log(report::severity_named(said.log_level));
-    const StopOnSignal stop;
-    if (app.got_subcommand("bench")) return do_bench(said.bench, stop);
-    if (app.got_subcommand("check")) return post::check_set(said.check, std::cout);
-    if (app.got_subcommand("calibrate"))
-      return calibrate::do_calibrate(app, said.calibrate, std::cout);
-    if (app.got_subcommand("merge")) return do_render(said.merge, std::nullopt, stop);
-    if (app.got_subcommand("model")) return model::make_model(said.model, std::cout), 0;
-    if (app.got_subcommand("devices")) return do_devices(said.learn, said.rules, stop);
-    if (app.got_subcommand("export")) return do_export(said.export_take, stop);
-    if (app.got_subcommand("farm")) return do_farm(app, said.farm, stop);
-    if (app.got_subcommand("import")) return do_import(said.import_session);
-    if (app.got_subcommand("print")) return print::do_print(app, said.print, std::cout);
-    if (app.got_subcommand("render")) return do_render(said.render, said.render_takes, stop);
-    if (app.got_subcommand("takes")) return do_takes(app, said.takes, std::cout, stop.token());
-    if (app.got_subcommand("track")) return do_track(said.track, stop);
-    if (app.got_subcommand("trade")) return do_trade(said.trade, stop);
-    return do_run(said.run, stop);
   } catch (const CLI::ParseError& error) {
     if (app.exit(error) == 0) return 0;
     if (const std::string meant = meant_option(app); !meant.empty()) std::cerr << meant << '\n';
@@ -175,4 +185,12 @@ int main(int argc, char** argv) {
     report_end(error);
     return 1;
   }
+  report::start_log(report::severity_named(said.log_level));
+  return do_stoppable(app, said);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return finished_output("previzd", do_line(argc, argv));
 }

@@ -3,6 +3,9 @@
 #include <unistd.h>
 #include <csignal>
 #include <ctime>
+#include <string_view>
+
+#include "drivers/session/draft.hpp"
 
 namespace previz {
 namespace {
@@ -15,9 +18,17 @@ sigset_t stop_signals() {
   return signals;
 }
 
+// Ends the process. Other threads go on meanwhile, and may hold any lock but that of the drafts.
+[[noreturn]] void end_by(int signal) {
+  session::abandon_drafts();
+  constexpr std::string_view words = "previzd: stopped; files that were not complete are removed\n";
+  [[maybe_unused]] const ssize_t is_told = ::write(STDERR_FILENO, words.data(), words.size());
+  _exit(128 + signal);
+}
+
 }  // namespace
 
-StopOnSignal::StopOnSignal() {
+StopOnSignal::StopOnSignal(std::optional<std::chrono::milliseconds> patience) {
   const sigset_t signals = stop_signals();
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   // The waiting thread must leave SIGHUP to the rig's loop.
@@ -25,13 +36,17 @@ StopOnSignal::StopOnSignal() {
   sigemptyset(&hangup);
   sigaddset(&hangup, SIGHUP);
   pthread_sigmask(SIG_BLOCK, &hangup, &before);
-  waiter_ = std::jthread([this, signals](const std::stop_token& done) {
+  waiter_ = std::jthread([this, signals, patience](const std::stop_token& done) {
+    using Clock = std::chrono::steady_clock;
     const timespec poll{0, 100'000'000};  // how late the destructor may be noticed
+    std::optional<Clock::time_point> deadline;
     while (!done.stop_requested()) {
       const int signal = sigtimedwait(&signals, nullptr, &poll);
+      if (deadline && Clock::now() > *deadline) end_by(received_);
       if (signal <= 0) continue;
-      if (received_ != 0) _exit(128 + signal);
+      if (received_ != 0) end_by(signal);
       received_ = signal;
+      if (patience) deadline = Clock::now() + *patience;
       stop_.request_stop();
     }
   });

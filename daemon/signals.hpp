@@ -2,6 +2,8 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
+#include <optional>
 #include <stop_token>
 #include <thread>
 
@@ -9,10 +11,12 @@ namespace previz {
 
 // While an object of this class lives, SIGINT and SIGTERM are blocked in the constructing thread
 // and in every thread started after it. The first signal to arrive requests a stop; a second one
-// ends the process at once. Construct the object in main, before any other thread.
+// ends the process at once, and so does the end of its patience, whatever keeps it busy. What it
+// had not finished is then removed (session::abandon_drafts()), and its exit status is 128 + the
+// signal. Construct the object in main, before any other thread.
 class StopOnSignal {
  public:
-  StopOnSignal();
+  explicit StopOnSignal(std::optional<std::chrono::milliseconds> patience = std::nullopt);
   ~StopOnSignal();
   StopOnSignal(const StopOnSignal&) = delete;
   StopOnSignal& operator=(const StopOnSignal&) = delete;

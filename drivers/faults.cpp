@@ -142,6 +142,8 @@ Number number(std::string_view text, const std::string& whole) {
   Number value{};
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size()) refuse(whole);
+  if constexpr (std::is_floating_point_v<Number>)
+    if (!std::isfinite(value)) refuse(whole);
   return value;
 }
 

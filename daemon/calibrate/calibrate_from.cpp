@@ -17,18 +17,6 @@ namespace {
 
 constexpr double most_refit_px = 0.1;
 
-std::string content_of_lens_file(const std::filesystem::path& file) {
-  std::error_code error;
-  if (std::filesystem::is_directory(file, error))
-    throw Error(file.string() + ": is a folder; give the file with the calibration");
-  if (std::filesystem::exists(file, error) && !std::filesystem::is_regular_file(file, error))
-    throw Error(file.string() + ": is a device or a pipe; give a file");
-  const auto size = std::filesystem::file_size(file, error);
-  if (!error && size > most_lens_file_bytes)
-    throw Error(file.string() + ": is larger than 1 MiB; give a file with the lens alone");
-  return session::read_file(file);
-}
-
 // Reports how well a lens was fitted, and returns a comment for the table if it is forced.
 template <typename Intrinsics>
 std::string report_refit(const Refit<Intrinsics>& refit, const char* role, bool force,
@@ -97,7 +85,7 @@ void calibrate_from(const FromOptions& options, std::ostream& out) {
   const std::string file = options.file.string();
   std::optional<PictureSize> size;
   if (!options.size.empty()) size = parse_picture_size(options.size);
-  const LensFile read = read_lens_file(content_of_lens_file(options.file), file);
+  const LensFile read = read_lens_file(session::read_file(options.file, lens_file_kind), file);
   FileLens lens = chosen_lens(read, options.camera, file);
   complete_lens(lens, size);
   const auto [width, height] = picture_size(lens.lens);

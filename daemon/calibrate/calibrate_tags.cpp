@@ -173,7 +173,7 @@ void calibrate_tags(const TagsOptions& options, std::ostream& out) {
       insist(missing_of_tags(survey, wanted, how.origin), options.force, out);
   if (options.write) {
     const std::string text =
-        with_lens(with_tags(session::read_file(*options.set_file), survey, doubts),
+        with_lens(with_tags(set::read_set_file(*options.set_file), survey, doubts),
                   camera.intrinsics, survey.lens);
     set::parse_set(text, *options.set_file);
     const auto old = set::keep_beside(*options.set_file);

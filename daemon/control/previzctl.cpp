@@ -13,6 +13,7 @@
 #include "daemon/control/bus.hpp"
 #include "daemon/control/request.hpp"
 #include "drivers/error.hpp"
+#include "drivers/standard_output.hpp"
 
 namespace {
 
@@ -155,9 +156,7 @@ void print_actions(bool names_only) {
   }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int do_line(int argc, char** argv) {
   CLI::App app{"Operates a camera rig that runs previzd", "previzctl"};
   control::Request asked;
   try {
@@ -186,4 +185,10 @@ int main(int argc, char** argv) {
     std::cerr << "previzctl: " << error.what() << std::endl;
     return 1;
   }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return finished_output("previzctl", do_line(argc, argv));
 }

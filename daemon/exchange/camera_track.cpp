@@ -180,7 +180,7 @@ void export_scene(const pipeline::Take& take, const std::filesystem::path& direc
           << "\", is never found in the take" << std::endl;
       continue;
     }
-    std::string content = session::read_file(object.file);
+    std::string content = session::read_file(object.file, {"a model", std::uint64_t{1} << 32});
     try {
       if (*places.first != glm::dmat4(1))
         content = placed_model(content, object.name, *places.first);

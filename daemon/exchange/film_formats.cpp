@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <span>
 #include <string_view>
 
 #include "daemon/exchange/picture_header.hpp"
 #include "daemon/set/problems.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::exchange {
 namespace {
@@ -53,8 +53,8 @@ std::string mark_of(std::uint32_t tag) {
 
 // The four bytes after the first four, where boxes have their names.
 std::string first_mark(const std::filesystem::path& file) {
-  std::string bytes(8, '\0');
-  std::ifstream(file, std::ios::binary).read(bytes.data(), 8);
+  std::string bytes = session::read_beginning(file, 8);
+  bytes.resize(8);
   return bytes.substr(4);
 }
 

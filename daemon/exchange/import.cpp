@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <set>
-#include <sstream>
 
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/import_description.hpp"
 #include "daemon/exchange/size_reason.hpp"
 #include "daemon/scene/assets.hpp"
+#include "daemon/set/file_edit.hpp"
 #include "daemon/set/problems.hpp"
 #include "daemon/tracking/pose_judgement.hpp"
 #include "daemon/tracking/trackers.hpp"
@@ -35,14 +34,6 @@ void check_target(const fs::path& target) {
     throw Error(target.string() + ": already exists; choose another name for the session");
   std::error_code seen_later;
   fs::create_directories(target.parent_path(), seen_later);
-}
-
-std::string content_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  if (!stream || (stream.peek() != EOF && !(text << stream.rdbuf())))
-    throw Error(file.string() + ": cannot be read");
-  return text.str();
 }
 
 std::uintmax_t size_of(const fs::path& folder) {
@@ -318,7 +309,7 @@ session::SessionInfo info_of(const ImportDescription& description, const fs::pat
   info.light = description.light_calibration;
   if (description.set) {
     info.set_name = description.set->file.filename().string();
-    info.set_text = content_of(description.set->file);
+    info.set_text = set::read_set_file(description.set->file);
   }
   return info;
 }

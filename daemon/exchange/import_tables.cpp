@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <sstream>
 
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::exchange {
 namespace {
@@ -31,8 +31,7 @@ std::vector<std::string> Table::column(const std::string& name) const {
 }
 
 Table read_csv(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
+  std::istringstream stream(session::read_file(file, {"a table (CSV)", 1 << 28}));
   Table table;
   table.file = file;
   std::string line;

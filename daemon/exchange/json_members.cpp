@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <limits>
 
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::exchange {
 namespace {
@@ -96,12 +96,8 @@ std::vector<Members> Members::objects(const std::string& key,
 namespace {
 
 // Returns whether a file begins as text does: videos and pictures have bytes that no text has.
-bool is_text_at_its_start(std::istream& stream) {
-  char start[64];
-  stream.clear();
-  stream.seekg(0);
-  stream.read(start, sizeof start);
-  return std::none_of(start, start + stream.gcount(), [](char c) {
+bool is_text_at_its_start(const std::filesystem::path& file) {
+  return std::ranges::none_of(session::read_beginning(file, 64), [](char c) {
     return static_cast<unsigned char>(c) < ' ' && c != '\n' && c != '\r' && c != '\t';
   });
 }
@@ -109,15 +105,16 @@ bool is_text_at_its_start(std::istream& stream) {
 }  // namespace
 
 Json read_json(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
+  const std::string hint = is_text_at_its_start(file)
+                               ? ""
+                               : ". A video or a picture is named in a JSON file; "
+                                 "config/frames.example.json shows how";
   try {
-    return Json::parse(stream);
+    return Json::parse(session::read_file(file, {"a list of frames (JSON)", 1 << 27}));
   } catch (const Json::exception& error) {
-    throw Error(file.string() + ": is not JSON: " + error.what() +
-                (is_text_at_its_start(stream) ? ""
-                                              : ". A video or a picture is named in a JSON file; "
-                                                "config/frames.example.json shows how"));
+    throw Error(file.string() + ": is not JSON: " + error.what() + hint);
+  } catch (const Error& error) {
+    throw Error(error.what() + hint);
   }
 }
 

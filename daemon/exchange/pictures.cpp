@@ -156,7 +156,7 @@ class PictureFiles final : public Footage {
   }
 
   Picture read(const std::string& name) {
-    const std::string content = session::read_file(name);
+    const std::string content = session::read_file(name, {"a picture", std::uint64_t{1} << 32});
     const PictureKind kind = check_picture_file(name, content);
     if (kind == PictureKind::dpx) return read_dpx(name, content);
     if (kind == PictureKind::exr) return read_exr(name);

@@ -69,7 +69,7 @@ class TakeProof {
 // Returns why the frames of a chunk's folder are not taken over; empty: they may be.
 std::string TakeProof::why_not_ours(std::size_t chunk) const {
   const std::filesystem::path file = folder_.chunk(chunk) / "render.json";
-  const std::string settings = session::read_plain_file(file);
+  const std::string settings = post::read_settings(folder_.chunk(chunk));
   if (!same_settings(settings, take_.settings))
     return file.string() +
            ": these frames were rendered with other settings or another version of "
@@ -113,9 +113,8 @@ void TakeProof::collect(std::size_t chunk) {
   }
   const Chunk& plan = job_.chunks[chunk];
   post::take_back(folder, take_.pictures);
-  post::RenderDirectory part(output_of(take_, folder, false),
-                             session::read_plain_file(folder / "render.json"), false, {},
-                             plan.frames, stop_);
+  post::RenderDirectory part(output_of(take_, folder, false), post::read_settings(folder), false,
+                             {}, plan.frames, stop_);
   for (const auto& [why, frames] : part.rejected())
     for (const std::uint64_t frame : frames) frame_faults_[frame] = why;
   const std::vector<post::FinishedFrame> foreign =

@@ -24,7 +24,8 @@ namespace {
 
 constexpr std::array<const char*, 5> outcomes{"running", "done", "stopped", "machine", "job"};
 // A job of a million chunks takes less, and so does any state or reason.
-constexpr std::uintmax_t most_plan_bytes = std::uintmax_t{1} << 27, most_state_bytes = 1 << 16;
+constexpr session::FileKind plan_kind{"a job's plan", 1 << 27},
+    state_kind{"a state of a job", 1 << 16};
 
 bool is_there(const std::filesystem::path& file) {
   std::error_code unknown;
@@ -34,13 +35,6 @@ bool is_there(const std::filesystem::path& file) {
 // Returns whether the folder can be looked into, so that what is not found in it is not there.
 bool can_be_entered(const std::filesystem::path& folder) {
   return ::access(folder.c_str(), R_OK | X_OK) == 0;
-}
-
-std::string read_at_most(const std::filesystem::path& file, std::uintmax_t most_bytes) {
-  std::error_code unknown;
-  const std::uintmax_t bytes = std::filesystem::file_size(file, unknown);
-  if (!unknown && bytes > most_bytes) throw Error(file.string() + ": is too large for such a file");
-  return session::read_plain_file(file);
 }
 
 std::string text_of(const nlohmann::ordered_json& json) {
@@ -86,7 +80,7 @@ Job JobFolder::read_plan() const {
   if (const std::string why = session::why_not_plain(plan()); !why.empty())
     throw JobFault(plan().string() + ": " + why);
   refuse_links();
-  return job_from_json(read_at_most(plan(), most_plan_bytes), plan().string());
+  return job_from_json(session::read_plain_file(plan(), plan_kind), plan().string());
 }
 
 // A job's folder may come from elsewhere, and what is written and removed below it must be in it.
@@ -125,7 +119,7 @@ void JobFolder::write_finish_state(const TaskState& state) const {
 std::optional<TaskState> JobFolder::read_state_in(const std::filesystem::path& file) const {
   if (!is_there(file)) return std::nullopt;
   try {
-    const auto json = nlohmann::json::parse(read_at_most(file, most_state_bytes));
+    const auto json = nlohmann::json::parse(session::read_plain_file(file, state_kind));
     TaskState state;
     const auto outcome = std::ranges::find(outcomes, json.at("outcome").get<std::string_view>());
     if (outcome == outcomes.end()) return std::nullopt;
@@ -162,7 +156,7 @@ Submitted JobFolder::read_submitted() const {
   const std::filesystem::path file = path_ / "submitted.json";
   if (!is_there(file)) return {};
   try {
-    const auto json = nlohmann::json::parse(read_at_most(file, most_state_bytes));
+    const auto json = nlohmann::json::parse(session::read_plain_file(file, state_kind));
     Submitted submitted;
     submitted.tasks = session::numbers_of<std::uint64_t>(json.at("tasks"));
     if (json.contains("finish"))
@@ -182,7 +176,7 @@ void JobFolder::write_submitted(const Submitted& submitted) const {
 }
 
 std::string JobFolder::read_stopped() const {
-  return is_there(stopped_file()) ? read_at_most(stopped_file(), most_state_bytes) : "";
+  return is_there(stopped_file()) ? session::read_plain_file(stopped_file(), state_kind) : "";
 }
 
 bool JobFolder::has_locks() const {
@@ -211,6 +205,7 @@ post::RenderOptions JobFolder::render_options(const Job& job, const JobTake& tak
   post::RenderOptions options = job.render;
   options.session = take.session;
   if (!job.set_file.empty()) options.set_file = place(job.set_file);
+  options.of_set_file = set::Origin::job;
   if (!job.with_file.empty()) options.with = place(job.with_file);
   for (const auto& [name, in_folder] : job.set_assets)
     options.set_assets.emplace_back(name, place(in_folder));

@@ -79,8 +79,12 @@ std::string place_of_asset(const std::filesystem::path& file) {
 std::vector<std::pair<std::string, std::filesystem::path>> own_assets(
     const post::RenderPlan& plan, const std::filesystem::path& session) {
   auto assets = scene::assets_of(plan.take.set);
-  std::erase_if(assets,
-                [&](const auto& asset) { return session::lies_within(session, asset.second); });
+  const auto& brought = plan.take.session.info.assets;
+  std::erase_if(assets, [&](const auto& asset) {
+    const auto found = brought.find(asset.first);
+    return found != brought.end() &&
+           asset.second == std::filesystem::absolute(session / found->second).lexically_normal();
+  });
   return assets;
 }
 

@@ -208,7 +208,7 @@ post::RenderOptions Task::render_options() {
 // Throws JobFault if the pictures would not be those of the plan: a file was changed since.
 void Task::check_settings() const {
   const std::filesystem::path file = folder_.chunk(options_.chunk) / "render.json";
-  const std::string settings = session::read_plain_file(file);
+  const std::string settings = post::read_settings(folder_.chunk(options_.chunk));
   const JobTake& take = job_.takes[chunk_.take];
   if (same_settings(settings, take.settings)) return;
   throw JobFault(take.session.string() +
@@ -300,6 +300,17 @@ void check_paths(const JobFolder& folder, const Job& job, bool any_paths) {
     if (!session::lies_within(folder.path().parent_path(), take.pictures))
       throw JobFault(folder.plan().string() + ": the pictures would be written to " +
                      take.pictures.string() + ", which is not beside the job's folder" + mine);
+  std::vector<std::string> places;
+  for (const auto& [name, place] : job.set_assets) places.push_back(place);
+  if (!job.set_file.empty()) places.push_back(job.set_file);
+  if (!job.with_file.empty()) places.push_back(job.with_file);
+  for (const std::string& place : places) {
+    const std::filesystem::path file = folder.place(place);
+    if (const std::string why = session::why_not_plain(file); !why.empty())
+      throw JobFault(file.string() + ": " + why + mine);
+    if (!session::lies_within(folder.path(), file))
+      throw JobFault(file.string() + ": lies outside the job's folder, and is not read" + mine);
+  }
   if (job.render.any_paths)
     throw JobFault(folder.plan().string() +
                    ": the takes' own sets may name files outside of the takes" + mine);

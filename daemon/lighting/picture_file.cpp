@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <string_view>
 
 #include "daemon/lighting/exr_picture.hpp"
 #include "daemon/lighting/radiance_picture.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::lighting {
 namespace {
@@ -43,17 +43,6 @@ constexpr Format others[] = {
     {"a PFM", 0, "PF\n"sv, true},
 };
 
-std::string beginning_of(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) throw Error(path.string() + ": cannot be read: " + std::strerror(errno));
-  std::string bytes(16, '\0');
-  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (file.bad() || std::filesystem::is_directory(path))
-    throw Error(path.string() + ": cannot be read: it is not a file");
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
-  return bytes;
-}
-
 [[noreturn]] void refuse(const std::filesystem::path& path, std::string_view bytes) {
   const auto* format = std::ranges::find_if(others, [&](const Format& f) {
     return bytes.size() >= f.offset && bytes.substr(f.offset).starts_with(f.bytes);
@@ -80,7 +69,7 @@ std::string beginning_of(const std::filesystem::path& path) {
 
 LinearPicture read_linear_picture(const std::filesystem::path& path,
                                   std::vector<std::string>& notes, std::int64_t most_kept) {
-  const std::string bytes = beginning_of(path);
+  const std::string bytes = session::read_beginning(path, 16);
   if (bytes.starts_with("\x76\x2f\x31\x01"sv))
     return read_exr_picture(path, notes, {.most_kept = most_kept});
   // The name of the program follows.

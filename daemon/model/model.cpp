@@ -386,7 +386,8 @@ Parts marked_parts(const ModelOptions& options, const ObserverCalibration& camer
 Parts parts_of(const ModelOptions& options, const ObserverCalibration& camera,
                const set::Tracking& tracking, std::ostream& out) {
   if (!options.parts_file.empty())
-    return parse_parts(session::read_file(options.parts_file), options.parts_file);
+    return parse_parts(session::read_file(options.parts_file, {"a file of parts", 1 << 22}),
+                       options.parts_file);
   if (!options.tags_only) return marked_parts(options, camera, tracking, out);
   const auto pictures = with_marks(pictures_apart(options.footage, camera, tracking), {});
   return parse_parts(parts_text(pictures, tag_planes(tracking.tags), {}), options.footage);

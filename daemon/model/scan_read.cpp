@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <string>
 
 #include "daemon/model/scan_fbx.hpp"
@@ -15,15 +14,14 @@
 #include "daemon/scene/other_format.hpp"
 #include "drivers/error.hpp"
 #include "drivers/letters.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::model {
 namespace {
 
 // Returns the ending of a file's name, or that of the format that its first bytes are of.
 std::string ending_by_content(const std::filesystem::path& path) {
-  std::string head(18, '\0');
-  std::ifstream(path, std::ios::binary)
-      .read(head.data(), static_cast<std::streamsize>(head.size()));
+  const std::string head = session::read_beginning(path, 18);
   if (head.starts_with("ply\n") || head.starts_with("ply\r")) return ".ply";
   if (head == "Kaydara FBX Binary") return ".fbx";
   if (head.starts_with("glTF")) return ".glb";

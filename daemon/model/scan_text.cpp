@@ -1,33 +1,29 @@
 #include "daemon/model/scan_text.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 #include <limits>
 
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::model {
 namespace {
 
 constexpr std::string_view white = " \t\v\f\r\n";
-constexpr std::uintmax_t most_bytes = std::uintmax_t{1} << 34;
 
 }  // namespace
 
 std::string scan_bytes(const std::filesystem::path& file) {
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(file, error);
-  if (!error && size > most_bytes)
-    throw Error(file.string() + ": is larger than 16 GiB; export less of the scan");
-  std::ifstream in(file, std::ios::binary);
-  std::string bytes(error ? 0 : size, '\0');
-  in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (error || !in) throw Error(file.string() + ": cannot be read");
-  return bytes;
+  const auto memory = static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) *
+                      static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  const std::uint64_t most_bytes = std::min(std::uint64_t{1} << 34, memory / 2);
+  return session::read_file(file, {"a scan on this machine", most_bytes});
 }
 
 std::string_view next_line(std::string_view& text) {

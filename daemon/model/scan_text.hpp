@@ -14,7 +14,7 @@
 namespace previz::model {
 
 // Returns all bytes of a scan's file. Throws previz::Error naming the file if it cannot be read or
-// has more than 16 GiB.
+// is larger than 16 GiB or half of the memory.
 std::string scan_bytes(const std::filesystem::path& file);
 
 // Takes the first line off a text and returns it without its end, which is that of Unix, Windows or

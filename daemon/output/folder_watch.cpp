@@ -73,8 +73,10 @@ class Ownership {
  private:
   static std::string first_line(const fs::path& file) {
     try {
-      const std::string text = session::read_plain_file(file);
-      return text.substr(0, text.find('\n'));
+      session::PlainLines lines(file);
+      std::string line;
+      lines.next(line);
+      return line.substr(0, 200);
     } catch (const Error& error) {
       return reason_of(error);
     }
@@ -232,9 +234,10 @@ class FolderWatch::Worker {
     const TakeFolders alone({options_.folder}, 0, {});
     now.highest_number =
         next_take_number({options_.folder}, options_.slate, now.highest_number) - 1;
-    now.kept_number = alone.kept_number(options_.slate);
+    const auto say = [this](const std::string& what) { note(what); };
+    now.kept_number = alone.kept_number(options_.slate, say);
     salvage_.look(now.salvaged);
-    now.wish = alone.kept_wish();
+    now.wish = alone.kept_wish(say);
     is_in_order_ = true;
   }
 

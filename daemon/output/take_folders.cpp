@@ -28,11 +28,18 @@ std::filesystem::path names_in(const std::filesystem::path& folder) {
   return folder / ".highest_takes";
 }
 
-std::string kept_names(const std::filesystem::path& folder) {
+// Returns their lines. A file that is none of ours, or cannot be read, says nothing; `note` says
+// so.
+std::string kept_names(const std::filesystem::path& folder, const TakeFolders::Note& note) {
+  constexpr session::FileKind kind{"a list of takes", 1 << 16};
   std::error_code none;
-  return std::filesystem::exists(names_in(folder), none)
-             ? session::read_plain_file(names_in(folder))
-             : std::string();
+  if (!std::filesystem::exists(names_in(folder), none)) return {};
+  try {
+    return session::read_plain_file(names_in(folder), kind);
+  } catch (const Error& error) {
+    if (note) note(std::string(error.what()) + "; what it says of other takes is not known");
+    return {};
+  }
 }
 
 std::string megabytes(std::uint64_t bytes) {
@@ -183,17 +190,19 @@ void TakeFolders::drop_wish() const {
   if (!faults.empty()) throw Error(faults);
 }
 
-std::optional<KeptWish> TakeFolders::kept_wish() const {
+std::optional<KeptWish> TakeFolders::kept_wish(const Note& note) const {
+  constexpr session::FileKind kind{"the name of a take", 1 << 12};
   std::optional<KeptWish> newest;
   for (const std::filesystem::path& folder : folders_) {
     std::error_code none;
     const auto time = std::filesystem::last_write_time(wish_in(folder), none);
     if (none || (newest && time < newest->time)) continue;
     try {
-      const std::string text = session::read_plain_file(wish_in(folder));
+      const std::string text = session::read_plain_file(wish_in(folder), kind);
       newest = KeptWish{text.substr(0, text.find_last_not_of('\n') + 1), time};
-    } catch (const Error&) {
-      continue;
+    } catch (const Error& error) {
+      if (note)
+        note(std::string(error.what()) + "; whether a take was being recorded is not known");
     }
   }
   return newest;
@@ -201,7 +210,7 @@ std::optional<KeptWish> TakeFolders::kept_wish() const {
 
 void TakeFolders::keep_number(const std::filesystem::path& folder, const std::string& slate,
                               int number) {
-  std::istringstream before(kept_names(folder));
+  std::istringstream before(kept_names(folder, {}));
   std::string names = take_name(slate, number) + "\n";
   for (std::string name; std::getline(before, name);) {
     const std::optional<int> known = take_number(name, slate);
@@ -211,16 +220,12 @@ void TakeFolders::keep_number(const std::filesystem::path& folder, const std::st
   session::replace_file(names_in(folder), names);
 }
 
-int TakeFolders::kept_number(const std::string& slate) const {
+int TakeFolders::kept_number(const std::string& slate, const Note& note) const {
   int highest = 0;
   for (const std::filesystem::path& folder : folders_) {
-    try {
-      std::istringstream names(kept_names(folder));
-      for (std::string name; std::getline(names, name);)
-        highest = std::max(highest, take_number(name, slate).value_or(0));
-    } catch (const Error&) {
-      continue;  // it can say nothing
-    }
+    std::istringstream names(kept_names(folder, note));
+    for (std::string name; std::getline(names, name);)
+      highest = std::max(highest, take_number(name, slate).value_or(0));
   }
   return highest;
 }

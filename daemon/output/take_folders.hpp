@@ -35,6 +35,7 @@ std::uint64_t free_on_disk_of(
 class TakeFolders {
  public:
   // Bytes that are free on a folder's disk; throws std::filesystem::filesystem_error.
+  using Note = std::function<void(const std::string&)>;
   using FreeBytes = std::function<std::uint64_t(const std::filesystem::path& folder)>;
 
   // `folders` in the order of preference, at least one; none of them need exist. A folder with less
@@ -79,15 +80,16 @@ class TakeFolders {
   // previz::Error that names those that cannot; the others have forgotten it then.
   void drop_wish() const;
   // Returns the take that was being recorded when the last process ended, if one was: the newest
-  // that a folder remembers. A folder that cannot be read remembers nothing.
-  std::optional<KeptWish> kept_wish() const;
+  // that a folder remembers. A folder that cannot be read remembers nothing; `note` is told why.
+  std::optional<KeptWish> kept_wish(const Note& note = {}) const;
 
   // Writes into a folder that the slate has a take of this number, there or elsewhere, so that no
   // other gets its name while the disk of that one is not there. Throws previz::Error.
   static void keep_number(const std::filesystem::path& folder, const std::string& slate,
                           int number);
-  // Returns the highest of those numbers that the folders can say; 0 if there is none.
-  int kept_number(const std::string& slate) const;
+  // Returns the highest of those numbers that the folders can say; 0 if there is none. `note` is
+  // told of those that cannot.
+  int kept_number(const std::string& slate, const Note& note = {}) const;
 
  private:
   const std::vector<std::filesystem::path> folders_;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "daemon/scene/assets.hpp"
+#include "daemon/set/file_edit.hpp"
 #include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
@@ -38,7 +39,8 @@ std::optional<LightCameraCalibration> light_calibration(const set::Set& set,
 Take open_take(const std::filesystem::path& session_directory,
                const std::optional<std::filesystem::path>& set_file, bool any_paths,
                const std::stop_token& stop, const std::optional<set::Overlay>& with,
-               const std::vector<std::pair<std::string, std::filesystem::path>>& set_assets) {
+               const std::vector<std::pair<std::string, std::filesystem::path>>& set_assets,
+               set::Origin of_set_file) {
   Take take;
   take.session = session::open_session(session_directory, stop);
   std::vector<std::pair<std::string, std::filesystem::path>> assets = set_assets;
@@ -48,12 +50,12 @@ Take open_take(const std::filesystem::path& session_directory,
 
   const std::filesystem::path name = set_file.value_or(
       session_directory / std::filesystem::path(take.session.info.set_name).filename());
-  take.set_text = set_file ? session::read_file(*set_file) : take.session.info.set_text;
+  take.set_text = set_file ? set::read_set_file(*set_file) : take.session.info.set_text;
   if (take.set_text.empty())
     throw Error(session_directory.string() +
                 ": the session has no set file; give one with --set FILE");
   take.set = set::parse_set(take.set_text, name, assets,
-                            set_file    ? set::Origin::crew
+                            set_file    ? of_set_file
                             : any_paths ? set::Origin::trusted_session
                                         : set::Origin::session,
                             with);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/set/load.hpp"
+#include "daemon/set/origin.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/session/session.hpp"
@@ -33,11 +34,13 @@ struct Take {
 // `any_paths`. Throws previz::Error if something cannot be read, or there are no observer frames or
 // no observer calibration. The whole take is read once, which a stop ends, also with an error.
 // `with` replaces settings of either set. `set_assets` are files that stand in for those of the
-// set, by the names that it has for them, before any others.
+// set, by the names that it has for them, before any others. `of_set_file` says whose `set_file`
+// is.
 Take open_take(const std::filesystem::path& session_directory,
                const std::optional<std::filesystem::path>& set_file, bool any_paths = false,
                const std::stop_token& stop = {}, const std::optional<set::Overlay>& with = {},
-               const std::vector<std::pair<std::string, std::filesystem::path>>& set_assets = {});
+               const std::vector<std::pair<std::string, std::filesystem::path>>& set_assets = {},
+               set::Origin of_set_file = set::Origin::crew);
 
 // Says that the light must come from a light camera, that the take has none, and what to do.
 std::string no_light_words();

@@ -27,6 +27,9 @@ constexpr std::uint64_t transaction_byte = 0, first_frame_byte = 1;
 constexpr std::uint64_t video_byte = std::uint64_t{1} << 61;       // above all frames
 constexpr std::uint64_t first_line_byte = std::uint64_t{1} << 62;  // of the processes' lines
 constexpr std::uint64_t frames_end = video_byte - first_frame_byte;
+// Of the file, which is a few hundred bytes for each process that renders into the folder.
+constexpr std::uint64_t most_lines = 4096;
+constexpr std::size_t most_bytes = 1 << 20;
 
 struct flock range_of(std::uint64_t byte, short type) {
   struct flock range {};
@@ -174,16 +177,42 @@ void FolderLocks::unlock(std::uint64_t byte) {
 bool FolderLocks::is_locked_by_another(std::uint64_t byte) const {
   if (!has_locks_) return false;
   struct flock range = range_of(byte, F_WRLCK);
+  look_at(range);
+  return range.l_type != F_UNLCK;
+}
+
+void FolderLocks::look_at(struct flock& range) const {
   while (call_(open_.get(), F_OFD_GETLK, &range) != 0)
     if (errno != EINTR)
       throw Error(file_.string() + ": its locks cannot be read: " + std::strerror(errno));
-  return range.l_type != F_UNLCK;
+}
+
+void FolderLocks::add_locked(std::uint64_t begin, std::uint64_t end,
+                             std::set<std::uint64_t>& lines) const {
+  if (begin >= end || lines.size() >= most_lines) return;
+  struct flock range = range_of(begin, F_WRLCK);
+  range.l_len = static_cast<off_t>(end - begin);
+  look_at(range);
+  if (range.l_type == F_UNLCK) return;
+  // It is one of several, in no order.
+  const std::uint64_t first = std::max(begin, static_cast<std::uint64_t>(range.l_start));
+  const std::uint64_t last =
+      range.l_len == 0 ? end : first + static_cast<std::uint64_t>(range.l_len);
+  lines.insert(first - first_line_byte);
+  add_locked(begin, first, lines);
+  add_locked(last, end, lines);
+}
+
+std::set<std::uint64_t> FolderLocks::lines_of_others() const {
+  std::set<std::uint64_t> lines;
+  if (has_locks_) add_locked(first_line_byte, first_line_byte + most_lines, lines);
+  return lines;
 }
 
 std::vector<std::string> FolderLocks::lines() const {
   std::string text;
   std::array<char, 4096> block{};
-  for (;;) {
+  while (text.size() < most_bytes) {
     const ssize_t count =
         ::pread(open_.get(), block.data(), block.size(), static_cast<off_t>(text.size()));
     if (count < 0 && errno == EINTR) continue;
@@ -199,15 +228,16 @@ std::vector<std::string> FolderLocks::lines() const {
 
 // Lines of processes that have ended become empty: the others keep their places.
 void FolderLocks::write_own_line() {
-  std::vector<std::string> all = lines();
-  const auto own = static_cast<std::size_t>(line_);
-  if (all.size() <= own) all.resize(own + 1);
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (i != own && !is_locked_by_another(first_line_byte + i)) all[i].clear();
-  all[own] = self_.host.empty() ? "" : line_of(self_);
-  while (!all.empty() && all.back().empty()) all.pop_back();
+  const std::vector<std::string> before = lines();
+  std::map<std::uint64_t, std::string> all;
+  for (const std::uint64_t i : lines_of_others()) all[i] = i < before.size() ? before[i] : "";
+  if (!self_.host.empty()) all[static_cast<std::uint64_t>(line_)] = line_of(self_);
   std::string text;
-  for (const std::string& line : all) text += line + "\n";
+  std::uint64_t next = 0;
+  for (const auto& [i, line] : all) {
+    text.append(i - next, '\n').append(line).append("\n");
+    next = i + 1;
+  }
   for (std::size_t done = 0; done < text.size();) {
     const ssize_t count =
         ::pwrite(open_.get(), text.data() + done, text.size() - done, static_cast<off_t>(done));
@@ -230,9 +260,8 @@ void FolderLocks::join() {
 std::vector<FolderUser> FolderLocks::others() const {
   std::vector<FolderUser> users;
   const std::vector<std::string> all = lines();
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (static_cast<std::int64_t>(i) != line_ && is_locked_by_another(first_line_byte + i))
-      users.push_back(user_of(all[i]));
+  for (const std::uint64_t i : lines_of_others())
+    users.push_back(i < all.size() ? user_of(all[i]) : FolderUser{});
   return users;
 }
 

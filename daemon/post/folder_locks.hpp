@@ -88,6 +88,11 @@ class FolderLocks {
   bool lock(std::uint64_t byte);
   void unlock(std::uint64_t byte);
   bool is_locked_by_another(std::uint64_t byte) const;
+  // Fills in a lock that is in the way of this one, or that there is none.
+  void look_at(struct flock& range) const;
+  // Adds the lines among these bytes that other processes hold.
+  void add_locked(std::uint64_t begin, std::uint64_t end, std::set<std::uint64_t>& lines) const;
+  std::set<std::uint64_t> lines_of_others() const;
   std::vector<std::string> lines() const;
   void write_own_line();
 

@@ -114,7 +114,7 @@ std::string RenderDirectory::differences_from(const std::string& settings) const
   const std::filesystem::path name = path() / settings_name;
   std::error_code unknown;
   if (!std::filesystem::exists(name, unknown)) return "it cannot be read";
-  const auto there = nlohmann::json::parse(session::read_plain_file(name), nullptr,
+  const auto there = nlohmann::json::parse(read_settings(path()), nullptr,
                                            /*allow_exceptions=*/false);
   return there.is_object() ? differences(there, nlohmann::json::parse(settings))
                            : "it cannot be read";

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
@@ -114,12 +113,16 @@ bool has_files(const set::Output& output, bool has_sums, const FinishedFrame& fr
   });
 }
 
+std::string read_settings(const std::filesystem::path& folder) {
+  return session::read_plain_file(folder / settings_name, {"the settings of a render", 1 << 24});
+}
+
 Frames frames_in(const std::filesystem::path& lines) {
   Frames frames;
   std::error_code unknown;
   if (!std::filesystem::exists(std::filesystem::symlink_status(lines, unknown))) return frames;
-  std::istringstream text(session::read_plain_file(lines));
-  for (std::string line; std::getline(text, line);) {
+  session::PlainLines text(lines);
+  for (std::string line; text.next(line);) {
     try {
       const FinishedFrame record = from_json(line);
       frames[record.frame] = record;

@@ -20,6 +20,10 @@ inline constexpr const char* settings_name = "render.json";
 inline constexpr const char* lines_name = "frames.jsonl";
 inline constexpr const char* sums_extension = ".sums.exr";
 
+// Reads settings_name of a folder. Throws previz::Error where it cannot be read, is no plain file,
+// or is larger than settings are.
+std::string read_settings(const std::filesystem::path& folder);
+
 // Returns "0007.exr" for frame 7 and ".exr".
 std::string frame_file(std::uint64_t frame, const char* extension);
 

@@ -1,6 +1,5 @@
 #include "daemon/post/render_folder.hpp"
 
-#include <fstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -36,9 +35,9 @@ std::optional<std::uint64_t> rendered_frames(const output::ListedTake& take) {
   }
   std::error_code unknown;
   if (!fs::is_regular_file(fs::symlink_status(folder / "frames.jsonl", unknown))) return 0;
-  std::ifstream lines(folder / "frames.jsonl");
+  session::PlainLines lines(folder / "frames.jsonl");
   std::uint64_t count = 0;
-  for (std::string line; std::getline(lines, line);) ++count;
+  for (std::string line; lines.next(line);) ++count;
   return count;
 }
 

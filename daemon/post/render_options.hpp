@@ -15,6 +15,7 @@
 #include "daemon/post/finished_frame.hpp"
 #include "daemon/render/gpu.hpp"
 #include "daemon/render/sample_sums.hpp"
+#include "daemon/set/origin.hpp"
 #include "daemon/set/set.hpp"
 
 namespace previz::post {
@@ -51,6 +52,7 @@ struct RenderOptions {
   std::function<void(const pipeline::Shot&)> on_frame;
   // Files that stand in for those of `set_file`, by the names that it has for them.
   std::vector<std::pair<std::string, std::filesystem::path>> set_assets;
+  set::Origin of_set_file = set::Origin::crew;  // whose `set_file` is
   // Rendered on in place of a device that is opened by `device`; null: none is open.
   std::shared_ptr<render::Device> open_device;
   // Called once all that the take and the set name has been read, and frames are next: what fails

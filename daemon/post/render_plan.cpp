@@ -104,7 +104,7 @@ RenderPlan plan_render(const RenderOptions& options) {
   RenderPlan plan;
   if (options.with) plan.with = set::read_overlay(*options.with);
   plan.take = pipeline::open_take(options.session, options.set_file, options.any_paths, {},
-                                  plan.with, options.set_assets);
+                                  plan.with, options.set_assets, options.of_set_file);
   set::Set& set = plan.take.set;
   override_take(plan.take, options);
   check_directory(set, options);

@@ -21,7 +21,7 @@ nlohmann::json settings_in(const std::filesystem::path& folder) {
   if (!std::filesystem::exists(file, unknown))
     throw Error(folder.string() + ": has no " + settings_name +
                 "; name folders that `previzd render --sample-range` has made");
-  auto json = nlohmann::json::parse(session::read_plain_file(file), nullptr,
+  auto json = nlohmann::json::parse(read_settings(folder), nullptr,
                                     /*allow_exceptions=*/false);
   if (!json.is_object() || !json.contains(range_key) || !json[range_key].is_string())
     throw Error(file.string() +

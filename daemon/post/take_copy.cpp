@@ -3,7 +3,6 @@
 #include <fcntl.h>
 
 #include <map>
-#include <sstream>
 
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
@@ -17,7 +16,7 @@ namespace fs = std::filesystem;
 
 using Checksums = std::map<std::string, std::string>;  // of files, by their paths
 
-constexpr std::size_t hash_digits = 64;
+constexpr std::size_t hash_digits = 64, longest_name = 8192;
 
 // A name may have any byte. As sha256sum(1) does, a line whose name has a backslash or the end of a
 // line begins with a backslash, and these two are escaped in it.
@@ -49,14 +48,14 @@ std::string to_text(const Checksums& sums) {
 
 Checksums read_checksums(const fs::path& file) {
   Checksums sums;
-  std::istringstream lines(session::read_plain_file(file));
+  session::PlainLines lines(file);
   int number = 0;
-  for (std::string line; std::getline(lines, line);) {
+  for (std::string line; lines.next(line);) {
     ++number;
     const bool is_escaped = line.starts_with('\\');
     if (is_escaped) line.erase(0, 1);
     const std::size_t path = hash_digits + 2;
-    if (line.size() <= path)
+    if (line.size() <= path || line.size() > path + longest_name)
       throw Error(file.string() + ":" + std::to_string(number) +
                   ": is not a checksum and a file; copy the take again");
     const std::string name = line.substr(path);

@@ -45,14 +45,11 @@ std::string name_of(const vk::PhysicalDeviceProperties& properties) {
 // Returns what a driver wrote, behind whose hash it lies in the file; empty where there is nothing
 // of use. Drivers check what they read only in part, and a damaged file can end the process.
 std::string read_cache(const fs::path& file) {
+  constexpr session::FileKind kind{"compiled shaders of previzd",
+                                   PipelineCache::most_bytes + hash_digits};
   std::error_code none;
-  const std::uintmax_t size = fs::file_size(file, none);
-  if (none) return {};
-  if (size > PipelineCache::most_bytes + hash_digits) {
-    note(file.string() + " is too large to be previzd's; the shaders are compiled again");
-    return {};
-  }
-  const std::string text = session::read_plain_file(file);
+  if (!fs::exists(fs::symlink_status(file, none))) return {};
+  const std::string text = session::read_plain_file(file, kind);
   const std::string_view data = std::string_view(text).substr(std::min(hash_digits, text.size()));
   if (text.size() < hash_digits || text.substr(0, hash_digits) != hash_of(data)) {
     note(file.string() + " is damaged; the shaders are compiled again");

@@ -24,7 +24,7 @@ std::optional<std::filesystem::path> memory_file() {
 // Returns the GPU that the rig had; empty if none is known. A file that cannot be read is none.
 std::string remembered_gpu(const std::filesystem::path& memory) {
   try {
-    const std::string name = session::read_file(memory);
+    const std::string name = session::read_file(memory, {"the name of a card", 1 << 12});
     return name.substr(0, name.find('\n'));
   } catch (const Error&) {
     return {};

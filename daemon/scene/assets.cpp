@@ -9,6 +9,7 @@
 #include "daemon/scene/gltf_uri.hpp"
 #include "daemon/set/problems.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::scene {
 namespace {
@@ -27,9 +28,7 @@ std::string gltf_json(const std::filesystem::path& file) {
   stream.read(header.data(), header.size());
   const bool binary = stream.gcount() == 20 && std::string(header.data(), 4) == "glTF";
   if (!binary) {
-    stream.clear();
-    stream.seekg(0);
-    return {std::istreambuf_iterator<char>(stream), {}};
+    return session::read_file(file, {"a model", max_file_bytes});
   }
   const std::uint32_t length = chunk_length(&header[12]);
   if (length > std::filesystem::file_size(file))

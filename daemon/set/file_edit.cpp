@@ -128,7 +128,7 @@ std::string FileEdit::text() const {
 }
 
 std::filesystem::path keep_beside(const std::filesystem::path& file) {
-  const std::string content = session::read_file(file);
+  const std::string content = read_set_file(file);
   for (int number = 1;; ++number) {
     std::filesystem::path copy = file.string() + '.' + std::to_string(number) + ".old";
     if (std::filesystem::exists(copy)) continue;

@@ -2,8 +2,6 @@
 #include "daemon/set/load.hpp"
 
 #include <algorithm>
-#include <fstream>
-#include <sstream>
 
 #include "daemon/set/file_edit.hpp"
 #include "daemon/set/read_tables.hpp"
@@ -11,6 +9,7 @@
 #include "daemon/set/table.hpp"
 #include "drivers/error.hpp"
 #include "drivers/keys/toml_value.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::set {
 namespace {
@@ -58,29 +57,22 @@ Set parse_set(const std::string& text, const std::filesystem::path& file, const 
 
 namespace {
 
-// Returns a file of settings. A pipe can be read only once, and one that nobody writes to, never.
-std::string text_of(const std::filesystem::path& file, const char* allowed) {
-  std::error_code unknown;
-  const auto kind = std::filesystem::status(file, unknown).type();
-  if (kind != std::filesystem::file_type::regular &&
-      kind != std::filesystem::file_type::not_found && kind != std::filesystem::file_type::none)
-    throw Error(file.string() +
-                ": is not a file, but a folder, a pipe or a device; allowed: " + allowed);
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  if (!stream || (stream.peek() != EOF && !(text << stream.rdbuf())))
-    throw Error(file.string() + ": cannot be read; allowed: " + allowed);
-  return text.str();
+std::string text_of(const std::filesystem::path& file, const char* what) {
+  try {
+    return session::read_file(file, {what, 1 << 22});
+  } catch (const Error& error) {
+    throw Error(std::string(error.what()) + "; allowed: " + what + " (TOML)");
+  }
 }
 
 }  // namespace
 
 std::string read_set_file(const std::filesystem::path& file) {
-  return text_of(file, "a set file (TOML)");
+  return text_of(file, "a set file");
 }
 
 Overlay read_overlay(const std::filesystem::path& file) {
-  return {file, text_of(file, "a file of settings (TOML)")};
+  return {file, text_of(file, "a file of settings")};
 }
 
 Set load_set(const std::filesystem::path& file) {

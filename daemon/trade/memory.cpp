@@ -289,13 +289,16 @@ TradeMemory load_memory(const fs::path& directory, const std::string& key, std::
   if (!fs::exists(rows_file(directory))) return {};
   try {
     TradeMemory memory;
-    const json rows = json::parse(session::read_file(rows_file(directory)));
+    const json rows =
+        json::parse(session::read_file(rows_file(directory), {"a table of a trade", 1 << 27}));
     if (rows.at("key").get<std::string>() != key) {
       why_not = "it is of another frame, set, size, device, driver or version";
       return {};
     }
     read_rows(rows, memory);
-    read_reference(session::read_file(reference_file(directory)), key, memory.reference);
+    read_reference(
+        session::read_file(reference_file(directory), {"a reference of a trade", 1ull << 34}), key,
+        memory.reference);
     return memory;
   } catch (const std::exception& error) {
     why_not = error.what();

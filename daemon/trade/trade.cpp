@@ -95,7 +95,8 @@ double parse_share(const std::string& text) {
   const std::string digits = text.substr(0, text.size() - (is_percent ? 1 : 0));
   double value = 0;
   const auto [end, code] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-  if (digits.empty() || code != std::errc() || end != digits.data() + digits.size() || !(value > 0))
+  if (digits.empty() || code != std::errc() || end != digits.data() + digits.size() ||
+      !(value > 0 && std::isfinite(value)))
     throw Error("--error " + text + ": write a fraction above 0, as 2% or 0.02");
   return is_percent ? value / 100 : value;
 }

@@ -11,7 +11,9 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
+#include <mutex>
 #include <random>
+#include <set>
 #include <utility>
 
 #include "drivers/error.hpp"
@@ -48,6 +50,26 @@ bool is_draft_name(const std::string& name) {
   return digits.find_first_not_of("0123456789abcdef") == std::string::npos;
 }
 
+// The drafts of this process that are not in their place. Never destroyed: threads may outlive the
+// end of main().
+struct OwnDrafts {
+  std::mutex mutex;  // held while one of them is put in place
+  std::set<fs::path> paths;
+
+  void add(const fs::path& draft) {
+    const std::lock_guard lock(mutex);
+    paths.insert(draft);
+  }
+  void forget(const fs::path& draft) {
+    const std::lock_guard lock(mutex);
+    paths.erase(draft);
+  }
+};
+OwnDrafts& own_drafts() {
+  static auto* const all = new OwnDrafts;
+  return *all;
+}
+
 // Returns false where another process found the draft before it was locked, and removes it, or
 // where the disk has failed; what is left of the draft is then removed.
 bool lock(const OwnedDescriptor& draft, const fs::path& path) {
@@ -58,6 +80,13 @@ bool lock(const OwnedDescriptor& draft, const fs::path& path) {
   std::error_code gone;
   fs::remove(path, gone);
   return false;
+}
+
+// Renames a draft, whose path is empty afterwards.
+void put_in_place(fs::path& draft, const fs::path& target, const char* failure) {
+  const std::lock_guard lock(own_drafts().mutex);
+  if (std::rename(draft.c_str(), target.c_str()) != 0) fail_draft(target, failure);
+  own_drafts().paths.erase(std::exchange(draft, {}));
 }
 
 void sync_folder_of(const fs::path& file) {
@@ -73,7 +102,9 @@ Draft::Made Draft::make(const fs::path& target) {
         ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
     if (!made && errno == EEXIST) continue;
     if (!made) fail_draft(target, "cannot be created");
-    if (lock(made, path)) return {std::move(path), std::move(made)};
+    if (!lock(made, path)) continue;
+    own_drafts().add(path);
+    return {std::move(path), std::move(made)};
   }
 }
 
@@ -90,8 +121,10 @@ Draft::Draft(Draft&& other) noexcept
       file_(std::move(other.file_)) {}
 
 Draft::~Draft() {
+  if (path_.empty()) return;
   std::error_code ignored;
-  if (!path_.empty()) fs::remove(path_, ignored);
+  fs::remove(path_, ignored);
+  own_drafts().forget(path_);
 }
 
 void Draft::keep_owner() const {
@@ -105,14 +138,13 @@ void Draft::keep_owner() const {
 
 void Draft::put(Sync sync) {
   if (sync == Sync::yes) file_.sync();
-  if (std::rename(path_.c_str(), target_.c_str()) != 0)
-    fail_draft(target_, "cannot be renamed into place");
-  path_.clear();
+  put_in_place(path_, target_, "cannot be renamed into place");
   if (sync == Sync::yes) sync_folder_of(target_);
 }
 
 bool Draft::put_as_new(const fs::path& target) {
   file_.sync();
+  const std::lock_guard lock(own_drafts().mutex);
   const bool is_linked = ::link(path_.c_str(), target.c_str()) == 0;
   const bool has_no_links = errno == EPERM || errno == EOPNOTSUPP || errno == ENOSYS;
   if (is_linked) {
@@ -125,7 +157,7 @@ bool Draft::put_as_new(const fs::path& target) {
     if (errno == EEXIST) return false;
     fail_draft(target, "cannot be renamed into place");
   }
-  path_.clear();
+  own_drafts().paths.erase(std::exchange(path_, {}));
   sync_folder_of(target);
   return true;
 }
@@ -145,19 +177,33 @@ DraftFolder::DraftFolder(const fs::path& target) : target_(fs::absolute(target))
       errno = error;
       fail_draft(path_, "cannot be opened");
     }
-    if (lock(lock_, path_)) return;
+    if (!lock(lock_, path_)) continue;
+    own_drafts().add(path_);
+    return;
   }
 }
 
 DraftFolder::~DraftFolder() {
+  if (path_.empty()) return;
   std::error_code ignored;
-  if (!path_.empty()) fs::remove_all(path_, ignored);
+  fs::remove_all(path_, ignored);
+  own_drafts().forget(path_);
 }
 
 void DraftFolder::put() {
-  if (std::rename(path_.c_str(), target_.c_str()) != 0) fail_draft(target_, "cannot be created");
-  path_.clear();
+  put_in_place(path_, target_, "cannot be created");
   sync_folder_of(target_);
+}
+
+void abandon_drafts() {
+  OwnDrafts& own = own_drafts();
+  own.mutex.lock();  // never unlocked
+  for (const fs::path& draft : own.paths)
+    for (int tries = 0; tries < 10; ++tries) {  // other threads may still write into a folder
+      std::error_code failure;
+      fs::remove_all(draft, failure);
+      if (!failure) break;
+    }
 }
 
 void replace_file(const std::filesystem::path& file, const std::string& content) {

@@ -72,6 +72,10 @@ class DraftFolder {
 // Throws previz::Error; the old content then stays.
 void replace_file(const std::filesystem::path& file, const std::string& content);
 
+// Removes all drafts of this process, none of which can be put in place any more: its threads wait
+// for ever where they try to. For a process that ends in the middle of its work.
+void abandon_drafts();
+
 // Removes the drafts, files and folders, that dead processes left in a folder, and returns their
 // names. Those that cannot be locked or removed stay: their process lives, or the file system knows
 // no locks.

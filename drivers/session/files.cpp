@@ -79,15 +79,29 @@ bool lies_within(const std::filesystem::path& folder, const std::filesystem::pat
 
 namespace {
 
-std::string content_of(const OpenFile& file, const std::filesystem::path& name) {
+std::string words_of_size(std::uint64_t bytes) {
+  return bytes < 1 << 20 ? std::to_string(bytes >> 10) + " KiB"
+                         : std::to_string(bytes >> 20) + " MiB";
+}
+
+std::string content_of(const OpenFile& file, const FileKind& kind) {
+  const auto check = [&](std::uint64_t bytes) {
+    if (bytes > kind.most_bytes)
+      throw Error(file.name().string() + ": is too large for " + std::string(kind.words) +
+                  ", which has at most " + words_of_size(kind.most_bytes));
+  };
+  struct stat known {};
+  if (::fstat(file.get(), &known) == 0) check(static_cast<std::uint64_t>(known.st_size));
   std::string content;
+  content.reserve(static_cast<std::size_t>(known.st_size));
   std::vector<char> block(1 << 18);
   for (;;) {
     const ssize_t count = ::read(file.get(), block.data(), block.size());
     if (count == 0) return content;
     if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail(name, "cannot be read");
+    if (count < 0) fail(file.name(), "cannot be read");
     content.append(block.data(), static_cast<std::size_t>(count));
+    check(content.size());
   }
 }
 
@@ -100,8 +114,33 @@ std::string words_of(mode_t mode) {
 
 }  // namespace
 
-std::string read_file(const std::filesystem::path& file) {
-  return content_of(OpenFile(file, O_RDONLY), file);
+namespace {
+
+OpenFile open_named_file(const std::filesystem::path& file, std::string_view what) {
+  // Without O_NONBLOCK the opening of a pipe waits for somebody who writes.
+  OpenFile open(file, O_RDONLY | O_NONBLOCK);
+  struct stat known {};
+  if (::fstat(open.get(), &known) == 0 && !S_ISREG(known.st_mode))
+    throw Error(file.string() + ": is " + words_of(known.st_mode) + " and not " +
+                std::string(what));
+  return open;
+}
+
+}  // namespace
+
+std::string read_file(const std::filesystem::path& file, const FileKind& kind) {
+  return content_of(open_named_file(file, kind.words), kind);
+}
+
+std::string read_beginning(const std::filesystem::path& file, std::size_t bytes) {
+  const OpenFile open = open_named_file(file, "a file");
+  std::string beginning(bytes, '\0');
+  ssize_t count = 0;
+  do count = ::read(open.get(), beginning.data(), bytes);
+  while (count < 0 && errno == EINTR);
+  if (count < 0) fail(file, "cannot be read");
+  beginning.resize(static_cast<std::size_t>(count));
+  return beginning;
 }
 
 std::string why_not_plain(const std::filesystem::path& file) {
@@ -131,8 +170,33 @@ OpenFile open_plain_file(const std::filesystem::path& file) {
   return {std::move(open), file};
 }
 
-std::string read_plain_file(const std::filesystem::path& file) {
-  return content_of(open_plain_file(file), file);
+std::string read_plain_file(const std::filesystem::path& file, const FileKind& kind) {
+  return content_of(open_plain_file(file), kind);
+}
+
+bool PlainLines::next(std::string& line) {
+  for (std::size_t looked_at = at_;;) {
+    const std::size_t end = block_.find('\n', looked_at);
+    if (end != std::string::npos) {
+      line.assign(block_, at_, end - at_);
+      at_ = end + 1;
+      return true;
+    }
+    if (has_ended_ || block_.size() - at_ > most_bytes_a_line) {
+      line.assign(block_, at_);
+      at_ = block_.size();
+      const bool has_more = !line.empty();
+      has_ended_ = true;
+      return has_more;
+    }
+    block_.erase(0, std::exchange(at_, 0));
+    looked_at = block_.size();
+    block_.resize(looked_at + (1 << 16));
+    const ssize_t count = ::read(file_.get(), block_.data() + looked_at, 1 << 16);
+    block_.resize(looked_at + static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+    if (count < 0 && errno != EINTR) fail(file_.name(), "cannot be read");
+    has_ended_ = count == 0;
+  }
 }
 
 void read_blocks(const std::filesystem::path& file, const std::function<bool()>& is_left,

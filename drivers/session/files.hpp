@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -55,14 +56,41 @@ void make_folders(const std::filesystem::path& folder);
 // links on the way to it lead.
 bool lies_within(const std::filesystem::path& folder, const std::filesystem::path& file);
 
-// Returns the whole file; throws previz::Error naming it.
-std::string read_file(const std::filesystem::path& file);
+// What a file is, for words, and the bytes that one of its kind can have. A file without content
+// may claim any size, and has it all in memory once it is read.
+struct FileKind {
+  std::string_view words;  // "a set file"
+  std::uint64_t most_bytes;
+};
 
-// Takes come from elsewhere: a link in one may lead anywhere, and a pipe or a device may keep its
-// reader waiting for ever. Both open and read only what is a file itself, without waiting. Throw
-// previz::Error that says what else is there.
+// Returns the whole of a file that a user names, which may be a link to one. A pipe or a device is
+// not waited for. Throws previz::Error that says what is there instead, or how large it may be.
+std::string read_file(const std::filesystem::path& file, const FileKind& kind);
+
+// Returns so many bytes from the beginning of such a file, or all that it has. Throws likewise.
+std::string read_beginning(const std::filesystem::path& file, std::size_t bytes);
+
+// Takes come from elsewhere, and a link in one may lead anywhere. These open and read only what is
+// a file itself.
 OpenFile open_plain_file(const std::filesystem::path& file);
-std::string read_plain_file(const std::filesystem::path& file);
+std::string read_plain_file(const std::filesystem::path& file, const FileKind& kind);
+
+// Reads a file that is a file itself, line by line.
+class PlainLines {
+ public:
+  // Throws previz::Error, as open_plain_file() does.
+  explicit PlainLines(const std::filesystem::path& file) : file_(open_plain_file(file)) {}
+  // Takes the next line, without its end; false behind the last one. A line longer than any record
+  // can be ends the file: its beginning is the last line. Throws previz::Error.
+  bool next(std::string& line);
+
+ private:
+  static constexpr std::size_t most_bytes_a_line = 1 << 20;
+  OpenFile file_;
+  std::string block_;   // what was read
+  std::size_t at_ = 0;  // of it was taken
+  bool has_ended_ = false;
+};
 // Returns what is there in the place of a file, and what to do about it, as the end of a sentence
 // that begins with its name; empty: a file, or nothing.
 std::string why_not_plain(const std::filesystem::path& file);

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -221,14 +220,17 @@ bool in_order(const MarkEvent&, const MarkEvent&) {
   return true;
 }
 
+// A file that has more is not what a recorder writes, and is not read further.
+constexpr std::size_t most_bad_lines = 10'000;
+
 // `parse` returns nothing for a line of another kind.
 template <typename Record, typename Parse>
 Lines<Record> read_lines(const std::filesystem::path& file, Parse parse) {
   Lines<Record> lines;
   if (!std::filesystem::exists(std::filesystem::symlink_status(file))) return lines;
-  std::istringstream stream(read_plain_file(file));
+  PlainLines from(file);
   std::string text;
-  for (std::uint64_t number = 1; std::getline(stream, text); ++number) {
+  for (std::uint64_t number = 1; from.next(text); ++number) {
     try {
       std::optional<Record> record = parse(Json::parse(text));
       if (!record) continue;
@@ -237,6 +239,7 @@ Lines<Record> read_lines(const std::filesystem::path& file, Parse parse) {
       lines.records.push_back(std::move(*record));
     } catch (const std::exception&) {
       lines.bad_lines.push_back(number);
+      if (lines.bad_lines.size() == most_bad_lines) break;
     }
   }
   return lines;

@@ -29,8 +29,9 @@ std::string to_line(std::int64_t timestamp_ns, const std::string& event);
 
 template <typename Record>
 struct Lines {
-  std::vector<Record> records;           // of whole lines; frames strictly increase
-  std::vector<std::uint64_t> bad_lines;  // numbers, from 1, of lines that cannot be understood
+  std::vector<Record> records;  // of whole lines; frames strictly increase
+  std::vector<std::uint64_t>
+      bad_lines;  // numbers, from 1, of lines that cannot be understood; 10,000 end the file
 };
 
 // Read every line that can be read; a file that is not there has no lines.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <map>
 #include <optional>
-#include <sstream>
 #include <utility>
 
 #include "drivers/error.hpp"
@@ -28,7 +27,7 @@ class Repairer {
         draft_(draft),
         stop_(stop),
         session_(open_session(damaged, stop)),
-        file_(parse_session_toml(read_file(damaged / "session.toml"), damaged / "session.toml")) {
+        file_(read_session_toml(damaged / "session.toml")) {
     repair_.is_complete = file_.closed && file_.fault.empty();
   }
 
@@ -113,11 +112,13 @@ class Repairer {
     if (!bad.empty()) repair_.is_complete = false;
     const bool is_there = fs::exists(fs::symlink_status(damaged_ / name));
     if (!is_there && more.empty()) return;
-    std::istringstream from(is_there ? read_plain_file(damaged_ / name) : "");
     const LineFile to(draft_ / name);
-    std::uint64_t number = 0;
-    for (std::string line; std::getline(from, line);)
-      if (!std::ranges::binary_search(bad, ++number)) to.append(line);
+    if (is_there) {
+      PlainLines from(damaged_ / name);
+      std::uint64_t number = 0;
+      for (std::string line; from.next(line);)
+        if (!std::ranges::binary_search(bad, ++number)) to.append(line);
+    }
     if (!more.empty()) to.append(more);
     to.sync();
   }

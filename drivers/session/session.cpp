@@ -97,7 +97,7 @@ Session open_session(const std::filesystem::path& directory, const std::stop_tok
                 ": not found; `previzd takes list FOLDER` shows the existing takes");
   if (!std::filesystem::exists(std::filesystem::symlink_status(toml)))
     throw Error(directory.string() + ": is not a session; it holds no session.toml");
-  const SessionFile file = parse_session_toml(read_plain_file(toml), toml);
+  const SessionFile file = read_session_toml(toml);
   Session session{directory, file.info, {}, {}};
   read_end(file, session);
   for (const std::string& stranger : strangers_in(directory)) session.missing.push_back(stranger);

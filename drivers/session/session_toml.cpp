@@ -436,4 +436,9 @@ SessionFile parse_session_toml(const std::string& text, const std::filesystem::p
   return file;
 }
 
+SessionFile read_session_toml(const std::filesystem::path& file) {
+  constexpr FileKind kind{"a session.toml", 1 << 24};  // with the text of a set
+  return parse_session_toml(read_plain_file(file, kind), file);
+}
+
 }  // namespace previz::session

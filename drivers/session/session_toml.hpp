@@ -34,5 +34,7 @@ struct SessionFile {
 std::string to_toml(const SessionFile& file);
 // `path` names the text in errors. Throws previz::Error naming line and key.
 SessionFile parse_session_toml(const std::string& text, const std::filesystem::path& path);
+// Reads and parses the file of a session, which must be a file itself (open_plain_file()).
+SessionFile read_session_toml(const std::filesystem::path& file);
 
 }  // namespace previz::session

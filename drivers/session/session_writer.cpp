@@ -325,7 +325,7 @@ std::optional<std::uint64_t> salvage(const std::filesystem::path& directory) {
   bool is_anothers = false;
   const OwnedDescriptor lock = locked(directory, is_anothers);
   if (is_anothers) return std::nullopt;
-  SessionFile file = parse_session_toml(read_plain_file(toml), toml);
+  SessionFile file = read_session_toml(toml);
   if (file.closed || !file.fault.empty()) return std::nullopt;
   const std::uint64_t frames = read_frame_lines(directory / "observer.jsonl").records.size();
   file.fault = "it was cut off by a crash or a power cut";
@@ -336,7 +336,7 @@ std::optional<std::uint64_t> salvage(const std::filesystem::path& directory) {
 void change_take(const std::filesystem::path& directory,
                  const std::function<void(TakeInfo&)>& change) {
   const std::filesystem::path toml = directory / "session.toml";
-  SessionFile file = parse_session_toml(read_plain_file(toml), toml);
+  SessionFile file = read_session_toml(toml);
   if (!file.info.take) file.info.take.emplace();
   change(*file.info.take);
   replace_file(toml, to_toml(file));

@@ -168,7 +168,7 @@ void search_lost(OpenedVideo& video, const std::filesystem::path& file, const St
 std::unique_ptr<StreamReader> open_stream(Session& session, const std::string& source,
                                           const std::stop_token& stop) {
   const std::filesystem::path toml = session.directory / "session.toml";
-  const SessionFile file = parse_session_toml(read_plain_file(toml), toml);
+  const SessionFile file = read_session_toml(toml);
   const std::filesystem::path video_file = session.directory / (source + ".mkv");
   const std::filesystem::path line_file = session.directory / (source + ".jsonl");
   const auto declared = file.streams.find(source);

@@ -54,7 +54,7 @@ Summary summary_of(const std::filesystem::path& directory) {
   if (std::filesystem::symlink_status(toml, unreadable).type() ==
       std::filesystem::file_type::not_found)
     throw Error(directory.string() + ": is not a take; it holds no session.toml");
-  SessionFile file = parse_session_toml(read_plain_file(toml), toml);
+  SessionFile file = read_session_toml(toml);
   Summary summary{std::move(file.info), file.closed, file.fault, file.lost, 0, 0, 0};
   const auto observer = read_frame_lines(directory / "observer.jsonl").records;
   summary.frames = observer.size();

@@ -3,6 +3,7 @@
 #include "daemon/output/asset_store.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/durability/faulty_rounds.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
 
@@ -92,7 +93,7 @@ TEST(PowerCut, LeavesALinkedAssetWhereTheSessionNamesIt) {
       const session::Session session = session::open_session(elsewhere / "after/one");
       assets = session.info.assets.size();
       for (const auto& [as_written, file] : session.info.assets)
-        EXPECT_EQ(session::read_file(session.directory / file), "a model");
+        EXPECT_EQ(test::content_of(session.directory / file), "a model");
     }
     EXPECT_TRUE(assets == 1 || cut < acknowledged);
   });

@@ -9,6 +9,7 @@
 #include "drivers/session/session.hpp"
 #include "tests/durability/simulated_time.hpp"
 #include "tests/durability/simulated_time_camera.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/notify_socket.hpp"
 #include "tests/support/other_camera.hpp"
@@ -71,7 +72,7 @@ class SimulatedDay : public testing::Test {
         "[lighting]\nfrom = \"set\"\n[recording]\nslate = \"12A\"\nreserve_mb = 1\n"
         "directory = \"takes\"\n" +
             test::button_for_every_action());
-    std::string text = session::read_file(directory_ / "set.toml");
+    std::string text = test::content_of(directory_ / "set.toml");
     const std::string before = "[light_camera]\ndriver = \"replay\"\ndevice = \"session\"\n";
     text.replace(text.find(before), before.size(), "[light_camera]\ndriver = \"none\"\n");
     std::ofstream(directory_ / "set.toml") << text;

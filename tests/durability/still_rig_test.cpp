@@ -3,6 +3,7 @@
 
 #include "daemon/rig/set_keeper.hpp"
 #include "tests/durability/still_disk.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/notify_socket.hpp"
 #include "tests/support/test.hpp"
@@ -95,7 +96,7 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
 TEST_F(RigLive, ASetThatTakesLongToBeReadHoldsUpNothing) {
   write_set();
   const std::filesystem::path file = directory_ / "set.toml";
-  std::string other = session::read_file(file);
+  std::string other = test::content_of(file);
   const std::string good = other;
   other.replace(other.find("samples = 2"), 11, "samples = 4");
   // The disk does not stand still for this name of the file.

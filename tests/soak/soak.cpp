@@ -9,8 +9,8 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
-#include "drivers/session/files.hpp"
 #include "tests/devices/leftovers.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -151,7 +151,7 @@ void forget_old_takes(const std::filesystem::path& takes) {
 // second; then some of their frames are lost and damaged. (The light camera has three frames where
 // the film camera has eight.) The crew has the set read again every 16 s.
 void add_faults(const std::filesystem::path& set_file) {
-  std::string text = session::read_file(set_file);
+  std::string text = test::content_of(set_file);
   for (const auto& [camera, frame] : {std::pair("[observer]\n", 2500), {"[light_camera]\n", 900}}) {
     const std::size_t at = text.find(camera) + std::string(camera).size();
     text.insert(at, "faults = [\"disconnect@" + std::to_string(frame) + "+0.5s\", \"drop@" +

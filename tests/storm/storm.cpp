@@ -6,6 +6,7 @@
 #include "daemon/set/actions.hpp"
 #include "drivers/session/files.hpp"
 #include "tests/devices/private_network.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/other_camera.hpp"
 
 namespace previz::rig::storm_test {
@@ -97,7 +98,7 @@ void Storm::SetUpTestSuite() {
 
 void Storm::write_stormy_set() {
   write_set("composite = true\n[display]\ndriver = \"headless\"\nmode = \"480x270\"\n");
-  text_ = session::read_file(directory_ / "set.toml");
+  text_ = test::content_of(directory_ / "set.toml");
   const std::string camera = "driver = \"replay\"\ndevice = \"session\"\n";
   replace(camera, camera +
                       "faults = [\"disconnect@40+0.5s\", \"drop@70+3\", \"corrupt@90\", "

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/post/render.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -67,7 +68,7 @@ class RigLive : public testing::Test {
 
   // Replaces words of the set file. Returns its text as it was before.
   std::string replace_in_set(const std::string& old, const std::string& by) {
-    std::string before = session::read_file(directory_ / "set.toml");
+    std::string before = test::content_of(directory_ / "set.toml");
     std::string text = before;
     EXPECT_THAT(text, HasSubstr(old));
     text.replace(text.find(old), old.size(), by);
@@ -108,7 +109,7 @@ class RigLive : public testing::Test {
   void until_metrics(const std::string& what,
                      const std::function<bool(const nlohmann::json&)>& condition) {
     const auto text = [file = directory_ / "live/metrics.json"] {
-      return std::filesystem::exists(file) ? session::read_file(file) : std::string("{}");
+      return std::filesystem::exists(file) ? test::content_of(file) : std::string("{}");
     };
     must_come(
         what, [&] { return condition(nlohmann::json::parse(text())); }, text);

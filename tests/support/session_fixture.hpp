@@ -4,23 +4,19 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <random>
 #include <string>
 #include <vector>
 
 #include "drivers/frame.hpp"
 #include "drivers/session/session.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/temporary_directory.hpp"
 
 namespace previz::session {
 
+using test::content_of;
 using test::TemporaryDirectory;
-
-inline std::string content_of(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 inline void write_content(const std::filesystem::path& file, const std::string& content) {
   std::filesystem::create_directories(file.parent_path());

@@ -10,7 +10,7 @@
 #include "daemon/model/model.hpp"
 #include "daemon/scene/load.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/truth/truth_take.hpp"
 
 namespace previz::truth {
@@ -83,7 +83,7 @@ fs::path make_phantom(const TruthSet& set, const fs::path& directory, const std:
   options.footage = directory / "session";
   options.parts_file = directory / "made.toml";
   options.device.name = device;
-  std::ofstream(options.parts_file) << for_session(session::read_file(marks), set);
+  std::ofstream(options.parts_file) << for_session(test::content_of(marks), set);
   model::make_model(options, out);
   fs::path made = directory / "made.glb";
   report_corners(set, made, out);

@@ -223,7 +223,7 @@ std::optional<std::size_t> index_of(const LensFile& read, const std::string& cam
 
 LensFile read_lens_file(std::string_view bytes, const std::string& file) {
   if (bytes.empty()) fail_at({file, 0, ""}, "has 0 bytes; export the calibration again");
-  if (bytes.size() > most_lens_file_bytes)
+  if (bytes.size() > lens_file_kind.most_bytes)
     fail_at({file, 0, ""}, "is larger than 1 MiB; give a file with the lens alone");
   refuse_binary(bytes, {file, 0, ""});
   if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);

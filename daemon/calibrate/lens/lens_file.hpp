@@ -8,10 +8,11 @@
 #include <vector>
 
 #include "daemon/calibrate/lens/file_lens.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::calibrate {
 
-inline constexpr std::size_t most_lens_file_bytes = 1 << 20;
+inline constexpr session::FileKind lens_file_kind{"a file with a lens alone", 1 << 20};
 
 // Recognises the format by the content. `file` is for messages. Throws previz::Error with file, key
 // and, where the parser knows it, line: for bytes that are not a calibration, and for formats that

@@ -1,26 +1,17 @@
 #include "daemon/calibrate/lens/source.hpp"
 
 #include <algorithm>
-#include <fstream>
 
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/picture_header.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 #include "drivers/session/session.hpp"
 
 namespace previz::calibrate {
 namespace {
 
 namespace fs = std::filesystem;
-
-// As much of a file as says what it is.
-std::string beginning_of(const fs::path& file) {
-  std::string bytes(1 << 16, '\0');
-  std::ifstream stream(file, std::ios::binary);
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
-  return bytes;
-}
 
 class SessionPictures final : public PictureSource {
  public:
@@ -85,7 +76,8 @@ std::vector<fs::path> picture_files(const fs::path& folder) {
   std::ranges::sort(others);
   if (files.empty())
     for (const fs::path& file : others)
-      if (const auto fault = exchange::picture_fault(file, beginning_of(file)); !fault.empty())
+      if (const auto fault = exchange::picture_fault(file, session::read_beginning(file, 1 << 16));
+          !fault.empty())
         throw Error(file.string() + ": " + fault);
   if (files.empty())
     throw Error(folder.string() +

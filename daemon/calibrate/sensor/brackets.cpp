@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
 #include <map>
 #include <sstream>
 
@@ -11,6 +10,7 @@
 #include "daemon/calibrate/lens/source.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::calibrate {
 namespace {
@@ -42,8 +42,7 @@ std::optional<double> seconds(const std::string& text) {
 }
 
 std::map<std::string, double> read_exposures(const fs::path& file) {
-  std::ifstream stream(file);
-  if (!stream) throw Error(file.string() + ": cannot be read; allowed: lines of NAME SECONDS");
+  std::istringstream stream(session::read_file(file, {"a list of exposure times", 1 << 22}));
   std::map<std::string, double> times;
   int number = 0;
   for (std::string line; std::getline(stream, line);) {

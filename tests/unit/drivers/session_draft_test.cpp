@@ -5,6 +5,7 @@
 
 #include "drivers/session/session.hpp"
 #include "tests/support/child_process.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
@@ -32,7 +33,7 @@ TEST(Draft, IsNotThereUntilItIsPut) {
   Draft draft(file);
   draft.file().append("whole");
   draft.put();
-  EXPECT_EQ(read_file(file), "whole");
+  EXPECT_EQ(test::content_of(file), "whole");
   EXPECT_EQ(files_in(directory), 1);
 }
 
@@ -40,7 +41,7 @@ TEST(Draft, OfANameThatIsAsLongAsNamesMayBe) {
   const test::TemporaryDirectory directory;
   const fs::path file = directory / std::string(255, 'a');
   replace_file(file, "whole");
-  EXPECT_EQ(read_file(file), "whole");
+  EXPECT_EQ(test::content_of(file), "whole");
 }
 
 TEST(Draft, TakesNoNameThatIsTaken) {
@@ -50,8 +51,8 @@ TEST(Draft, TakesNoNameThatIsTaken) {
   draft.file().append("new");
   EXPECT_FALSE(draft.put_as_new(directory / "1"));
   EXPECT_TRUE(draft.put_as_new(directory / "2"));
-  EXPECT_EQ(read_file(directory / "1"), "old");
-  EXPECT_EQ(read_file(directory / "2"), "new");
+  EXPECT_EQ(test::content_of(directory / "1"), "old");
+  EXPECT_EQ(test::content_of(directory / "2"), "new");
   EXPECT_EQ(files_in(directory), 2);
 }
 
@@ -64,9 +65,9 @@ TEST(Draft, FollowsNoLink) {
   fs::create_symlink(victim, directory / "a.toml.part");
   fs::create_symlink(victim, directory / "a.toml");
   replace_file(directory / "a.toml", "new");
-  EXPECT_EQ(read_file(victim), "as it was");
+  EXPECT_EQ(test::content_of(victim), "as it was");
   EXPECT_EQ(mode_of(victim), 0600u);
-  EXPECT_EQ(read_plain_file(directory / "a.toml"), "new");
+  EXPECT_EQ(read_plain_file(directory / "a.toml", {"a text", 1 << 20}), "new");
 }
 
 TEST(Draft, KeepsTheModeOfWhatItReplaces) {
@@ -108,14 +109,55 @@ TEST(DraftFolder, GetsItsNameWhereNothingIs) {
   EXPECT_THROW(second.put(), Error);
 }
 
+// A user's file may be a link; what is no file is not waited for, and what is too large not read.
+TEST(NamedFile, IsAFileOfItsKind) {
+  const test::TemporaryDirectory directory;
+  constexpr FileKind kind{"a text", 4096};
+  replace_file(directory / "a", std::string(4096, 'a'));
+  fs::create_symlink("a", directory / "link");
+  fs::create_symlink("/dev/zero", directory / "device");
+  ASSERT_EQ(::mkfifo((directory / "pipe").c_str(), 0600), 0);
+  EXPECT_EQ(read_file(directory / "link", kind).size(), 4096u);
+  EXPECT_EQ(read_beginning(directory / "link", 3), "aaa");
+  for (const auto& [name, words] : {std::pair("device", "is a device and not a text"),
+                                    std::pair("pipe", "is a pipe and not a text")})
+    EXPECT_THAT(test::error_of([&, &its = name] { read_file(directory / its, kind); }),
+                HasSubstr(words));
+  for (const std::uintmax_t size : {std::uintmax_t{4097}, std::uintmax_t{40} << 30}) {
+    fs::resize_file(directory / "a", size);
+    EXPECT_THAT(test::error_of([&] { read_file(directory / "a", kind); }),
+                testing::EndsWith("a: is too large for a text, which has at most 4 KiB"));
+  }
+}
+
+TEST(PlainLines, EndWithALineThatIsNone) {
+  const test::TemporaryDirectory directory;
+  const fs::path file = directory / "lines";
+  const auto read = [&] {
+    std::vector<std::string> all;
+    PlainLines lines(file);
+    for (std::string line; lines.next(line);) all.push_back(line);
+    return all;
+  };
+  const std::string block((1 << 16) - 1, 'b');  // as much as is read at once, with its end
+  std::ofstream(file) << "first\n\n" << block << "\n" << block << "\nlast";
+  EXPECT_THAT(read(), ElementsAre("first", "", block, block, "last"));
+  std::ofstream(file, std::ios::app) << "\n";
+  EXPECT_THAT(read(), ElementsAre("first", "", block, block, "last"));
+  fs::resize_file(file, std::uintmax_t{40} << 30);
+  const std::vector<std::string> cut = read();
+  ASSERT_EQ(cut.size(), 6u);
+  EXPECT_LT(cut.back().size(), 2u << 20);
+}
+
 std::string refusal(const fs::path& file) {
-  return test::error_of([&] { read_plain_file(file); });
+  return test::error_of([&] { read_plain_file(file, {"a text", 1 << 20}); });
 }
 
 TEST(PlainFile, IsNoLinkPipeDeviceOrFolder) {
   const test::TemporaryDirectory directory;
   replace_file(directory / "a", "text");
-  EXPECT_EQ(read_plain_file(directory / "a"), "text");
+  EXPECT_EQ(read_plain_file(directory / "a", {"a text", 1 << 20}), "text");
   fs::create_symlink("a", directory / "link");
   fs::create_symlink("/dev/zero", directory / "device");
   fs::create_symlink("nothing", directory / "dangling");

@@ -5,6 +5,7 @@
 
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -157,7 +158,7 @@ TEST(CameraTrack, FramesThatWereNotTrackedHaveNoKey) {
 
 // A session in which `from` stands for what `to` says, wherever it is written.
 void rewrite(const std::filesystem::path& session, const std::string& from, const std::string& to) {
-  std::string text = session::read_file(session / "session.toml");
+  std::string text = test::content_of(session / "session.toml");
   for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
     text.replace(at, from.size(), to);
   session::replace_file(session / "session.toml", text);
@@ -172,18 +173,18 @@ class ExportTake : public testing::Test {
 };
 
 TEST_F(ExportTake, TwoFilesOfOneNameStayTwo) {
-  const std::string floor = session::read_file(directory / "floor.gltf");
-  const std::string card = session::read_file(directory / "card.gltf");
+  const std::string floor = test::content_of(directory / "floor.gltf");
+  const std::string card = test::content_of(directory / "card.gltf");
   rewrite(directory / "session", "card.gltf", "props/floor.gltf");
   export_take({directory / "session", directory / "out"}, out);
-  EXPECT_EQ(session::read_file(directory / "out/floor.gltf"), floor);
-  EXPECT_EQ(session::read_file(directory / "out/floor_2.gltf"), card);
+  EXPECT_EQ(test::content_of(directory / "out/floor.gltf"), floor);
+  EXPECT_EQ(test::content_of(directory / "out/floor_2.gltf"), card);
 }
 
 // What is exported is handed on: a take from elsewhere must not add files of the one who exports
 // it.
 TEST_F(ExportTake, CopiesNoForeignFile) {
-  session::replace_file(directory / "secret.gltf", session::read_file(directory / "card.gltf"));
+  session::replace_file(directory / "secret.gltf", test::content_of(directory / "card.gltf"));
   rewrite(directory / "session", "\"card.gltf\"", "\"../secret.gltf\"");
   rewrite(directory / "session", "\\\"card.gltf\\\"", "\\\"../secret.gltf\\\"");
   // What the set names is no asset of the session any more.

@@ -1,6 +1,7 @@
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/picture_header.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/import_fixture.hpp"
 
 namespace previz::exchange::import_footage_test {
@@ -293,7 +294,7 @@ TEST(PictureHeader, HasTheSizeOfEveryKindThatIsAllowed) {
   Shoot shoot;
   for (const char* name : {"a.png", "a.jpg", "a.tiff"}) {
     write_picture(shoot.folder() / name, noise_picture(1, CV_8UC3, 37, 21));
-    const std::optional<PictureSize> size = picture_size(session::read_file(shoot.folder() / name));
+    const std::optional<PictureSize> size = picture_size(test::content_of(shoot.folder() / name));
     ASSERT_TRUE(size) << name;
     EXPECT_EQ(size->width, 37u) << name;
     EXPECT_EQ(size->height, 21u) << name;
@@ -306,7 +307,7 @@ TEST(PictureHeader, OfDamagedFilesDoesNoHarm) {
   std::mt19937 random(7);
   for (const char* name : {"a.png", "a.jpg", "a.tiff"}) {
     write_picture(shoot.folder() / name, noise_picture(1, CV_8UC3, 16, 16));
-    const std::string whole = session::read_file(shoot.folder() / name);
+    const std::string whole = test::content_of(shoot.folder() / name);
     for (std::size_t size = 0; size < whole.size(); ++size) {
       std::string part(whole, 0, size);
       EXPECT_NO_THROW(picture_size(part));
@@ -340,7 +341,7 @@ TEST(PictureHeader, MorePixelsThanAnybodyHasAreRefused) {
   const auto file = shoot.folder() / "huge.png";
   session::write_content(
       file, std::string("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\x01\0\0\0\x01\0\0\x08\x02\0\0\0", 29));
-  EXPECT_THROW(check_picture_file(file, session::read_file(file)), Error);
+  EXPECT_THROW(check_picture_file(file, test::content_of(file)), Error);
 }
 
 TEST(Import, TransparencyIsAnErrorUnlessThereIsNone) {

@@ -9,6 +9,7 @@
 #include "daemon/exchange/footage.hpp"
 #include "daemon/exchange/video_color.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/import_fixture.hpp"
 
 namespace previz::exchange::import_still_color_test {
@@ -140,7 +141,7 @@ std::string chrm(const std::array<double, 8>& xy) {
 
 // Puts bytes behind the header of a PNG or the first marker of a JPEG.
 void insert(const std::filesystem::path& file, const std::string& bytes) {
-  std::string content = session::read_file(file);
+  std::string content = test::content_of(file);
   content.insert(content.starts_with("\xff\xd8") ? 2 : 33, bytes);
   session::write_content(file, content);
 }

@@ -2,6 +2,7 @@
 #include "daemon/exchange/picture_sequence.hpp"
 
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/import_fixture.hpp"
 
 namespace previz::exchange::picture_sequence_test {
@@ -158,7 +159,7 @@ TEST(Import, ADpxSequenceIsRead) {
   // Byte 801 is the transfer characteristic: film's density is refused, and linear is heeded where
   // another program says it.
   const auto file = shoot.folder() / "a1.dpx";
-  std::string content = session::read_file(file);
+  std::string content = test::content_of(file);
   content[801] = 1;
   session::write_content(file, content);
   shoot.json["observer"]["pictures"] = {"a1.dpx"};

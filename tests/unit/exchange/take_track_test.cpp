@@ -11,6 +11,7 @@
 #include "daemon/set/load.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/import_fixture.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -82,7 +83,7 @@ class UntrackedTake : public testing::Test {
   }
 
   void take_tags_out() {
-    std::string toml = session::read_file(session_ / "session.toml");
+    std::string toml = test::content_of(session_ / "session.toml");
     const std::size_t tag = toml.find("[[tag]]");
     ASSERT_NE(tag, std::string::npos);
     toml.erase(tag, toml.find("[[object]]") - tag);
@@ -120,7 +121,7 @@ TEST_F(UntrackedTake, PosesAreFoundWithoutRendering) {
   EXPECT_THAT(said_.str(), HasSubstr("tag 3: seen in 3 frames, used for the camera in 3\n"));
   EXPECT_THAT(said_.str(), HasSubstr("1 without a pose, e.g. frame 2: "));
   EXPECT_THAT(said_.str(), Not(HasSubstr("warning")));
-  std::istringstream lines(session::read_file(*options.out));
+  std::istringstream lines(test::content_of(*options.out));
   int count = 0;
   for (std::string line; std::getline(lines, line); ++count) {
     const auto json = nlohmann::json::parse(line);
@@ -184,7 +185,7 @@ TEST_F(UntrackedTake, IsExportedWithItsCamera) {
   EXPECT_THAT(said_.str(), HasSubstr("finding the poses of 4 frames"));
   EXPECT_THAT(said_.str(), HasSubstr("3 poses of 4 frames"));
   EXPECT_THAT(said_.str(), HasSubstr("rotation order ZXY"));
-  EXPECT_EQ(std::ranges::count(session::read_file(out_ / "camera.chan"), '\n'), 3);
+  EXPECT_EQ(std::ranges::count(test::content_of(out_ / "camera.chan"), '\n'), 3);
 }
 
 // It lay at the origin.
@@ -219,7 +220,7 @@ TEST(PlacedModel, KeepsWhatItDoesNotKnow) {
   const test::TemporaryDirectory directory;
   for (const char* name : {"model.glb", "model.gltf"}) {
     write_model(directory / name);
-    const std::string content = session::read_file(directory / name);
+    const std::string content = test::content_of(directory / name);
     const std::string placed =
         placed_model(content, "shelf", glm::translate(glm::dmat4(1), glm::dvec3(1, 2, 3)));
     EXPECT_THAT(placed, HasSubstr(R"("matrix":[1.0,0.0,0.0,0.0,0.0,1.0,0.0,0.0,)"));

@@ -500,6 +500,45 @@ TEST_F(FarmTask, WritesBesideTheJobOnlyUnlessItIsAllowed) {
   EXPECT_FALSE(std::filesystem::exists(elsewhere / "out/0000.exr"));
 }
 
+// The same for what it reads: whatever the plan or the set in the job names, nothing beside the
+// job's folder and the take is opened.
+TEST_F(FarmTask, ReadsInTheJobOnlyUnlessItIsAllowed) {
+  const test::TemporaryDirectory elsewhere;
+  const std::filesystem::path secret = elsewhere / "secret.toml";
+  write_content(secret, "[set]\npassword = 1\n");
+  options_.render.set_file = directory_ / "set.toml";
+  submit();
+  const std::string plan = content_of(folder_.plan());
+  const std::filesystem::path set = folder_.place("set/set.toml");
+  const auto expect_refused = [&](const std::string& why) {
+    out_.str("");
+    EXPECT_NE(run(0), task_status::done);
+    EXPECT_THAT(out_.str(), AllOf(HasSubstr(why), Not(HasSubstr("password"))));
+  };
+  const auto name_in_plan = [&](const std::string& place) {
+    auto json = nlohmann::ordered_json::parse(plan);
+    json["set_file"] = place;
+    write_content(folder_.plan(), json.dump());
+  };
+  std::filesystem::create_directory_symlink(elsewhere.path(), folder_.path() / "evil");
+  for (const char* place : {"evil/secret.toml", "chunks/../evil/secret.toml"}) {
+    name_in_plan(place);
+    expect_refused("lies outside the job's folder");
+  }
+  write_content(folder_.plan(), plan);
+  const std::string good = content_of(set);
+  std::filesystem::remove(set);
+  std::filesystem::create_symlink(secret, set);
+  expect_refused("is a link");
+  std::filesystem::remove(set);
+  write_content(elsewhere / "card.gltf", content_of(directory_ / "card.gltf"));
+  write_content(set, good + "[[object]]\nname = \"more\"\nfile = \"" +
+                         (elsewhere / "card.gltf").string() + "\"\npresence = \"virtual\"\n");
+  expect_refused("lies outside the job's folder");
+  write_content(set, good);
+  EXPECT_EQ(run(0), task_status::done) << out_.str();
+}
+
 TEST_F(FarmTask, OfALinkedPlanIsRefused) {
   submit();
   std::filesystem::rename(folder_.plan(), directory_ / "plan.json");

@@ -9,7 +9,7 @@
 #include "daemon/output/png.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/set/load.hpp"
-#include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 #include "tests/unit/model/tagged_scan.hpp"
@@ -297,10 +297,10 @@ TEST_F(ModelCommand, TakesANameThatTheSetDoesNotHave) {
 
 TEST_F(ModelCommand, ReplacesNothingThatItIsMadeOf) {
   write_parts(marks() + parts_text);
-  const std::string before = session::read_file(options_.parts_file);
+  const std::string before = test::content_of(options_.parts_file);
   options_.out = options_.parts_file;
   EXPECT_THAT(refusal(), HasSubstr("real.toml: the model is a .glb file"));
-  EXPECT_EQ(session::read_file(options_.parts_file), before);
+  EXPECT_EQ(test::content_of(options_.parts_file), before);
   options_.out = folder_ / "demo/phantom.glb";
   write_parts(marks() + parts_text +
               "[[scan]]\nname = \"s\"\nfile = \"phantom.glb\"\n[scan.points]\n"
@@ -348,7 +348,7 @@ TEST_F(ModelCommand, OnePictureHasOneTable) {
 
 // A set file that cannot be changed is found out before anything is written.
 TEST_F(ModelCommand, WritesNoModelForASetThatCannotBeChanged) {
-  std::string text = session::read_file(*options_.set_file);
+  std::string text = test::content_of(*options_.set_file);
   const std::size_t first = text.find("[[object]]");
   std::ofstream(*options_.set_file)
       << "object = [{name = \"x\", file = \"phantom.glb\", presence = \"phantom\"}]\n"
@@ -384,7 +384,7 @@ TEST_F(ModelCommand, WritesPicturesToMarkPointsIn) {
   options_.pictures = folder_ / "marks";
   std::ostringstream out;
   model::make_model(options_, out);
-  const std::string text = session::read_file(folder_ / "marks/model.toml");
+  const std::string text = test::content_of(folder_ / "marks/model.toml");
   EXPECT_THAT(text, HasSubstr("tags = [0, 1, 2]"));
   EXPECT_TRUE(fs::exists(folder_ / "marks/frame_0.png"));
   // It is a file of parts as it is: a model of nothing but the table.

@@ -9,6 +9,7 @@
 #include "drivers/session/json_lines.hpp"
 #include "drivers/session/marks.hpp"
 #include "drivers/session/session.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
@@ -29,8 +30,8 @@ class MarkedTake : public testing::Test {
     options_.grey = true;  // colours take seconds
     session::Session opened = session::open_session(options_.footage);
     pictures_ = session::open_stream(opened, "observer")->records();
-    by_hand_ = model::parse_parts(session::read_file(demo_folder / "real.toml"),
-                                  demo_folder / "real.toml");
+    by_hand_ =
+        model::parse_parts(test::content_of(demo_folder / "real.toml"), demo_folder / "real.toml");
   }
 
   // Marks a point of the file of parts as a corner, in the first pictures of that file.
@@ -101,7 +102,7 @@ TEST_F(MarkedTake, GivesAFileOfPartsToGoOnWith) {
   options_.pictures = folder_ / "marks";
   made();
   const fs::path file = folder_ / "marks/model.toml";
-  const model::Parts parts = model::parse_parts(session::read_file(file), file);
+  const model::Parts parts = model::parse_parts(test::content_of(file), file);
   ASSERT_EQ(parts.boxes.size(), 1u);
   EXPECT_EQ(parts.boxes[0].on, "plane 1");
   EXPECT_EQ(parts.boxes[0].top,

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -173,7 +173,7 @@ TEST_F(ScanTags, OfTexturesThatCannotBeReadAreNamed) {
   std::ofstream(folder_ / "set.png") << "junk";
   EXPECT_THAT(refusal(),
               HasSubstr("set.obj: its texture \"set.png\": is neither PNG, JPEG nor WebP"));
-  std::string png(session::read_file(folder_ / "other.png"));
+  std::string png(test::content_of(folder_ / "other.png"));
   std::ofstream(folder_ / "set.png", std::ios::binary) << png.substr(0, png.size() / 2);
   EXPECT_THAT(refusal(), HasSubstr("set.png\": is cut short"));
   png[18] = 0x7f;  // the third byte of the width
@@ -318,7 +318,7 @@ class GltfScanTags : public ScanTags {
   // Writes the scan with its description changed.
   void write_changed(const std::function<void(GltfWriter::Json&)>& change) {
     write_textured_glb(file_, scan_);
-    GltfWriter::Json json = GltfWriter::Json::parse(session::read_file(file_));
+    GltfWriter::Json json = GltfWriter::Json::parse(test::content_of(file_));
     change(json);
     std::ofstream(file_) << json;
   }

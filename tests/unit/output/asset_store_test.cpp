@@ -8,6 +8,7 @@
 
 #include "drivers/descriptor.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
 
@@ -43,7 +44,7 @@ TEST(AssetStore, KeepsEachContentOnceUnderItsHash) {
   EXPECT_EQ(delivered.assets, (std::map<std::string, std::string>{{"a.glb", "assets/" + name},
                                                                   {"same.glb", "assets/" + name}}));
   EXPECT_TRUE(delivered.missing.empty());
-  EXPECT_EQ(session::read_file(directory / "take/assets" / name), "a model");
+  EXPECT_EQ(test::content_of(directory / "take/assets" / name), "a model");
   EXPECT_EQ(names_in(directory / "store"), std::vector<std::string>{name});
 }
 
@@ -98,7 +99,7 @@ TEST(Recorder, LinksTheAssetsIntoEachTakeAsTheyWereWhenTheSetWasLoaded) {
     const session::Session session = session::open_session(directory / "takes" / take);
     EXPECT_TRUE(session.missing.empty()) << session.missing.front();
     const std::filesystem::path file = session.directory / session.info.assets.at("models/a.glb");
-    EXPECT_EQ(session::read_file(file), "a model");
+    EXPECT_EQ(test::content_of(file), "a model");
     EXPECT_EQ(std::filesystem::hard_link_count(file), 3u);
   }
 }
@@ -125,7 +126,7 @@ TEST(Recorder, DoesNotWaitForAnAssetThatIsStillBeingRead) {
     ASSERT_TRUE(wait_for_finished(recorder, 1));
   }
   const session::Session session = session::open_session(directory / "takes/12A_take001");
-  EXPECT_EQ(session::read_file(session.directory / session.info.assets.at("slow.glb")), "a model");
+  EXPECT_EQ(test::content_of(session.directory / session.info.assets.at("slow.glb")), "a model");
 }
 
 }  // namespace previz::output::asset_store_test

@@ -14,6 +14,7 @@
 
 #include "daemon/output/exr_file.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -252,7 +253,7 @@ TEST_F(Exr, ADataWindowThatDoesNotBeginAtZeroIsRefused) {
   const render::Layers layers = sample_layers(4, 4);
   const auto window_of = [&](int min_x, int min_y, int max_x, int max_y) {
     write_exr(file_, layers, {});
-    std::string bytes = session::read_file(file_);
+    std::string bytes = test::content_of(file_);
     const std::string name("dataWindow\0box2i\0\x10\0\0\0", 21);
     const std::size_t at = bytes.find(name);
     EXPECT_NE(at, std::string::npos);

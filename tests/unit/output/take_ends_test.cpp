@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/cut_off_take.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
@@ -60,7 +61,7 @@ TEST(Recorder, OfTwoDisksHasTheAssetsOnBothBeforeTheyAreNeeded) {
   EXPECT_EQ(recorder.status().failures, 0u);
   const session::Session session = session::open_session(rig.second / "12A_take002");
   EXPECT_TRUE(session.missing.empty()) << session.missing.front();
-  EXPECT_EQ(session::read_file(session.directory / session.info.assets.at("a.glb")), "a model");
+  EXPECT_EQ(test::content_of(session.directory / session.info.assets.at("a.glb")), "a model");
 }
 
 TEST(Recorder, WithoutAFileOfTheSetRecordsAndTheTakeSaysWhichItWas) {
@@ -96,7 +97,7 @@ TEST(Recorder, OfAStoreThatWasDeletedTakesTheFileOfTheSetIfItIsTheSame) {
     ASSERT_TRUE(wait_for_finished(recorder, takes + 1));
   }
   const session::Session same = session::open_session(rig.first / "12A_take001");
-  EXPECT_EQ(session::read_file(same.directory / same.info.assets.at("a.glb")), "a model");
+  EXPECT_EQ(test::content_of(same.directory / same.info.assets.at("a.glb")), "a model");
   const session::Session changed = session::open_session(rig.first / "12A_take002");
   EXPECT_TRUE(changed.info.assets.empty());
   EXPECT_TRUE(mentions(changed.missing, "was changed since the set was loaded"));

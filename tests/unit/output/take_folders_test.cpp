@@ -3,6 +3,7 @@
 
 #include "daemon/output/folder_watch.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"
 
@@ -110,9 +111,32 @@ TEST(TakeFolders, KeepTheHighestTakeOfEachSlate) {
   EXPECT_EQ(folders.kept_number("12A"), 9);
   EXPECT_EQ(folders.kept_number("12B"), 2);
   EXPECT_EQ(folders.kept_number("12"), 0);
-  EXPECT_EQ(session::read_file(directory / "a/.highest_takes"), "12B_take002\n12A_take007\n");
+  EXPECT_EQ(test::content_of(directory / "a/.highest_takes"), "12B_take002\n12A_take007\n");
   std::ofstream(directory / "a/.highest_takes") << "12B_take002\n\nnothing\n12B_take";
   EXPECT_EQ(folders.kept_number("12B"), 2);
+}
+
+// A file of no content may claim any size, and one of 30 million lines is no list of takes.
+TEST(TakeFolders, WhatIsNoListOfTakesSaysNothingAndIsNamed) {
+  const TemporaryDirectory directory;
+  const std::filesystem::path list = directory / ".highest_takes", wish = directory / ".recording";
+  const TakeFolders folders({directory.path()}, 0, {});
+  for (const std::uintmax_t bytes : {std::uintmax_t{40} << 30, std::uintmax_t{1} << 20}) {
+    for (const auto& file : {list, wish}) {
+      std::ofstream(file, std::ios::trunc).close();
+      std::filesystem::resize_file(file, bytes);
+    }
+    std::vector<std::string> said;
+    const auto note = [&](const std::string& what) { said.push_back(what); };
+    EXPECT_EQ(folders.kept_number("12A", note), 0);
+    EXPECT_FALSE(folders.kept_wish(note));
+    EXPECT_THAT(said, ElementsAre(HasSubstr(".highest_takes: is too large for a list of takes, "
+                                            "which has at most 64 KiB"),
+                                  HasSubstr(".recording: is too large")));
+    TakeFolders::keep_number(directory.path(), "12A", 7);
+    EXPECT_EQ(folders.kept_number("12A"), 7);
+    EXPECT_EQ(test::content_of(list), "12A_take007\n");
+  }
 }
 
 TEST(TakeFolders, AreOnOneDiskWhereTheFoldersAboveThemAre) {
@@ -171,7 +195,7 @@ TEST(Recorder, WritesTheFormThatTheSetWants) {
   const std::filesystem::path take = disks.first / "12A_take001";
   EXPECT_EQ(frames_of(take), count_from(0, 2));
   EXPECT_THAT(session::open_session(take).missing, testing::IsEmpty());
-  EXPECT_THAT(session::read_file(take / "session.toml"), HasSubstr("codec = \"raw\""));
+  EXPECT_THAT(test::content_of(take / "session.toml"), HasSubstr("codec = \"raw\""));
 }
 
 // As `umount -l` does it: files that are open stay so, and nobody finds them by name.

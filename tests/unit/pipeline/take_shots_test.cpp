@@ -2,6 +2,7 @@
 #include "daemon/pipeline/take_shots.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -24,7 +25,7 @@ class TakeShotsTest : public testing::Test {
   // Replaces words of the session's own description, from `first` up to the next quote.
   void replace_quoted(const std::string& first, const std::string& by) {
     const std::filesystem::path toml = directory_ / "session/session.toml";
-    std::string text = session::read_file(toml);
+    std::string text = test::content_of(toml);
     const std::size_t begin = text.find(first);
     ASSERT_NE(begin, std::string::npos);
     const std::size_t end = text.find('"', begin + 1);

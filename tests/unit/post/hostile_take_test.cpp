@@ -8,6 +8,7 @@
 #include "drivers/session/draft.hpp"
 #include "drivers/session/summary.hpp"
 #include "tests/support/child_process.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -69,7 +70,7 @@ class HostileTake : public testing::TestWithParam<Case> {
   }
 
   void expect_victim_untouched() {
-    EXPECT_EQ(session::read_file(victim_), victims_text);
+    EXPECT_EQ(test::content_of(victim_), victims_text);
     EXPECT_EQ(fs::status(victim_).permissions(), fs::perms{0600});
   }
 
@@ -101,7 +102,7 @@ TEST_P(HostileTake, IsNamedAndHarmsNobody) {
 // The daemon brings takes that were cut off into order as it starts.
 TEST_P(HostileTake, IsNoTrapForADaemonThatStarts) {
   const fs::path toml = take_ / "session.toml";
-  std::string text = session::read_file(toml);
+  std::string text = test::content_of(toml);
   const std::string closed = "closed = true";
   session::replace_file(toml, text.replace(text.find(closed), closed.size(), "closed = false"));
   put_stranger();

@@ -435,6 +435,32 @@ TEST(FolderLocks, WithoutLocksOfTheFileSystemEveryClaimSucceedsAndThatIsSaid) {
   EXPECT_TRUE(locks.others().empty());
 }
 
+// Of the lines, those count whose bytes are locked; a file of a million others is made small.
+TEST(FolderLocks, LinesThatNobodyHoldsAreNotLookedAt) {
+  const test::TemporaryDirectory directory;
+  const std::filesystem::path file = directory / FolderLocks::file_name;
+  std::ofstream(file) << std::string(1'000'000, '\n');
+  static int calls;
+  calls = 0;
+  const auto counted = [](int descriptor, int command, struct flock* range) {
+    ++calls;
+    return call_fcntl(descriptor, command, range);
+  };
+  FolderLocks one(directory.path(), counted), two(directory.path(), counted),
+      three(directory.path(), counted);
+  for (FolderLocks* locks : {&one, &two, &three}) {
+    const FolderLocks::Transaction transaction(*locks);
+    locks->join();
+  }
+  EXPECT_TRUE(one.claim(5));
+  const std::vector<FolderUser> others = three.others();
+  ASSERT_EQ(others.size(), 2u);
+  EXPECT_EQ(others[0].pid, ::getpid());
+  EXPECT_THAT(others[0].frames, ElementsAre(5));
+  EXPECT_LT(std::filesystem::file_size(file), 1000u);
+  EXPECT_LT(calls, 100);
+}
+
 TEST(FrameRange, ReadsWhatTheHelpSays) {
   EXPECT_EQ(parse_frame_range("7").first, 7u);
   EXPECT_EQ(parse_frame_range("7").last, 7u);

@@ -10,6 +10,7 @@
 #include "daemon/rig/live.hpp"
 #include "drivers/plate.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -273,7 +274,7 @@ TEST_F(RenderSession, ASecondRunSkipsWhatIsFinishedAndOtherSamplesAreRefused) {
 TEST_F(RenderSession, TagsAreHiddenAsTheyWereRecordedUnlessTheOptionSaysOtherwise) {
   const auto edit = [&](const std::filesystem::path& file, const std::string& from,
                         const std::string& to) {
-    std::string text = session::read_file(file);
+    std::string text = test::content_of(file);
     for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
       text.replace(at, from.size(), to);
     std::ofstream(file) << text;

@@ -8,6 +8,7 @@
 #include "daemon/post/take_copy.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -68,7 +69,7 @@ class Takes : public testing::Test {
 
   void replace_in_toml(const std::string& take, const std::string& from, const std::string& to) {
     const fs::path toml = folder_ / take / "session.toml";
-    std::string text = session::read_file(toml);
+    std::string text = test::content_of(toml);
     const std::size_t at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
     session::replace_file(toml, text.replace(at, from.size(), to));
@@ -148,7 +149,7 @@ TEST_F(Takes, AreCopiedWithChecksums) {
   EXPECT_EQ(session::own_files(copy), session::own_files(one_));
   EXPECT_FALSE(fs::exists(copy / "notes.txt"));
   for (const fs::path& file : session::own_files(one_))
-    EXPECT_EQ(session::read_file(copy / file), session::read_file(one_ / file)) << file;
+    EXPECT_EQ(test::content_of(copy / file), test::content_of(one_ / file)) << file;
   EXPECT_TRUE(fits_its_checksums(copy));
   EXPECT_EQ(check_takes({copy}, out_, {}), 0);
   // Nothing but the takes is in the folder.
@@ -162,7 +163,7 @@ TEST_F(Takes, AreCopiedWithChecksumsOfNamesThatHaveTheEndOfALine) {
   std::ofstream(one_ / name) << "an asset";
   const fs::path disk = directory_ / "disk", copy = disk / "12A_take001";
   copy_takes({{one_}, disk}, out_, {});
-  EXPECT_EQ(session::read_file(copy / name), "an asset");
+  EXPECT_EQ(test::content_of(copy / name), "an asset");
   EXPECT_EQ(check_takes({copy}, out_, {}), 0) << out_.str();
   EXPECT_TRUE(fits_its_checksums(copy));
 }
@@ -222,14 +223,14 @@ TEST_F(Takes, ADamagedTakeIsCopiedAsItIsAndSaid) {
 
 TEST_F(Takes, ADamagedTakeIsRepairedIntoANewOne) {
   const fs::path film = one_ / "observer.mkv", disk = directory_ / "disk/repaired";
-  const std::string before = session::read_file(film);
+  const std::string before = test::content_of(film);
   std::string damaged = before;
   damaged[damaged.size() / 2] ^= 0x10;
   session::replace_file(film, damaged);
   EXPECT_EQ(repair_takes({{one_, two_}, disk}, out_, {}), 1);
   EXPECT_THAT(out_.str(), HasSubstr("12A_take001: repaired, 7 frames; what is lost is in its"));
   EXPECT_THAT(out_.str(), HasSubstr("12A_take002: whole, nothing to repair"));
-  EXPECT_EQ(session::read_file(film), damaged);
+  EXPECT_EQ(test::content_of(film), damaged);
   EXPECT_FALSE(fs::exists(disk / "12A_take002"));
   const auto [status, said] = checked({disk / "12A_take001"});
   EXPECT_EQ(status, 1);

@@ -11,6 +11,7 @@
 #include "daemon/tracking/tag_detector.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
@@ -261,7 +262,7 @@ TEST(PrintReport, SaysWhatIsInTheFile) {
   std::ostringstream out;
   print_tags(tags, out);
   EXPECT_THAT(out.str(), HasSubstr("tags.pdf: 12 tags tag36h11 0-11, 80 mm, on 6 sheets of A4\n"));
-  EXPECT_THAT(session::read_file(tags.file), StartsWith("%PDF-"));
+  EXPECT_THAT(test::content_of(tags.file), StartsWith("%PDF-"));
 }
 
 }  // namespace previz::print::print_test

@@ -72,6 +72,29 @@ TEST(CommandLine, AnUnknownOptionHasTheOneThatIsMeant) {
   EXPECT_EQ(meant("render session more"), "");
 }
 
+// A range lets "nan" pass, and a job of the farm with it could not be read by any machine.
+TEST(CommandLine, NoOptionTakesWhatIsNoNumber) {
+  CLI::App app;
+  CommandLine said;
+  add_commands(app, said);
+  int looked_at = 0;
+  const std::function<void(CLI::App&)> look = [&](CLI::App& command) {
+    for (CLI::Option* option : command.get_options([](CLI::Option*) { return true; })) {
+      if (!option->get_type_name().starts_with("FLOAT")) continue;
+      ++looked_at;
+      for (const char* none : {"nan", "NaN", "-nan", "inf", "-inf", "infinity", "1e999"}) {
+        option->clear();
+        option->add_result(none);
+        EXPECT_THROW(option->run_callback(), CLI::ParseError)
+            << command.get_name() << " " << option->get_name() << " " << none;
+      }
+    }
+    for (CLI::App* below : command.get_subcommands([](CLI::App*) { return true; })) look(*below);
+  };
+  look(app);
+  EXPECT_GT(looked_at, 15);
+}
+
 TEST(CommandLine, APictureHasUpToFourNeighboursOnEitherSide) {
   EXPECT_EQ(render_options("--neighbours 0").neighbours, 0);
   EXPECT_EQ(render_options("--neighbours 4").neighbours, 4);

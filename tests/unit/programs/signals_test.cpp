@@ -6,6 +6,8 @@
 #include <csignal>
 
 #include "daemon/pipeline/stages.hpp"
+#include "drivers/session/draft.hpp"
+#include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::signals_test {
@@ -45,6 +47,22 @@ TEST(StopOnSignalDeathTest, ASecondSignalEndsTheProcessAtOnce) {
         for (;;) pause();
       },
       testing::ExitedWithCode(128 + SIGINT), "");
+}
+
+// What keeps a command busy need not hear of the signal: it ends, and nothing half done stays.
+TEST(StopOnSignalDeathTest, TheEndOfItsPatienceEndsTheProcessWithoutItsDrafts) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  const test::TemporaryDirectory directory;
+  const auto work = [&] {
+    const StopOnSignal stop(std::chrono::milliseconds(50));
+    const session::Draft file(directory / "file");
+    const session::DraftFolder folder(directory / "folder");
+    session::Draft(directory / "done").put();
+    std::ofstream(folder.path() / "frame") << "half of it";
+    kill(getpid(), SIGTERM);
+    for (int i = 0;; ++i) std::ofstream(folder.path() / std::to_string(i % 100)) << "more";
+  };
+  EXPECT_EXIT(work(), testing::ExitedWithCode(128 + SIGTERM), "");
 }
 
 }  // namespace previz::signals_test

@@ -1,7 +1,7 @@
 // Whatever the driver has compiled is kept in a file, and a file that is of no use costs nothing
 // but the time to compile.
 #include "daemon/render/device.hpp"
-#include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -60,7 +60,7 @@ TEST_F(PipelineCacheTest, IsWrittenOnceForADevice) {
 
 TEST_F(PipelineCacheTest, IsLeftOutAndReplacedWhereItIsDamaged) {
   const std::vector<glm::vec3> first = picture();
-  const std::string whole = session::read_file(file());
+  const std::string whole = test::content_of(file());
   std::string damaged = whole;
   damaged[damaged.size() / 2] ^= 0x20;
   for (const std::string& content : {damaged, whole.substr(0, whole.size() / 2), std::string()}) {

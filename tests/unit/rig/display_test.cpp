@@ -1,5 +1,6 @@
 // What the crew sees, from end to end: a replayed take on a headless display that is read back.
 #include "daemon/output/png.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/pages.hpp"
 #include "tests/support/session_fixture.hpp"
@@ -240,7 +241,7 @@ TEST_F(RigDisplay, TakesThatWereCutOffStandOnItUntilSomebodyTakesNote) {
   for (const char* name : {"12A_take001", "12A_take002"}) {
     const std::filesystem::path take = take_folder(name);
     session::write_small_session(take, 3);
-    std::string toml = session::read_file(take / "session.toml");
+    std::string toml = test::content_of(take / "session.toml");
     const std::string closed = "closed = true";
     toml.replace(toml.find(closed), closed.size(), "closed = false");
     session::replace_file(take / "session.toml", toml);

@@ -6,6 +6,7 @@
 #include "daemon/control/bus.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/session/draft.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/other_camera.hpp"
 #include "tests/support/private_bus.hpp"
@@ -200,7 +201,7 @@ TEST_F(RigLive, AStageThatEndsTheRigDoesNotEndTheRecording) {
     until_more(8);
     throws = true;
     test::must_come("the take is closed", [&] {
-      const std::string text = session::read_file(takes / "12A_take001/session.toml");
+      const std::string text = test::content_of(takes / "12A_take001/session.toml");
       return text.find("closed = true") != std::string::npos;
     });
   };
@@ -311,7 +312,7 @@ TEST_P(RigStop, ClosesTheTakeBeforeADeviceThatHangs) {
     const auto is_closed = [&] {
       const std::filesystem::path file = take / "session.toml";
       return is_over && std::filesystem::exists(file) &&
-             session::read_file(file).find("closed = true") != std::string::npos;
+             test::content_of(file).find("closed = true") != std::string::npos;
     };
     EXPECT_TRUE(test::wait_until("the take is closed", is_closed));
     gate.open();

@@ -7,6 +7,7 @@
 //   --gtest_filter=KeptTakeRecording.*
 #include <nlohmann/json.hpp>
 
+#include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
 
@@ -180,7 +181,7 @@ TEST(KeptTake, IsReadAndRenderedAsEver) {
     SCOPED_TRACE(folder.path());
     ++takes;
     const fs::path take = folder.path() / "take";
-    const Json expected = Json::parse(session::read_file(folder.path() / "expected.json"));
+    const Json expected = Json::parse(test::content_of(folder.path() / "expected.json"));
     EXPECT_EQ(streams_of(take), expected.at("streams"));
     expect_track(take);
     const session::SessionInfo info = session::open_session(take).info;

@@ -1,5 +1,6 @@
 // Takes in review, and what buttons change in them and in the live picture, from end to end.
 #include "daemon/set/load.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
 
@@ -104,7 +105,7 @@ TEST_F(RigLive, ChangesOutlastTheSetAndAreKeptInItsFile) {
       return s.shot.scene.objects.contains("card") && s.shot.scene.lights.contains("key");
     });
     replace_in_set("samples = 2", "samples = 4");
-    const std::string other = session::read_file(file);
+    const std::string other = test::content_of(file);
     press("reload_set");
     const Shown again = until_samples(4);
     EXPECT_NEAR(glm::dvec3(again.shot.scene.objects.at("card").value()[3]).x, 0.01, 1e-12);
@@ -115,7 +116,7 @@ TEST_F(RigLive, ChangesOutlastTheSetAndAreKeptInItsFile) {
       return s.shot.samples == 4 && !s.shot.scene.objects.contains("card");
     });
     EXPECT_EQ(kept.look.edits, pipeline::Edits{});
-    EXPECT_EQ(session::read_file(directory_ / "set.toml.1.old"), other);
+    EXPECT_EQ(test::content_of(directory_ / "set.toml.1.old"), other);
   });
   const set::Set set = set::load_set(file);
   EXPECT_NEAR(glm::dvec3(set.objects[1].world_from_file[3]).x, 0.01, 1e-9);

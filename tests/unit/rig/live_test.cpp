@@ -6,6 +6,7 @@
 
 #include "daemon/output/exr.hpp"
 #include "daemon/output/png.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
 
@@ -218,7 +219,7 @@ TEST_F(RigLive, GoesOnWhereItsFilesCannotBeWritten) {
 
 TEST_F(RigLive, ABadSetLeavesTheOldOneRunningAndAGoodOneTakesOver) {
   write_set();
-  const std::string good = session::read_file(directory_ / "set.toml");
+  const std::string good = test::content_of(directory_ / "set.toml");
   run_rendering([&] {
     std::ofstream(directory_ / "set.toml") << "[quality]\nsamples = none\n";
     press("reload_set");

@@ -3,7 +3,7 @@
 
 #include <sys/stat.h>
 
-#include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -112,7 +112,7 @@ TEST_F(SetKeeperTest, ReadsNoPipe) {
   std::filesystem::remove(folder_ / "b.toml");
   ASSERT_EQ(mkfifo((folder_ / "b.toml").c_str(), 0600), 0);
   const std::optional<std::string> why_not = change(sets, 0);
-  EXPECT_THAT(why_not, Optional(HasSubstr("is not a file, but a folder, a pipe or a device")));
+  EXPECT_THAT(why_not, Optional(HasSubstr("is a pipe and not a set file")));
   EXPECT_EQ(sets.running().set.name, "old");
 }
 
@@ -173,16 +173,16 @@ TEST_F(SetKeeperTest, KeepsChangesInTheFileAndTheOldOneBesideIt) {
   EXPECT_EQ(std::filesystem::status(folder_ / "b.toml").permissions(), of_owner_and_group);
   std::string expected = stage;
   expected.replace(expected.find("0.5 "), 4, "0.25 ");
-  EXPECT_EQ(session::read_file(folder_ / "b.toml"), expected);
-  EXPECT_EQ(session::read_file(folder_ / "b.toml.1.old"), stage);
+  EXPECT_EQ(test::content_of(folder_ / "b.toml"), expected);
+  EXPECT_EQ(test::content_of(folder_ / "b.toml.1.old"), stage);
   ASSERT_TRUE(sets.has_next());
   sets.leave(a_stop_down("key"));
   sets.begin_next();
   EXPECT_EQ(sets.edits(), pipeline::Edits{}) << "changed twice";
   EXPECT_EQ(sets.running().set.lights[0].gain_mixed, 0.25);
   ASSERT_EQ(keep(sets, a_stop_down("key")), std::nullopt);
-  EXPECT_EQ(session::read_file(folder_ / "b.toml.1.old"), stage);
-  EXPECT_EQ(session::read_file(folder_ / "b.toml.2.old"), expected);
+  EXPECT_EQ(test::content_of(folder_ / "b.toml.1.old"), stage);
+  EXPECT_EQ(test::content_of(folder_ / "b.toml.2.old"), expected);
 }
 
 // The set could not start: what the crew has placed in the old one is still there.
@@ -209,7 +209,7 @@ TEST_F(SetKeeperTest, ChangesInTheFileAreNotMadeTwice) {
   sets.begin_next();
   ASSERT_TRUE(sets.go_back("there is no camera"));
   EXPECT_EQ(sets.edits(), a_stop_down("key")) << "the running set does not have them";
-  write("b.toml", session::read_file(folder_ / "b.toml") + "# by hand\n");
+  write("b.toml", test::content_of(folder_ / "b.toml") + "# by hand\n");
   ASSERT_EQ(change(sets, 0), std::nullopt);
   sets.leave(a_stop_down("key"));
   sets.begin_next();
@@ -231,7 +231,7 @@ TEST_F(SetKeeperTest, KeepsNothingOverAChangedFile) {
   write("b.toml", std::string(stage) + "# by hand\n");
   const std::optional<std::string> why_not = keep(sets, a_stop_down("key"));
   EXPECT_THAT(why_not, Optional(HasSubstr("has changed since it was loaded")));
-  EXPECT_EQ(session::read_file(folder_ / "b.toml"), std::string(stage) + "# by hand\n");
+  EXPECT_EQ(test::content_of(folder_ / "b.toml"), std::string(stage) + "# by hand\n");
   EXPECT_FALSE(sets.has_next());
 }
 
@@ -243,7 +243,7 @@ TEST_F(SetKeeperTest, KeepsNothingWhereItMayNotWrite) {
     why_not = keep(sets, a_stop_down("key"));
   }
   EXPECT_THAT(why_not, Optional(AllOf(HasSubstr("not kept: "), HasSubstr("b.toml"))));
-  EXPECT_EQ(session::read_file(folder_ / "b.toml"), stage);
+  EXPECT_EQ(test::content_of(folder_ / "b.toml"), stage);
   EXPECT_FALSE(sets.has_next());
 }
 

@@ -2,6 +2,7 @@
 #include "daemon/rig/snapshots.hpp"
 
 #include "daemon/rig/live_files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
@@ -41,7 +42,7 @@ TEST(Snapshots, OfManyAtOnceHaveANumberEach) {
           exr.file().append(std::to_string(100 * i + times));
           const fs::path stem = put_snapshot(exr);
           const std::lock_guard lock(mutex);
-          contents.insert(session::read_file(stem.string() + ".exr"));
+          contents.insert(test::content_of(stem.string() + ".exr"));
         }
       });
   }

@@ -4,6 +4,7 @@
 #include <systemd/sd-bus.h>
 
 #include "daemon/control/bus.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/pages.hpp"
 #include "tests/support/private_bus.hpp"
@@ -275,7 +276,7 @@ TEST_F(RigTranscript, EveryActionIsSignalledShownAndRecorded) {
   EXPECT_LE(std::stoull(take_["TakeFrames"].back()),
             session::open_stream(take, "observer")->records().size());
   EXPECT_TRUE(take.info.take->good);
-  const std::string events = session::read_file(take.directory / "events.jsonl");
+  const std::string events = test::content_of(take.directory / "events.jsonl");
   std::size_t at = 0;
   const auto begins =
       std::ranges::find(transcript, std::string_view("Object=sign"), &Line::changes);

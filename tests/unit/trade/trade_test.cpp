@@ -2,7 +2,7 @@
 #include "daemon/trade/trade.hpp"
 
 #include "daemon/set/load.hpp"
-#include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -35,7 +35,7 @@ class Trade : public testing::Test {
     EXPECT_THAT(test::error_of([&] { trade(); }), HasSubstr(words));
   }
   void rewrite_set(const std::string& from, const std::string& to) {
-    std::string text = session::read_file(directory_ / "set.toml");
+    std::string text = test::content_of(directory_ / "set.toml");
     ASSERT_THAT(text, HasSubstr(from));
     text.replace(text.find(from), from.size(), to);
     std::ofstream(directory_ / "set.toml") << text;
@@ -53,9 +53,9 @@ TEST_F(Trade, SweepsAndWritesTableAndPage) {
   ASSERT_GT(*report.noise.picture, 0.0);
   std::size_t entries = 0;
   for (const TradePlan::Axis& axis : report.plan.axes) entries += axis.entries.size();
-  const std::string csv = session::read_file(report.csv);
+  const std::string csv = test::content_of(report.csv);
   EXPECT_EQ(static_cast<std::size_t>(std::ranges::count(csv, '\n')), 2 + 2 * entries);
-  EXPECT_THAT(session::read_file(report.page), HasSubstr("What time buys on"));
+  EXPECT_THAT(test::content_of(report.page), HasSubstr("What time buys on"));
   EXPECT_THAT(out_.str(), HasSubstr("round 3 of 3, estimator difference ("));
 
   for (const TradeMethod& method : report.methods) {
@@ -98,8 +98,8 @@ TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
                          "parts lens", "parts coloured gloss", "parts brushed metal", "parts cloth",
                          "parts lacquer", "parts refraction", "parts panes", "parts coloured glass",
                          "parts textures", "parts textures of layers", "parts texture mappings",
-                         "parts vertex colours", "parts normal maps", "parts alpha", "parts lamps",
-                         "parts lamps in view", "parts many lamps"}));
+                         "parts vertex colours", "parts normal maps", "parts tangents",
+                         "parts alpha", "parts lamps", "parts lamps in view", "parts many lamps"}));
 }
 
 TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
@@ -114,7 +114,7 @@ TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
     EXPECT_GT(answer.seconds, 0);
     EXPECT_EQ(answer.file, directory_ / "out" / (answer.use + ".toml"));
     const std::filesystem::path file = directory_ / "set.toml";
-    const set::Set set = set::parse_set(session::read_file(file), file, {}, set::Origin::crew,
+    const set::Set set = set::parse_set(test::content_of(file), file, {}, set::Origin::crew,
                                         set::read_overlay(answer.file));
     EXPECT_EQ(set.estimation.estimator, answer.settings.estimation.estimator);
     if (answer.use == "live") {
@@ -126,7 +126,7 @@ TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
       EXPECT_EQ(set.quality.denoise, answer.making.denoise);
     }
   }
-  EXPECT_THAT(session::read_file(report.page), HasSubstr("What you get"));
+  EXPECT_THAT(test::content_of(report.page), HasSubstr("What you get"));
 }
 
 TEST_F(Trade, TakesASessionOrTheNewestTakeOfALiveSet) {
@@ -180,7 +180,7 @@ TEST_F(Trade, AStopLeavesWhatIsKnown) {
   options_.stop = stop.get_token();
   const TradeReport report = trade();
   EXPECT_TRUE(report.interrupted);
-  const std::string page = session::read_file(report.page);
+  const std::string page = test::content_of(report.page);
   EXPECT_THAT(page, HasSubstr("It was stopped before it had ended"));
   EXPECT_THAT(page, HasSubstr("There was no time to measure: "));
   EXPECT_THAT(page, HasSubstr("<b>converged</b>"));
@@ -202,7 +202,7 @@ TEST_F(Trade, TakesTheTimeThatItIsGiven) {
     EXPECT_THAT(answer.words, HasSubstr("no time to try all settings"));
     EXPECT_EQ(answer.file.empty(), !answer.is_met);
   }
-  const std::string csv = session::read_file(report.csv);
+  const std::string csv = test::content_of(report.csv);
   EXPECT_THAT(csv, HasSubstr("estimator,"));
   const auto count = std::ranges::count(csv, '\n');
   // The heads, the reference, and the set's own settings on each axis.

@@ -498,7 +498,7 @@ TEST(LensFiles, HostileFilesEndSoon) {
   expect_refused({
       {"a: &a [1]\nb: *a\n", "lens.txt:1: anchors (&) and aliases (*) are not supported"},
       {"a: " + std::string(40, '[') + std::string(40, ']'), "nested in more than 32 levels"},
-      {std::string((1 << 20) + 1, 'a'), "is larger than 1 MiB"},
+      {std::string((1 << 20) + 1, 'a'), "which has at most 1 MiB"},
       {"a: 1\na: 2\n", "lens.txt:2: a: is given twice"},
   });
   EXPECT_NE(from(std::string(100'000, '[')).error, "");

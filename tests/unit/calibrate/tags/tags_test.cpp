@@ -10,7 +10,7 @@
 #include "daemon/calibrate/tags/tag_tables.hpp"
 #include "daemon/calibrate/tags/tag_walk.hpp"
 #include "daemon/set/load.hpp"
-#include "drivers/session/files.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/tag_walks.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/tracking_synthetic.hpp"
@@ -335,7 +335,7 @@ class TagCommand : public testing::Test {
     return tags;
   }
   std::filesystem::path set_file() const { return folder / "stage.toml"; }
-  std::string text_of_set() const { return session::read_file(set_file()); }
+  std::string text_of_set() const { return test::content_of(set_file()); }
   std::string said() {
     std::ostringstream out;
     const std::string error = test::error_of([&] { calibrate_tags(options, out); });

@@ -1,0 +1,115 @@
+// How commands end: with an error where what they say cannot be written, and soon after a signal.
+#include <fmt/format.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/support/program.hpp"
+#include "tests/support/small_take.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
+
+namespace previz::endings_test {
+
+namespace fs = std::filesystem;
+
+class Ending : public testing::Test {
+ protected:
+  Ending() { test::write_small_take(directory_.path()); }
+
+  // TAKE, SET, PICTURES and NEW stand for their paths.
+  std::vector<std::string> words_of(const std::string& command) const {
+    std::vector<std::string> words;
+    std::istringstream parts(command);
+    for (std::string word; parts >> word;) {
+      if (word == "TAKE") word = directory_ / "session";
+      if (word == "SET") word = directory_ / "set.toml";
+      if (word == "FOOTAGE_SET") word = directory_ / "footage.toml";
+      if (word == "PICTURES") word = directory_ / "pictures";
+      if (word == "JSON") word = directory_ / "frames.json";
+      if (word == "NEW") word = directory_ / "new/it";
+      words.push_back(word);
+    }
+    return words;
+  }
+
+  // A set for pictures of 1280x720.
+  void write_set_of_footage() {
+    std::ofstream(directory_ / "footage.toml")
+        << "[observer.intrinsics]\nwidth = 1280\nheight = 720\nfx = 1000\nfy = 1000\ncx = 639.5\n"
+           "cy = 359.5\n[tracking]\nfamily = \"tag36h11\"\n[[tag]]\nid = 0\nsize_m = "
+           "0.1\nposition_m = [0, 0, 0]\n";
+  }
+
+  // Footage that keeps a command busy for long: names of one picture of noise.
+  void write_long_footage() {
+    fs::create_directories(directory_ / "pictures");
+    cv::Mat noise(720, 1280, CV_8UC3);
+    cv::randu(noise, 0, 255);
+    const fs::path first = directory_ / "pictures/00000.png";
+    cv::imwrite(first, noise);
+    nlohmann::json description{{"observer", {{"fps", 25}, {"start_ns", 0}, {"exposure", 1}}}};
+    for (int i = 0; i < 5000; ++i) {
+      const fs::path name = directory_ / fmt::format("pictures/{:05}.png", i);
+      if (i > 0) fs::create_hard_link(first, name);
+      description["observer"]["pictures"].push_back(name.string());
+    }
+    std::ofstream(directory_ / "frames.json") << description;
+  }
+
+  test::TemporaryDirectory directory_;
+};
+
+class FullOutput : public Ending, public testing::WithParamInterface<const char*> {};
+
+TEST_P(FullOutput, IsAnError) {
+  const test::Ended ended = test::run_program(words_of(GetParam()), {.output = "/dev/full"});
+  EXPECT_EQ(ended.status, 1);
+  EXPECT_THAT(ended.said, HasSubstr(": standard output cannot be written"));
+}
+
+std::string name_of(const char* command) {
+  std::string words;
+  for (const char* c = command; *c != '\0'; ++c)
+    if (std::isalpha(static_cast<unsigned char>(*c)) != 0) words += *c;
+  return words;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    OfEachCommand, FullOutput,
+    testing::Values("daemon/previzd --help", "daemon/previzd --version",
+                    "daemon/previzd takes list TAKE", "daemon/previzd takes check TAKE",
+                    "daemon/previzd check SET", "daemon/previzd devices --rules",
+                    "daemon/previzd farm TAKE --dry-run", "daemon/control/previzctl actions"),
+    [](const auto& name) { return name_of(name.param); });
+
+class StoppedCommand : public Ending, public testing::WithParamInterface<const char*> {};
+
+TEST_P(StoppedCommand, EndsWithItsSignalAndWithoutHalfFiles) {
+  write_long_footage();
+  write_set_of_footage();
+  fs::create_directories(directory_ / "new");
+  static int tries = 0;  // both signals in turn
+  const int signal = ++tries % 2 == 0 ? SIGINT : SIGTERM;
+  const test::Ended ended = test::run_program(
+      words_of(GetParam()),
+      {.signal = signal, .signal_after = std::chrono::milliseconds(700), .output = ""});
+  EXPECT_FALSE(ended.ran_over);
+  EXPECT_EQ(ended.status, 128 + signal) << ended.seconds << " s: " << ended.said;
+  for (const auto& entry : fs::recursive_directory_iterator(directory_.path()))
+    EXPECT_THAT(entry.path().string(), Not(HasSubstr(".part")));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    OfEachCommand, StoppedCommand,
+    testing::Values(
+        "daemon/previzd import JSON NEW",
+        "daemon/previzd model PICTURES --tags-only --set FOOTAGE_SET",
+        "daemon/previzd calibrate observer PICTURES --board charuco:11x8:20mm:15mm:5x5_1000",
+        "daemon/previzd calibrate tags PICTURES --set FOOTAGE_SET",
+        "daemon/previzd bench --seconds 60", "daemon/previzd render TAKE --spp 1000000 --out NEW",
+        "daemon/previzd trade TAKE --out NEW"),
+    [](const auto& name) { return name_of(name.param); });
+
+}  // namespace previz::endings_test
