@@ -9,7 +9,7 @@ packages=(
   # Vulkan: loader, Mesa's drivers (with a CPU one) and the validation layer the tests switch on
   libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers
   # pictures and video
-  libopencv-dev libopenexr-dev libimath-dev libpng-dev libtiff-dev libwebp-dev libexiv2-dev liblcms2-dev
+  libopencv-dev libopenexr-dev libimath-dev libpng-dev libspng-dev libtiff-dev libwebp-dev libexiv2-dev liblcms2-dev
   libcairo2-dev
   libavformat-dev libavcodec-dev libavutil-dev libswscale-dev libdeflate-dev libjpeg62-turbo-dev
   # the display and its text
@@ -18,7 +18,7 @@ packages=(
   # cameras, buttons
   libaravis-dev libcamera-dev libudev-dev libusb-1.0-0-dev libgpiod-dev libhidapi-dev
   # markers, geometry, scenes
-  libapriltag-dev libembree-dev libtinygltf-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libstb-dev libglm-dev
+  libapriltag-dev libembree-dev libtinygltf-dev libdraco-dev libmeshoptimizer-dev libassimp-dev libglm-dev
   # files, command line, log, hashes
   libtomlplusplus-dev nlohmann-json3-dev libyaml-cpp-dev libtinyxml2-dev libcli11-dev libspdlog-dev libfmt-dev libssl-dev
   # main loop, service, D-Bus

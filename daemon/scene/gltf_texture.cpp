@@ -1,13 +1,9 @@
 #include "daemon/scene/gltf_texture.hpp"
 
-#include <stb_image.h>
-
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <memory>
+#include <optional>
 #include <span>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -31,82 +27,60 @@ Wrap wrap(int gltf) {
 
 constexpr double least_cover = 1e-6;  // what a texel counts of alpha 0
 
-// Returns the texels of a picture of four samples a pixel, averaged in linear light where `to` is
-// smaller; where the alpha cuts out, the colours by it.
-template <typename Sample>
-std::vector<glm::vec4> linearise(const Sample* samples, PictureSize from, PictureSize to,
-                                 Encoding encoding, bool cuts_out) {
-  constexpr std::size_t values = std::size_t{std::numeric_limits<Sample>::max()} + 1;
-  std::vector<float> color(values), data(values);
-  for (std::size_t i = 0; i < values; ++i) {
-    const double value = static_cast<double>(i) / static_cast<double>(values - 1);
-    data[i] = static_cast<float>(value);
-    color[i] = static_cast<float>(encoding == Encoding::srgb ? srgb_signal(value) : value);
+// Returns what samples of 0 to `largest` are, as data or in linear light.
+std::vector<float> values_of(int largest, Encoding encoding) {
+  std::vector<float> values(static_cast<std::size_t>(largest) + 1);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double value = static_cast<double>(i) / largest;
+    values[i] = static_cast<float>(encoding == Encoding::srgb ? srgb_signal(value) : value);
   }
-  const auto read = [&](std::span<glm::vec4> linear) {
-    for (glm::vec4& texel : linear) {
-      texel = {color[samples[0]], color[samples[1]], color[samples[2]], data[samples[3]]};
-      samples += 4;
-    }
-  };
-  const auto width = static_cast<std::size_t>(from.width);
-  if (from == to) {
-    std::vector<glm::vec4> linear(width * static_cast<std::size_t>(from.height));
-    read(linear);
-    return linear;
-  }
-  const auto is_see_through = [&] {
-    const std::size_t texels = width * static_cast<std::size_t>(from.height);
-    for (std::size_t i = 0; i < texels; ++i)
-      if (samples[4 * i + 3] < std::numeric_limits<Sample>::max()) return true;
-    return false;
-  };
-  const bool by_alpha = cuts_out && is_see_through();
-  convert::AreaAverage<glm::dvec4> average(from.width, from.height, to.width, to.height);
-  std::vector<glm::vec4> row(width), smaller;
-  const auto weighted = [&](int x) {
-    const glm::dvec4 texel(row[static_cast<std::size_t>(x)]);
-    return by_alpha ? glm::dvec4((texel.a + least_cover) * glm::dvec3(texel), texel.a) : texel;
-  };
-  const auto keep = [&](std::span<const glm::dvec4> sums) {
-    for (const glm::dvec4& sum : sums)
-      smaller.emplace_back(by_alpha ? glm::dvec4(glm::dvec3(sum) / (sum.a + least_cover), sum.a)
-                                    : sum);
-  };
-  for (int y = 0; y < from.height; ++y) {
-    read(row);
-    average.add(weighted, keep);
-  }
-  return smaller;
+  return values;
 }
 
-// Returns the texels of a picture of the size that its header says.
-std::vector<glm::vec4> decoded(const EncodedImage& image, PictureSize from, PictureSize to,
-                               Encoding encoding, bool cuts_out) {
-  if (is_webp(image.bytes)) {
-    const WebpTexels webp = decoded_webp(image.bytes);
-    if (!webp.rgba || webp.size != from)
-      throw Error(image.where + ": cannot be decoded: it is a damaged WebP");
-    return linearise(webp.rgba.get(), from, to, encoding, cuts_out);
+// Takes the rows of a picture and returns its texels, averaged in linear light where `to` is
+// smaller; where the alpha cuts out, the colours by it.
+class Linearised {
+ public:
+  Linearised(PictureSize from, PictureSize to, Encoding encoding, bool cuts_out)
+      : encoding_(encoding), by_alpha_(cuts_out), row_(static_cast<std::size_t>(from.width)) {
+    if (from != to) average_.emplace(from.width, from.height, to.width, to.height);
+    texels_.reserve(static_cast<std::size_t>(to.width) * static_cast<std::size_t>(to.height));
   }
-  const int size = static_cast<int>(image.bytes.size());
-  int width = 0, height = 0, channels = 0;
-  std::vector<glm::vec4> texels;
-  const auto take = [&](auto* loaded) {
-    const auto free = [](void* samples) { stbi_image_free(samples); };
-    const std::unique_ptr<std::remove_pointer_t<decltype(loaded)>, decltype(free)> samples(loaded,
-                                                                                           free);
-    if (samples && PictureSize{width, height} == from)
-      texels = linearise(samples.get(), from, to, encoding, cuts_out);
-  };
-  if (stbi_is_16_bit_from_memory(image.bytes.data(), size))
-    take(stbi_load_16_from_memory(image.bytes.data(), size, &width, &height, &channels, 4));
-  else
-    take(stbi_load_from_memory(image.bytes.data(), size, &width, &height, &channels, 4));
-  if (texels.empty())
-    throw Error(image.where + ": cannot be decoded: " + picture_failure(image.bytes));
-  return texels;
-}
+
+  void add(const PictureRow& row) {
+    if (data_.empty()) {
+      data_ = values_of(row.largest, Encoding::linear);
+      color_ = values_of(row.largest, encoding_);
+    }
+    const std::uint16_t* samples = row.rgba.data();
+    for (glm::vec4& texel : row_) {
+      texel = {color_[samples[0]], color_[samples[1]], color_[samples[2]], data_[samples[3]]};
+      samples += 4;
+    }
+    if (!average_) {
+      texels_.insert(texels_.end(), row_.begin(), row_.end());
+      return;
+    }
+    const auto weighted = [&](int x) {
+      const glm::dvec4 texel(row_[static_cast<std::size_t>(x)]);
+      return by_alpha_ ? glm::dvec4((texel.a + least_cover) * glm::dvec3(texel), texel.a) : texel;
+    };
+    average_->add(weighted, [&](std::span<const glm::dvec4> sums) {
+      for (const glm::dvec4& sum : sums)
+        texels_.emplace_back(by_alpha_ ? glm::dvec4(glm::dvec3(sum) / (sum.a + least_cover), sum.a)
+                                       : sum);
+    });
+  }
+
+  std::vector<glm::vec4> texels() && { return std::move(texels_); }
+
+ private:
+  Encoding encoding_;
+  bool by_alpha_;
+  std::vector<float> data_, color_;  // by sample
+  std::vector<glm::vec4> row_, texels_;
+  std::optional<convert::AreaAverage<glm::dvec4>> average_;
+};
 
 }  // namespace
 
@@ -243,8 +217,10 @@ void GltfTextures::decode() {
     Texture& texture = scene_.textures[pending.texture];
     texture.width = width;
     texture.height = height;
-    texture.texels =
-        decoded(pending.image, pending.size, {width, height}, pending.encoding, pending.cuts_out);
+    Linearised linearised(pending.size, {width, height}, pending.encoding, pending.cuts_out);
+    decode_rows(pending.image.bytes, pending.size, pending.image.where,
+                [&](const PictureRow& row) { linearised.add(row); });
+    texture.texels = std::move(linearised).texels();
     if (pending.glossiness)
       for (glm::vec4& texel : texture.texels) texel = {1, 1 - *pending.glossiness * texel.a, 1, 1};
     if (pending.size == PictureSize{width, height}) continue;

@@ -1,15 +1,14 @@
 #include "daemon/scene/picture_bytes.hpp"
 
-#include <stb_image.h>
+#include <spng.h>
 #include <webp/decode.h>
 
 #include <algorithm>
 #include <cstring>
-#include <limits>
 #include <memory>
 
 #include "daemon/scene/scene.hpp"
-#include "daemon/set/problems.hpp"
+#include "drivers/convert/convert.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::scene {
@@ -30,59 +29,103 @@ bool begins_with(std::span<const unsigned char> bytes, std::span<const unsigned 
          std::memcmp(bytes.data(), signature.data(), signature.size()) == 0;
 }
 
-// stb_image asks for as much memory as a chunk's length says before it reads the chunk: up to 2 GiB
-// for a file of a few bytes. Throws previz::Error unless the chunks of a PNG, up to IEND, are in
-// its bytes.
-void require_chunks(std::span<const unsigned char> png, const std::string& where) {
-  std::size_t at = sizeof png_signature;
-  for (;;) {
-    constexpr std::size_t head = 8, checksum = 4;  // bytes; the head is a length and a name
-    if (png.size() - at < head) throw Error(where + ": is cut short: it has no IEND chunk");
-    const std::size_t length = std::size_t{png[at]} << 24 | std::size_t{png[at + 1]} << 16 |
-                               std::size_t{png[at + 2]} << 8 | png[at + 3];
-    const std::string name(png.begin() + static_cast<std::ptrdiff_t>(at + 4),
-                           png.begin() + static_cast<std::ptrdiff_t>(at + head));
-    if (name == "IEND") return;
-    const std::size_t left = png.size() - at - head;
-    if (left < checksum || length > left - checksum)
-      throw Error(where + ": is cut short: its chunk " + set::one_line(name) + " says " +
-                  std::to_string(length) + " bytes, and " + std::to_string(left) + " are left");
-    at += head + length + checksum;
-  }
+[[noreturn]] void refuse_damaged(const std::string& where, const std::string& why) {
+  throw Error(where + ": cannot be decoded: " + why);
 }
 
 // "WebP Container Specification" (Google): animations have a flag in their header.
 PictureSize webp_size(std::span<const unsigned char> bytes, const std::string& where) {
   WebPBitstreamFeatures features;
   if (WebPGetFeatures(bytes.data(), bytes.size(), &features) != VP8_STATUS_OK)
-    throw Error(where + ": cannot be decoded: it is a damaged WebP");
+    refuse_damaged(where, "it is a damaged WebP");
   if (features.has_animation != 0)
     throw Error(where + ": is an animated WebP; export it as one picture, as PNG, JPEG or WebP");
   return {features.width, features.height};
 }
 
-PictureSize stb_size(std::span<const unsigned char> bytes, const std::string& where) {
-  int width = 0, height = 0, channels = 0;
-  if (!stbi_info_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height,
-                             &channels) ||
-      width < 1 || height < 1)
-    throw Error(where + ": cannot be decoded: " + picture_failure(bytes));
+PictureSize jpeg_size(std::span<const unsigned char> bytes, const std::string& where) {
+  int width = 0, height = 0;
+  if (const auto wrong = convert::jpeg_size(bytes, width, height))
+    refuse_damaged(where, "it " + *wrong);
   return {width, height};
 }
 
-constexpr const char* too_large_in_16_bits =
-    "is too large with 16 bits; export it with 8 bits, or 8192 wide";
+class PngReader {
+ public:
+  PngReader(std::span<const unsigned char> bytes, const std::string& where)
+      : png_(spng_ctx_new(0), spng_ctx_free), where_(where) {
+    constexpr std::size_t most_cached = 1 << 26;
+    constexpr std::uint32_t most_side = 0x7fffffff;
+    spng_set_image_limits(png_.get(), most_side, most_side);
+    spng_set_chunk_limits(png_.get(), bytes.size(), most_cached);
+    check(spng_set_png_buffer(png_.get(), bytes.data(), bytes.size()));
+    check(spng_get_ihdr(png_.get(), &header_));
+  }
 
-// A PNG's first chunk has its bits per sample and its kind of colour behind its size.
-bool has_16_bits(std::span<const unsigned char> bytes) {
-  constexpr std::size_t bits_at = 24;
-  return begins_with(bytes, png_signature) && bytes.size() > bits_at && bytes[bits_at] == 16;
-}
-bool has_16_bits_and_alpha(std::span<const unsigned char> bytes) {
-  constexpr std::size_t color_at = 25;
-  constexpr unsigned char rgba = 6;
-  return has_16_bits(bytes) && bytes.size() > color_at && bytes[color_at] == rgba;
-}
+  PictureSize size() const {
+    return {static_cast<int>(header_.width), static_cast<int>(header_.height)};
+  }
+
+  // Calls take(samples) with the samples of each row.
+  template <typename Sample, typename Take>
+  void read(const Take& take) {
+    const std::size_t samples = std::size_t{4} * header_.width, bytes = samples * sizeof(Sample);
+    constexpr int format = sizeof(Sample) == 1 ? SPNG_FMT_RGBA8 : SPNG_FMT_RGBA16;
+    if (header_.interlace_method != SPNG_INTERLACE_NONE) {
+      std::vector<Sample> all(samples * header_.height);
+      check(spng_decode_image(png_.get(), all.data(), bytes * header_.height, format,
+                              SPNG_DECODE_TRNS));
+      for (std::size_t y = 0; y < header_.height; ++y) take(&all[y * samples]);
+      return;
+    }
+    std::vector<Sample> row(samples);
+    check(spng_decode_image(png_.get(), nullptr, 0, format,
+                            SPNG_DECODE_TRNS | SPNG_DECODE_PROGRESSIVE));
+    for (std::uint32_t y = 0; y < header_.height; ++y) {
+      const int code = spng_decode_row(png_.get(), row.data(), bytes);
+      if (code != SPNG_EOI || y + 1 < header_.height) check(code);
+      take(row.data());
+    }
+  }
+  bool has_16_bits() const { return header_.bit_depth == 16; }
+
+ private:
+  void check(int code) const {
+    if (code == 0) return;
+    if (code == SPNG_IO_EOF || code == SPNG_EIDAT_TOO_SHORT || code == SPNG_ECHUNK_SIZE ||
+        code == SPNG_ECHUNK_LIMITS)
+      throw Error(where_ + ": is cut short: a part of it is longer than what is left of the file");
+    refuse_damaged(where_, std::string("it is a damaged PNG: ") + spng_strerror(code));
+  }
+
+  std::unique_ptr<spng_ctx, void (*)(spng_ctx*)> png_;
+  const std::string& where_;
+  spng_ihdr header_{};
+};
+
+// Calls `take` with what `samples` of a row are in 16 bits.
+class RowTaker {
+ public:
+  RowTaker(int width, const std::function<void(const PictureRow&)>& take)
+      : row_(std::size_t{4} * static_cast<std::size_t>(width)), take_(take) {}
+
+  void rgba(const std::uint8_t* samples) {
+    std::copy_n(samples, row_.size(), row_.begin());
+    take_({row_, 255});
+  }
+  void rgba(const std::uint16_t* samples) { take_({{samples, row_.size()}, 65535}); }
+  void rgb(std::span<const std::uint8_t> samples) {
+    for (std::size_t x = 0; x < row_.size() / 4; ++x) {
+      std::copy_n(&samples[3 * x], 3, &row_[4 * x]);
+      row_[4 * x + 3] = 255;
+    }
+    take_({row_, 255});
+  }
+
+ private:
+  std::vector<std::uint16_t> row_;
+  const std::function<void(const PictureRow&)>& take_;
+};
 
 }  // namespace
 
@@ -91,77 +134,59 @@ bool is_webp(std::span<const unsigned char> bytes) {
          std::memcmp(bytes.data() + 8, "WEBP", 4) == 0;
 }
 
-WebpTexels decoded_webp(std::span<const unsigned char> bytes) {
-  int width = 0, height = 0;
-  std::uint8_t* const rgba = WebPDecodeRGBA(bytes.data(), bytes.size(), &width, &height);
-  return {{rgba, WebPFree}, {width, height}};
-}
-
-std::string picture_failure(std::span<const unsigned char> bytes) {
-  const char* const given = stbi_failure_reason();
-  const std::string reason = given ? given : "";
-  if (has_16_bits(bytes) && (reason == "outofmem" || reason == "too large"))
-    return std::string("it ") + too_large_in_16_bits;
-  // stb_image tries the formats in turn, and a failed try stays its reason where none follows.
-  const bool is_of_a_try = begins_with(bytes, png_signature)
-                               ? reason == "no SOI"
-                               : reason == "bad png sig" || reason == "unknown image type";
-  return reason.empty() || is_of_a_try ? "damaged" : reason;
-}
-
 PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std::string& where) {
   const bool is_png = begins_with(bytes, png_signature);
   if (!is_png && !begins_with(bytes, jpeg_signature) && !is_webp(bytes))
     throw Error(where + ": is neither PNG, JPEG nor WebP; export it as PNG or JPEG");
-  if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()))
-    throw Error(where + ": is larger than 2 GiB");
-  if (is_png) require_chunks(bytes, where);
-  const auto [width, height] = is_webp(bytes) ? webp_size(bytes, where) : stb_size(bytes, where);
+  const auto [width, height] = is_webp(bytes) ? webp_size(bytes, where)
+                               : is_png       ? PngReader(bytes, where).size()
+                                              : jpeg_size(bytes, where);
   if (width > max_texture_side || height > max_texture_side)
     throw Error(where + ": is " + std::to_string(width) + "x" + std::to_string(height) +
                 "; a side is at most " + std::to_string(max_texture_side));
   const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  if (has_16_bits_and_alpha(bytes) &&  // which stb_image counts in an int
-      texels * 8 > static_cast<std::size_t>(std::numeric_limits<int>::max()))
-    throw Error(where + ": " + too_large_in_16_bits);
   const bool is_small = is_webp(bytes) && texels <= most_texels_of_few_bytes;
   if (!is_small && texels / max_texels_a_byte > bytes.size()) throw Error(where + ": is cut short");
   return {width, height};
 }
 
-namespace {
-
-// Returns luma by the weights of stb_image, so that a scan has the same luma in each format.
-std::vector<std::uint8_t> webp_luma(std::span<const unsigned char> bytes, PictureSize size,
-                                    const std::string& where) {
-  const WebpTexels decoded = decoded_webp(bytes);
-  if (!decoded.rgba || decoded.size != size)
-    throw Error(where + ": cannot be decoded: it is a damaged WebP");
-  std::vector<std::uint8_t> luma(static_cast<std::size_t>(size.width) *
-                                 static_cast<std::size_t>(size.height));
-  const std::uint8_t* texel = decoded.rgba.get();
-  for (std::uint8_t& y : luma) {
-    y = static_cast<std::uint8_t>((77 * texel[0] + 150 * texel[1] + 29 * texel[2]) >> 8);
-    texel += 4;
+void decode_rows(std::span<const unsigned char> bytes, PictureSize size, const std::string& where,
+                 const std::function<void(const PictureRow&)>& take) {
+  RowTaker taker(size.width, take);
+  const auto rgba = [&](const auto* samples) { taker.rgba(samples); };
+  if (begins_with(bytes, png_signature)) {
+    PngReader png(bytes, where);
+    if (png.has_16_bits()) return png.read<std::uint16_t>(rgba);
+    return png.read<std::uint8_t>(rgba);
   }
-  return luma;
+  if (!is_webp(bytes)) {
+    const auto wrong = convert::decode_jpeg_rows(
+        bytes, size.width, size.height,
+        [&](std::span<const std::uint8_t> samples) { taker.rgb(samples); });
+    if (wrong) refuse_damaged(where, "it " + *wrong);
+    return;
+  }
+  int width = 0, height = 0;
+  const std::unique_ptr<std::uint8_t, void (*)(void*)> webp(
+      WebPDecodeRGBA(bytes.data(), bytes.size(), &width, &height), WebPFree);
+  if (!webp || PictureSize{width, height} != size) refuse_damaged(where, "it is a damaged WebP");
+  for (int y = 0; y < height; ++y)
+    rgba(webp.get() +
+         std::size_t{4} * static_cast<std::size_t>(y) * static_cast<std::size_t>(width));
 }
-
-}  // namespace
 
 std::vector<std::uint8_t> decoded_luma(std::span<const unsigned char> bytes, PictureSize size,
                                        const std::string& where) {
-  if (is_webp(bytes)) return webp_luma(bytes, size, where);
-  int width = 0, height = 0, channels = 0;
-  const auto free = [](void* samples) { stbi_image_free(samples); };
-  const std::unique_ptr<stbi_uc, decltype(free)> samples(
-      stbi_load_from_memory(bytes.data(), static_cast<int>(bytes.size()), &width, &height,
-                            &channels, 1),
-      free);
-  if (!samples || width != size.width || height != size.height)
-    throw Error(where + ": cannot be decoded: " + picture_failure(bytes));
-  const std::size_t texels = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  return {samples.get(), samples.get() + texels};
+  std::vector<std::uint8_t> luma;
+  luma.reserve(static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height));
+  decode_rows(bytes, size, where, [&](const PictureRow& row) {
+    const int one = (row.largest + 1) / 256;  // of 16 bits, the upper 8 count
+    for (std::size_t i = 0; i < row.rgba.size(); i += 4) {
+      const int r = row.rgba[i] / one, g = row.rgba[i + 1] / one, b = row.rgba[i + 2] / one;
+      luma.push_back(static_cast<std::uint8_t>((77 * r + 150 * g + 29 * b) >> 8));
+    }
+  });
+  return luma;
 }
 
 }  // namespace previz::scene

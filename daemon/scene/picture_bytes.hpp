@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,19 +21,21 @@ PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std
 
 bool is_webp(std::span<const unsigned char> bytes);
 
-// Returns why the last picture of this thread, a PNG or JPEG of these bytes, could not be decoded.
-std::string picture_failure(std::span<const unsigned char> bytes);
-
-// The texels of a WebP, four bytes each, RGBA, row-major from the top; null where it is damaged.
-// The size is that which the bytes say.
-struct WebpTexels {
-  std::unique_ptr<std::uint8_t, void (*)(void*)> rgba;
-  PictureSize size;
+// A row of a picture as it is encoded: four samples a pixel, R, G, B and A, of which `largest` is
+// 1. Grey has three equal ones; a picture without alpha has the largest.
+struct PictureRow {
+  std::span<const std::uint16_t> rgba;
+  int largest = 255;  // or 65535
 };
-WebpTexels decoded_webp(std::span<const unsigned char> bytes);
 
-// Returns the luma of each pixel as encoded in the picture (sRGB), row-major from the top.
-// `size` is what checked_picture_size returned for these bytes. Throws previz::Error, "WHERE: ...".
+// Calls `take` with each row from the top. `size` is what checked_picture_size() returned for these
+// bytes. No profile, gamma or orientation of the file is applied. Throws previz::Error, "WHERE:
+// ...", where the picture is damaged, some of whose rows may have been taken.
+void decode_rows(std::span<const unsigned char> bytes, PictureSize size, const std::string& where,
+                 const std::function<void(const PictureRow&)>& take);
+
+// Returns the luma of each pixel as encoded in the picture (sRGB, ITU-R BT.601), row-major from the
+// top. Throws likewise.
 std::vector<std::uint8_t> decoded_luma(std::span<const unsigned char> bytes, PictureSize size,
                                        const std::string& where);
 

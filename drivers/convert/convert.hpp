@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -87,6 +88,13 @@ std::optional<std::string> convert(const WirePicture& picture, Frame& frame);
 // The functions below are parts of convert() that have files of their own.
 std::optional<std::string> decode_jpeg(std::span<const std::uint8_t> jpeg, int width, int height,
                                        std::vector<std::uint8_t>& rgb);
+// The same row by row, from the top; also of a JPEG in CMYK. Rows of a damaged picture may have
+// been taken when it is found to be damaged.
+std::optional<std::string> decode_jpeg_rows(
+    std::span<const std::uint8_t> jpeg, int width, int height,
+    const std::function<void(std::span<const std::uint8_t> rgb)>& take);
+// Fills in the size that a JPEG's header says, or returns what is wrong with it.
+std::optional<std::string> jpeg_size(std::span<const std::uint8_t> jpeg, int& width, int& height);
 // Returns interleaved RGB with as many bits a sample. A mosaic is at least 2x2 pixels.
 std::vector<std::uint8_t> demosaic(BayerPattern pattern, bool deep, int width, int height,
                                    std::span<const std::uint8_t> mosaic);

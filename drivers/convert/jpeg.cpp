@@ -81,7 +81,7 @@ class JpegDecoder {
   std::size_t width() const { return decoder_.image_width; }
   std::size_t height() const { return decoder_.image_height; }
 
-  // These two return false where the picture is damaged.
+  // These return false where the picture is damaged.
   bool read_header() {
     if (setjmp(reports_.escape)) return false;
     jpeg_create_decompress(&decoder_);
@@ -90,18 +90,31 @@ class JpegDecoder {
     jpeg_read_header(&decoder_, TRUE);
     return true;
   }
-  bool read_picture(std::uint8_t* rgb) {
+  // Begins with the samples: RGB, or those of CMYK, which libjpeg does not convert.
+  bool begin() {
     if (setjmp(reports_.escape)) return false;
-    decoder_.out_color_space = JCS_RGB;
+    decoder_.out_color_space = is_cmyk() ? JCS_CMYK : JCS_RGB;
     decoder_.dct_method = JDCT_ISLOW;
     jpeg_start_decompress(&decoder_);
-    while (decoder_.output_scanline < decoder_.output_height) {
-      JSAMPROW row = rgb + std::size_t{3} * decoder_.output_scanline * decoder_.output_width;
-      jpeg_read_scanlines(&decoder_, &row, 1);
-    }
+    return true;
+  }
+  bool read_row(std::uint8_t* samples) {
+    if (setjmp(reports_.escape)) return false;
+    JSAMPROW row = samples;
+    jpeg_read_scanlines(&decoder_, &row, 1);
+    return true;
+  }
+  bool end() {
+    if (setjmp(reports_.escape)) return false;
     jpeg_finish_decompress(&decoder_);
     return !reports_.damaged;
   }
+
+  bool is_cmyk() const {
+    return decoder_.jpeg_color_space == JCS_CMYK || decoder_.jpeg_color_space == JCS_YCCK;
+  }
+  // Adobe's programs store how much of each ink is missing.
+  bool has_inverted_inks() const { return decoder_.saw_Adobe_marker != 0; }
 
  private:
   const std::span<const std::uint8_t> jpeg_;
@@ -114,25 +127,76 @@ std::string size_text(std::size_t width, std::size_t height) {
   return std::to_string(width) + "x" + std::to_string(height);
 }
 
+// Returns what is wrong with the header of a picture of this size, or with the number of its bytes:
+// before memory for the picture is asked for.
+std::optional<std::string> wrong_header(JpegDecoder& decoder, std::span<const std::uint8_t> jpeg,
+                                        std::size_t width, std::size_t height) {
+  if (!decoder.read_header()) return "is a damaged JPEG: " + decoder.damage();
+  if (decoder.width() != width || decoder.height() != height)
+    return "is a JPEG of " + size_text(decoder.width(), decoder.height()) + " pixels; " +
+           size_text(width, height) + " was agreed";
+  if (width * height / most_pixels_of_a_byte > jpeg.size())
+    return "is a JPEG of " + std::to_string(jpeg.size()) + " bytes, too few for " +
+           size_text(width, height) + " pixels";
+  return std::nullopt;
+}
+
+// Reads a picture whose row y goes to place(y); taken(row) follows when it is there.
+template <typename Place, typename Taken>
+std::optional<std::string> read_rows(JpegDecoder& decoder, const Place& place, const Taken& taken) {
+  bool is_good = decoder.begin();
+  for (std::size_t y = 0; y < decoder.height() && is_good; ++y) {
+    std::uint8_t* const row = place(y);
+    is_good = decoder.read_row(row);
+    if (is_good) taken(row);
+  }
+  if (is_good && decoder.end()) return std::nullopt;
+  return "is a damaged JPEG: " + decoder.damage();
+}
+
+void rgb_of_cmyk(std::vector<std::uint8_t>& row, bool is_inverted) {
+  const auto light = [&](int ink) { return is_inverted ? ink : 255 - ink; };
+  for (std::size_t i = 0; i < row.size() / 4; ++i)
+    for (std::size_t c = 0; c < 3; ++c)
+      row[3 * i + c] =
+          static_cast<std::uint8_t>((light(row[4 * i + c]) * light(row[4 * i + 3]) + 127) / 255);
+}
+
 }  // namespace
 
-// Memory for the picture is only asked for once its header is as agreed and its data can be that of
-// so large a picture.
+std::optional<std::string> jpeg_size(std::span<const std::uint8_t> jpeg, int& width, int& height) {
+  JpegDecoder decoder(jpeg);
+  if (!decoder.read_header()) return "is a damaged JPEG: " + decoder.damage();
+  width = static_cast<int>(decoder.width());
+  height = static_cast<int>(decoder.height());
+  return std::nullopt;
+}
+
 std::optional<std::string> decode_jpeg(std::span<const std::uint8_t> jpeg, int width, int height,
                                        std::vector<std::uint8_t>& rgb) {
   if (jpeg.empty()) return "is empty";
   JpegDecoder decoder(jpeg);
-  if (!decoder.read_header()) return "is a damaged JPEG: " + decoder.damage();
   const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
-  if (decoder.width() != w || decoder.height() != h)
-    return "is a JPEG of " + size_text(decoder.width(), decoder.height()) + " pixels; " +
-           size_text(w, h) + " was agreed";
-  if (w * h / most_pixels_of_a_byte > jpeg.size())
-    return "is a JPEG of " + std::to_string(jpeg.size()) + " bytes, too few for " +
-           size_text(w, h) + " pixels";
+  if (auto wrong = wrong_header(decoder, jpeg, w, h)) return wrong;
+  if (decoder.is_cmyk()) return "is a JPEG in CMYK";
   rgb.resize(3 * w * h);
-  if (!decoder.read_picture(rgb.data())) return "is a damaged JPEG: " + decoder.damage();
-  return std::nullopt;
+  return read_rows(
+      decoder, [&](std::size_t y) { return &rgb[3 * w * y]; }, [](std::uint8_t*) {});
+}
+
+std::optional<std::string> decode_jpeg_rows(
+    std::span<const std::uint8_t> jpeg, int width, int height,
+    const std::function<void(std::span<const std::uint8_t>)>& take) {
+  JpegDecoder decoder(jpeg);
+  const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
+  if (auto wrong = wrong_header(decoder, jpeg, w, h)) return wrong;
+  std::vector<std::uint8_t> row(w * (decoder.is_cmyk() ? 4 : 3));
+  return read_rows(
+      decoder, [&](std::size_t) { return row.data(); },
+      [&](std::uint8_t* samples) {
+        if (decoder.is_cmyk()) rgb_of_cmyk(row, decoder.has_inverted_inks());
+        take({samples, 3 * w});
+      });
 }
 
 }  // namespace previz::convert

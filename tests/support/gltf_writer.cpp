@@ -1,8 +1,10 @@
 #include "tests/support/gltf_writer.hpp"
 
-#include <stb_image_write.h>
+#include <spng.h>
 
+#include <cstdlib>
 #include <fstream>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string_view>
@@ -107,16 +109,23 @@ std::string base64(const std::vector<unsigned char>& bytes) {
 }
 
 std::vector<unsigned char> png(int width, int height, const std::vector<unsigned char>& rgba) {
-  std::vector<unsigned char> bytes;
-  const auto append = [](void* to, void* data, int size) {
-    auto& all = *static_cast<std::vector<unsigned char>*>(to);
-    const auto* begin = static_cast<unsigned char*>(data);
-    all.insert(all.end(), begin, begin + size);
-  };
-  if (rgba.size() != static_cast<std::size_t>(width) * static_cast<std::size_t>(height) * 4 ||
-      !stbi_write_png_to_func(append, &bytes, width, height, 4, rgba.data(), 4 * width))
-    throw std::runtime_error("cannot encode a PNG");
-  return bytes;
+  const std::unique_ptr<spng_ctx, void (*)(spng_ctx*)> png(spng_ctx_new(SPNG_CTX_ENCODER),
+                                                           spng_ctx_free);
+  spng_ihdr header{};
+  header.width = static_cast<std::uint32_t>(width);
+  header.height = static_cast<std::uint32_t>(height);
+  header.bit_depth = 8;
+  header.color_type = SPNG_COLOR_TYPE_TRUECOLOR_ALPHA;
+  spng_set_ihdr(png.get(), &header);
+  spng_set_option(png.get(), SPNG_ENCODE_TO_BUFFER, 1);
+  int code =
+      spng_encode_image(png.get(), rgba.data(), rgba.size(), SPNG_FMT_PNG, SPNG_ENCODE_FINALIZE);
+  std::size_t size = 0;
+  const std::unique_ptr<void, void (*)(void*)> bytes(spng_get_png_buffer(png.get(), &size, &code),
+                                                     std::free);
+  if (!bytes) throw std::runtime_error("cannot encode a PNG");
+  const auto* begin = static_cast<const unsigned char*>(bytes.get());
+  return {begin, begin + size};
 }
 
 }  // namespace previz::test

@@ -50,6 +50,32 @@ Bytes jpeg_of(int width, int height, const Bytes& rgb, bool abbreviated = false,
   return jpeg;
 }
 
+// 8x8 pixels of these inks, with the mark of Adobe's programs, which store what is missing of each.
+Bytes jpeg_of_inks(const std::array<std::uint8_t, 4>& missing) {
+  jpeg_compress_struct encoder{};
+  jpeg_error_mgr errors{};
+  encoder.err = jpeg_std_error(&errors);
+  jpeg_create_compress(&encoder);
+  unsigned char* data = nullptr;
+  unsigned long size = 0;
+  jpeg_mem_dest(&encoder, &data, &size);
+  encoder.image_width = encoder.image_height = 8;
+  encoder.input_components = 4;
+  encoder.in_color_space = JCS_CMYK;
+  jpeg_set_defaults(&encoder);
+  jpeg_set_quality(&encoder, 100, TRUE);
+  jpeg_start_compress(&encoder, TRUE);
+  Bytes row;
+  for (int x = 0; x < 8; ++x) row.insert(row.end(), missing.begin(), missing.end());
+  JSAMPLE* samples = row.data();
+  for (int y = 0; y < 8; ++y) jpeg_write_scanlines(&encoder, &samples, 1);
+  jpeg_finish_compress(&encoder);
+  jpeg_destroy_compress(&encoder);
+  Bytes jpeg(data, data + size);
+  std::free(data);
+  return jpeg;
+}
+
 Bytes flat(int width, int height, const std::array<std::uint8_t, 3>& colour) {
   Bytes rgb;
   for (int i = 0; i < width * height; ++i) rgb.insert(rgb.end(), colour.begin(), colour.end());
@@ -183,6 +209,26 @@ TEST(Mjpeg, DamageDoesNoHarm) {
       EXPECT_EQ(frame.bytes.size(), frame_bytes(PixelFormat::rgb8, 48, 32));
     }
   }
+}
+
+// Textures may be in CMYK; a camera's pictures are not.
+TEST(ConvertJpegRows, TurnsInksIntoLight) {
+  const Bytes jpeg = jpeg_of_inks({200, 100, 50, 204});
+  int width = 0, height = 0, rows = 0;
+  EXPECT_EQ(jpeg_size(jpeg, width, height), std::nullopt);
+  EXPECT_EQ(width, 8);
+  EXPECT_EQ(height, 8);
+  const auto look = [&](std::span<const std::uint8_t> rgb) {
+    ++rows;
+    ASSERT_EQ(rgb.size(), 24u);
+    for (std::size_t x = 0; x < 8; ++x)
+      for (const auto& [c, light] : {std::pair(0, 160), {1, 80}, {2, 40}})  // of 0.8 without black
+        EXPECT_NEAR(rgb[3 * x + static_cast<std::size_t>(c)], light, 1);
+  };
+  EXPECT_EQ(decode_jpeg_rows(jpeg, 8, 8, look), std::nullopt);
+  EXPECT_EQ(rows, 8);
+  Bytes frame;
+  EXPECT_THAT(decode_jpeg(jpeg, 8, 8, frame), Optional(HasSubstr("CMYK")));
 }
 
 }  // namespace previz::convert::convert_jpeg_test

@@ -299,7 +299,8 @@ TEST_F(GltfScanRead, CopiesAndMirroredNodesAreThere) {
   }
 }
 
-// Two texels, (0, 51, 255) and (10, 11, 128), without loss; the luma is stb_image's.
+// Two texels, (0, 51, 255) and (10, 11, 128), without loss; their luma is 0.299 R + 0.587 G +
+// 0.114 B, in 256ths.
 TEST_F(GltfScanRead, TexturesInWebpAreRead) {
   GltfWriter gltf;
   gltf.add("images", {{"uri",

