@@ -10,6 +10,7 @@
 #include <chrono>
 #include <iostream>
 #include <optional>
+#include <sstream>
 
 #include "daemon/bench/figures.hpp"
 #include "daemon/command_line.hpp"
@@ -23,6 +24,7 @@
 #include "daemon/signals.hpp"
 #include "daemon/trade/page.hpp"
 #include "drivers/error.hpp"
+#include "drivers/printable.hpp"
 #include "drivers/standard_output.hpp"
 
 namespace {
@@ -35,7 +37,7 @@ void report_end(const std::exception& error) {
   if (report::destination() == report::Destination::journal)
     report::log({report::Severity::error, "", error.what()});
   else
-    std::cerr << "previzd: " << error.what() << std::endl;
+    std::cerr << "previzd: " << with_short_lines(error.what()) << std::endl;
 }
 
 int do_devices(bool learn, bool rules, const StopOnSignal& stop) {
@@ -178,7 +180,10 @@ int do_line(int argc, char** argv) {
     add_commands(app, said);
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    if (app.exit(error) == 0) return 0;
+    std::ostringstream refusal;
+    const int status = app.exit(error, std::cout, refusal);
+    std::cerr << with_short_lines(refusal.str());
+    if (status == 0) return 0;
     if (const std::string meant = meant_option(app); !meant.empty()) std::cerr << meant << '\n';
     return 2;
   } catch (const std::exception& error) {
@@ -192,5 +197,6 @@ int do_line(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const SafeOutput out(std::cout), errors(std::cerr);
   return finished_output("previzd", do_line(argc, argv));
 }

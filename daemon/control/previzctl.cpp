@@ -8,11 +8,13 @@
 #include <cstring>
 #include <iostream>
 #include <memory>
+#include <sstream>
 #include <string>
 
 #include "daemon/control/bus.hpp"
 #include "daemon/control/request.hpp"
 #include "drivers/error.hpp"
+#include "drivers/printable.hpp"
 #include "drivers/standard_output.hpp"
 
 namespace {
@@ -180,9 +182,12 @@ int do_line(int argc, char** argv) {
     std::cout << said << std::endl;
     return 0;
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    std::ostringstream refusal;
+    const int status = app.exit(error, std::cout, refusal);
+    std::cerr << with_short_lines(refusal.str());
+    return status == 0 ? 0 : 2;
   } catch (const std::exception& error) {
-    std::cerr << "previzctl: " << error.what() << std::endl;
+    std::cerr << "previzctl: " << with_short_lines(error.what()) << std::endl;
     return 1;
   }
 }
@@ -190,5 +195,6 @@ int do_line(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  const SafeOutput out(std::cout), errors(std::cerr);
   return finished_output("previzctl", do_line(argc, argv));
 }

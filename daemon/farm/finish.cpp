@@ -9,7 +9,6 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/farm/on_one_line.hpp"
 #include "daemon/farm/settings.hpp"
 #include "daemon/farm/task.hpp"
 #include "daemon/post/folder_locks.hpp"
@@ -17,6 +16,7 @@
 #include "daemon/post/render_files.hpp"
 #include "daemon/post/render_plan.hpp"
 #include "drivers/error.hpp"
+#include "drivers/printable.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/timecode.hpp"
@@ -49,7 +49,7 @@ class TakeProof {
   void wait_for_a_look(std::size_t chunk) const;
   void collect(std::size_t chunk);
   std::string why_not_ours(std::size_t chunk) const;
-  std::string why_missing(std::size_t chunk, std::uint64_t frame) const;
+  std::string why_missing(std::size_t chunk) const;
   bool is_wanted_device(const post::FinishedFrame& frame) const {
     return job_.any_device || frame.made_on.is_gpu == job_.on_gpu;
   }
@@ -129,9 +129,7 @@ void TakeProof::collect(std::size_t chunk) {
   pictures_.adopt(part);
 }
 
-std::string TakeProof::why_missing(std::size_t chunk, std::uint64_t frame) const {
-  if (const auto fault = frame_faults_.find(frame); fault != frame_faults_.end())
-    return fault->second;
+std::string TakeProof::why_missing(std::size_t chunk) const {
   if (const auto fault = faults_.find(chunk); fault != faults_.end()) return fault->second;
   const std::optional<TaskState> state = folder_.read_state(chunk);
   if (!state) return "not begun";
@@ -156,12 +154,15 @@ void TakeProof::run(Proof& proof) {
     const Chunk& plan = job_.chunks[chunk];
     if (plan.take != index_ || plan.kind == ChunkKind::sums) continue;
     collect(chunk);
+    std::optional<std::string> why;  // of its frames that have no fault of their own
     for (std::uint64_t frame = plan.frames.first; frame <= plan.frames.last; ++frame) {
       if (const post::FinishedFrame* finished = pictures_.finished(frame)) {
         cards.insert(finished->made_on.device);
         continue;
       }
-      MissingFrames& these = missing[why_missing(chunk, frame)];
+      const auto fault = frame_faults_.find(frame);
+      if (fault == frame_faults_.end() && !why) why = why_missing(chunk);
+      MissingFrames& these = missing[fault == frame_faults_.end() ? *why : fault->second];
       these.take = index_;
       these.frames.push_back(frame);
       proof.chunks.insert(chunk);

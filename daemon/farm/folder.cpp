@@ -11,10 +11,10 @@
 #include <ctime>
 #include <nlohmann/json.hpp>
 
-#include "daemon/farm/on_one_line.hpp"
 #include "daemon/farm/signs_of_life.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
+#include "drivers/printable.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/json_numbers.hpp"

@@ -15,8 +15,8 @@ namespace previz::farm {
 namespace {
 
 constexpr int format = 1;
-constexpr std::size_t most_chunks = 1'000'000;
-constexpr std::uint64_t most_frames = 10'000'000;  // of a take: four days of it
+constexpr std::size_t most_chunks = 100'000;
+constexpr std::uint64_t most_frames = 1'000'000;  // of a take: eleven hours of it
 constexpr std::array<const char*, 3> kinds{"pictures", "sums", "merge"};
 // Each machine gets about four tasks, so that one that ends early takes another one.
 constexpr std::uint64_t chunks_a_machine = 4;
@@ -198,7 +198,8 @@ Job read(const Json& json) {
   wishes.at("memory").get_to(job.wishes.memory);
   for (const Json& take : json.at("takes")) job.takes.push_back(take_of(take));
   if (json.at("chunks").size() > most_chunks)
-    throw Error("it has more than " + std::to_string(most_chunks) + " chunks");
+    throw Error("it has more than " + std::to_string(most_chunks) +
+                " chunks; make several jobs of it, or give longer chunks with --chunk");
   for (const Json& chunk : json.at("chunks")) job.chunks.push_back(chunk_of(chunk, job));
   for (std::size_t i = job.first_merge(); i < job.chunks.size(); ++i)
     if (job.chunks[i].kind != ChunkKind::merge) throw Error("its chunks are not in their order");

@@ -9,8 +9,8 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/farm/on_one_line.hpp"
 #include "drivers/error.hpp"
+#include "drivers/printable.hpp"
 
 namespace previz::farm {
 

@@ -169,7 +169,9 @@ void make_folder(const FarmOptions& options, const JobFolder& folder, const Job&
     for (const auto& [as_written, file] : own_assets(plan, options.takes.front()))
       copy(file, job.set_assets.at(as_written));
   }
-  session::replace_file(folder.plan(), to_json(job));
+  const std::string plan = to_json(job);
+  job_from_json(plan, folder.plan().string());  // what no machine could read is not handed out
+  session::replace_file(folder.plan(), plan);
 }
 
 }  // namespace previz::farm

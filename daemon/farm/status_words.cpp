@@ -3,9 +3,9 @@
 #include <nlohmann/json.hpp>
 #include <ostream>
 
-#include "daemon/farm/on_one_line.hpp"
 #include "daemon/farm/status.hpp"
 #include "daemon/output/progress.hpp"
+#include "drivers/printable.hpp"
 
 namespace previz::farm {
 namespace {

@@ -9,12 +9,12 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/farm/on_one_line.hpp"
 #include "daemon/farm/settings.hpp"
 #include "daemon/farm/signs_of_life.hpp"
 #include "daemon/post/render.hpp"
 #include "daemon/post/render_files.hpp"
 #include "drivers/error.hpp"
+#include "drivers/printable.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
 

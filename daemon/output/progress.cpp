@@ -1,4 +1,5 @@
 #include "daemon/output/progress.hpp"
+#include "drivers/printable.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -32,7 +33,7 @@ Progress::Progress(std::ostream& out, bool terminal, std::uint64_t total_frames,
     : out_(out), terminal_(terminal), total_(total_frames), start_s_(start_s) {}
 
 void Progress::clear_line() {
-  if (line_shown_) out_ << "\r\x1b[K";
+  if (line_shown_) out_ << erase_line;
   line_shown_ = false;
 }
 
@@ -82,12 +83,12 @@ std::string ShareProgress::share_and_rest(double now_s) const {
 
 void ShareProgress::worked(const std::string& step, double work, double now_s) {
   done_ += work;
-  if (terminal_) out_ << "\r\x1b[K" << step << " (" << share_and_rest(now_s) << ")" << std::flush;
+  if (terminal_) out_ << erase_line << step << " (" << share_and_rest(now_s) << ")" << std::flush;
 }
 
 void ShareProgress::step_done(const std::string& text, double now_s) {
-  out_ << (terminal_ ? "\r\x1b[K" : "") << text << " (" << share_and_rest(now_s) << ")"
-       << std::endl;
+  out_ << (terminal_ ? erase_line : std::string_view()) << text << " (" << share_and_rest(now_s)
+       << ")" << std::endl;
 }
 
 }  // namespace previz::output

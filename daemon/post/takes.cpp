@@ -12,6 +12,7 @@
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
+#include "drivers/printable.hpp"
 #include "drivers/session/files.hpp"
 #include "drivers/session/repair.hpp"
 
@@ -96,6 +97,11 @@ Row row_of(const ListedTake& take) {
   return row;
 }
 
+// Says something of a take, whose name and files may be anybody's.
+void say(const fs::path& take, const std::string& what, std::ostream& out) {
+  out << on_one_line(take.string() + ": " + what) << std::endl;
+}
+
 void print(const std::vector<Row>& rows, std::ostream& out) {
   std::array<std::size_t, std::tuple_size_v<Row>> widths{};
   for (const Row& row : rows)
@@ -161,7 +167,10 @@ void list_takes(const Paths& places, std::ostream& out) {
     return;
   }
   std::vector<Row> rows{{"take", "good", "length", "frames", "timecode", "size", "rendered", ""}};
-  for (const ListedTake& take : takes) rows.push_back(row_of(take));
+  for (const ListedTake& take : takes) {
+    rows.push_back(row_of(take));
+    for (std::string& cell : rows.back()) cell = on_one_line(cell);
+  }
   print(rows, out);
 }
 
@@ -173,7 +182,7 @@ void mark_takes(const Paths& takes, bool good, std::ostream& out) {
     session::change_take(take.directory, [&](session::TakeInfo& info) { info.good = good; });
     if (fs::exists(fs::symlink_status(take.directory / checksums_name)))
       write_checksum(take.directory, "session.toml");
-    out << take.directory.string() << (good ? ": good\n" : ": not good\n");
+    say(take.directory, good ? "good" : "not good", out);
   }
 }
 
@@ -204,10 +213,9 @@ int check_takes(const Paths& takes, std::ostream& out, const std::stop_token& st
     // What could not be read a moment ago, and now can, is a disk that begins to fail.
     if (faults.empty()) faults = take.strangers;
     if (faults.empty() && !take.fault.empty()) faults.push_back(take.fault);
-    for (const std::string& fault : faults) out << take.directory.string() << ": " << fault << '\n';
+    for (const std::string& fault : faults) say(take.directory, fault, out);
     if (faults.empty())
-      out << take.directory.string() << ": whole, " << take.summary.frames << " frames"
-          << std::endl;
+      say(take.directory, "whole, " + std::to_string(take.summary.frames) + " frames", out);
     else
       result = 1;
   }
@@ -225,19 +233,18 @@ int repair_takes(const RepairOptions& options, std::ostream& out, const std::sto
   for (const ListedTake& take : takes) {
     if (!take.fault.empty()) throw Error(take.fault);
     if (damage_of(take.directory, stop).empty()) {
-      out << take.directory.string() << ": whole, nothing to repair" << std::endl;
+      say(take.directory, "whole, nothing to repair", out);
       continue;
     }
     session::make_folders(options.folder);
     const fs::path place = options.folder / take.directory.filename();
     const session::Repair repair = session::repair_session(take.directory, place, stop);
-    for (const std::string& what : repair.lacked)
-      out << take.directory.string() << ": " << what << '\n';
-    out << place.string() << ": repaired, " << repair.frames << " frames"
-        << (repair.is_complete ? ", nothing is lost" : "; what is lost is in its session.toml")
-        << std::endl;
-    for (const std::string& fault : damage_of(place, stop))
-      out << place.string() << ": " << fault << '\n';
+    for (const std::string& what : repair.lacked) say(take.directory, what, out);
+    say(place,
+        "repaired, " + std::to_string(repair.frames) + " frames" +
+            (repair.is_complete ? ", nothing is lost" : "; what is lost is in its session.toml"),
+        out);
+    for (const std::string& fault : damage_of(place, stop)) say(place, fault, out);
     if (!repair.is_complete) result = 1;
   }
   return result;
@@ -250,12 +257,10 @@ int copy_takes(const CopyOptions& options, std::ostream& out, const std::stop_to
   for (const ListedTake& take : takes) {
     const fs::path copy = options.folder / take.directory.filename();
     const bool was_made = copy_take(take, copy, stop);
-    out << copy.string()
-        << (was_made ? ": " + size_words(take.bytes) + ", checked" : ": already copied")
-        << std::endl;
+    say(copy, was_made ? size_words(take.bytes) + ", checked" : "already copied", out);
     // The bytes are the same; whether they are a whole take is another question.
     for (const std::string& fault : damage_of(copy, stop)) {
-      out << copy.string() << ": the take itself is damaged, not by copying: " << fault << '\n';
+      say(copy, "the take itself is damaged, not by copying: " + fault, out);
       result = 1;
     }
   }

@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <memory>
 
+#include "drivers/printable.hpp"
+
 namespace previz::report {
 namespace {
 
@@ -47,7 +49,8 @@ void start_log(Severity least, Destination destination) {
 }
 
 void log(const Report& report) {
-  spdlog::default_logger_raw()->log(level_of(report.severity), "{}", line_of(report));
+  spdlog::default_logger_raw()->log(level_of(report.severity), "{}",
+                                    with_short_lines(without_commands(line_of(report))));
 }
 
 }  // namespace previz::report

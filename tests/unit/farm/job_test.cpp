@@ -86,6 +86,19 @@ TEST(JobPlan, ThatIsNotOneIsRefused) {
               HasSubstr("no JSON object"));
 }
 
+// The last step looks at each of them.
+TEST(JobPlan, HasNoMoreThanAShootMakes) {
+  EXPECT_THAT(refusal([](auto& json) {
+                json["takes"][0]["frames"] = {0, 1'000'000};
+              }),
+              HasSubstr("a range of frames runs from 0 to 1000000"));
+  EXPECT_THAT(refusal([](auto& json) {
+                const auto chunk = json["chunks"][0];
+                json["chunks"] = std::vector(100'001, chunk);
+              }),
+              HasSubstr("it has more than 100000 chunks"));
+}
+
 // Otherwise the last step would find every frame there that is in a chunk, and none that is not.
 TEST(JobPlan, HasEveryFrameOnce) {
   const char* const once = "do not have every frame once";
@@ -96,7 +109,7 @@ TEST(JobPlan, HasEveryFrameOnce) {
   EXPECT_THAT(refusal([](auto& json) { json["chunks"].push_back(json["chunks"][9]); }),
               HasSubstr(once));
   EXPECT_THAT(refusal([](auto& json) {
-                json["takes"][0]["frames"] = {3, 1u << 23};
+                json["takes"][0]["frames"] = {3, 1u << 19};
               }),
               HasSubstr(once));
   EXPECT_THAT(refusal([](auto& json) {

@@ -4,7 +4,7 @@
 
 #include "daemon/farm/farm.hpp"
 #include "daemon/farm/finish.hpp"
-#include "daemon/farm/on_one_line.hpp"
+#include "drivers/printable.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
@@ -171,17 +171,6 @@ TEST_F(FarmStatus, PrintsWhatIsMissingLikewise) {
   std::ostringstream out;
   print_missing(folder_, job_, proof, out);
   EXPECT_THAT(out.str(), StartsWith("a\\x1b[31m card\n12A\\x1b[2J: frame 1: on node1: a b\\x07\n"));
-}
-
-TEST(OnOneLine, KeepsWordsAndShowsTheRestAsBytes) {
-  EXPECT_EQ(on_one_line("prise 12é — 撮影\n"), "prise 12é — 撮影");
-  EXPECT_EQ(on_one_line("a\tb\nc\x7f"), "a b c\\x7f");
-  EXPECT_EQ(on_one_line("\xc2\x9b"
-                        "31m"),
-            "\\xc2\\x9b31m");                                 // U+009B is ESC [ to a terminal
-  EXPECT_EQ(on_one_line("\xe2\x80\xae"), "\\xe2\\x80\\xae");  // from right to left
-  EXPECT_EQ(on_one_line("\x9b\xff\xc0\xaf\xe2\x82"), "\\x9b\\xff\\xc0\\xaf\\xe2\\x82");
-  EXPECT_EQ(on_one_line(std::string("a\0b", 3)), "a\\x00b");
 }
 
 }  // namespace previz::farm::status_test

@@ -84,6 +84,32 @@ INSTANTIATE_TEST_SUITE_P(
                     "daemon/previzd farm TAKE --dry-run", "daemon/control/previzctl actions"),
     [](const auto& name) { return name_of(name.param); });
 
+// Names and arguments are anybody's: none commands the terminal, forges a line or fills it.
+TEST_F(Ending, WordsOfOthersAreShownAndNotObeyed) {
+  const fs::path takes = directory_ / "takes";
+  fs::create_directories(takes);
+  fs::copy(directory_ / "session", takes / "1_take001\nK_take009  good\x1b[2J",
+           fs::copy_options::recursive);
+  const std::string escape = "x\x1b[31m", long_one(100'000, 'x');
+  using Words = std::vector<std::string>;
+  for (const Words& words :
+       {Words{"daemon/previzd", "takes", "list", takes.string()},
+        Words{"daemon/previzd", "takes", "check", (takes / "1_take001\nK_take009  good\x1b[2J")},
+        Words{"daemon/previzd", "takes", "list", escape},
+        Words{"daemon/previzd", "render", (directory_ / escape).string()},
+        Words{"daemon/previzd", "takes", "list", long_one},
+        Words{"daemon/previzd", "render", "--" + long_one, escape},
+        Words{"daemon/control/previzctl", "action", escape},
+        Words{"daemon/control/previzctl", "action", long_one},
+        Words{"daemon/control/previzctl", long_one}}) {
+    const test::Ended ended = test::run_program(words);
+    EXPECT_FALSE(ended.said.empty());
+    EXPECT_THAT(ended.said, Not(HasSubstr("\x1b")));
+    EXPECT_THAT(ended.said, Not(HasSubstr("\nK_take009")));
+    EXPECT_LT(ended.said.size(), 10'000u);
+  }
+}
+
 class StoppedCommand : public Ending, public testing::WithParamInterface<const char*> {};
 
 TEST_P(StoppedCommand, EndsWithItsSignalAndWithoutHalfFiles) {
