@@ -68,8 +68,7 @@ void read_by_own_functions(Reader& reader) {
   reader.SetFsCallbacks(files);
 }
 
-// Images are decoded later: tinygltf does not check the pointer of those in a buffer view, and has
-// no URIs of others.
+// Images are decoded later, by readers of our own (picture_bytes.hpp).
 bool keep_encoded(tinygltf::Image* image, int, std::string*, std::string*, int, int,
                   const unsigned char*, int, void*) {
   image->as_is = true;

@@ -246,7 +246,7 @@ YamlTree parse_yaml(std::string_view text, const std::string& file) {
   try {
     std::istringstream stream(lines);
     YAML::Parser parser(stream);
-    // To ask for all documents may not end: yaml-cpp 0.7 finds any number of them before a comma.
+    // One document: a library may find any number of them in a damaged text.
     parser.HandleNextDocument(events);
     has_more = bool(parser);
   } catch (const YAML::Exception& error) {
