@@ -297,8 +297,7 @@ void refuse_what_is_no_number(CLI::App& app) {
     return text + " is not a number that can be used; give a finite one";
   };
   for (CLI::Option* option : app.get_options([](CLI::Option*) { return true; }))
-    if (option->get_type_name().starts_with("FLOAT"))
-      option->check(CLI::Validator(refusal, ""));
+    if (option->get_type_name().starts_with("FLOAT")) option->check(CLI::Validator(refusal, ""));
   for (CLI::App* command : app.get_subcommands([](CLI::App*) { return true; }))
     refuse_what_is_no_number(*command);
 }

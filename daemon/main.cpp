@@ -8,14 +8,18 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <filesystem>
 #include <iostream>
 #include <optional>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 #include "daemon/bench/figures.hpp"
 #include "daemon/command_line.hpp"
 #include "daemon/device_rules.hpp"
 #include "daemon/devices.hpp"
+#include "daemon/output/take_folders.hpp"
 #include "daemon/post/check.hpp"
 #include "daemon/post/render_takes.hpp"
 #include "daemon/report/log.hpp"
@@ -23,6 +27,8 @@
 #include "daemon/rig/service.hpp"
 #include "daemon/signals.hpp"
 #include "daemon/trade/page.hpp"
+#include "drivers/box/confinement.hpp"
+#include "drivers/box/supervised.hpp"
 #include "drivers/error.hpp"
 #include "drivers/printable.hpp"
 #include "drivers/standard_output.hpp"
@@ -173,6 +179,52 @@ int do_stoppable(const CLI::App& app, CommandLine& said) {
   return stop.received() != 0 && !is_rig ? 128 + stop.received() : status;
 }
 
+// The folders that a command writes into, of those that do nothing but read what others made and
+// write what was asked for; nothing: of another command.
+std::optional<std::vector<std::filesystem::path>> written_folders(const CLI::App& app,
+                                                                  const CommandLine& said) {
+  std::vector<std::filesystem::path> written;
+  const auto add = [&](const std::filesystem::path& file) {
+    if (file.empty()) return;
+    const std::filesystem::path whole = std::filesystem::absolute(file / "").lexically_normal();
+    written.push_back(output::existing_part(whole.parent_path().parent_path()));
+  };
+  const auto add_given = [&](const std::optional<std::filesystem::path>& file) {
+    if (file) add(*file);
+  };
+  if (app.got_subcommand("import")) {
+    add(said.import_session.session);
+  } else if (app.got_subcommand("export")) {
+    add(said.export_take.directory);
+  } else if (app.got_subcommand("track")) {
+    add_given(said.track.out);
+  } else if (app.got_subcommand("model")) {
+    add(said.model.footage);
+    add(said.model.parts_file);
+    for (const auto& file :
+         {said.model.set_file, said.model.out, said.model.pictures, said.model.overlay})
+      add_given(file);
+  } else {
+    return std::nullopt;
+  }
+  return written;
+}
+
+// Keeps from the command what it does not need, whatever the libraries do that read for it.
+void confine(std::vector<std::filesystem::path> written) {
+  for (const char* folder : {"/dev", "/proc", "/tmp", "/var/tmp"}) written.emplace_back(folder);
+  written.push_back(std::filesystem::temp_directory_path());
+  if (const auto cache = render::cache_folder(); !cache.empty())
+    written.push_back(cache.parent_path());  // also of drivers of graphics cards
+  try {
+    box::leave_network_and_programs();
+    box::confine_files({{"/"}, std::move(written)});
+  } catch (const Error& error) {
+    report::log(
+        {report::Severity::info, "", std::string("the command is not confined: ") + error.what()});
+  }
+}
+
 int do_line(int argc, char** argv) {
   CLI::App app{"Path-traced previsualization for a camera rig", "previzd"};
   CommandLine said;
@@ -191,7 +243,12 @@ int do_line(int argc, char** argv) {
     return 1;
   }
   report::start_log(report::severity_named(said.log_level));
-  return do_stoppable(app, said);
+  const auto written = written_folders(app, said);
+  if (!written) return do_stoppable(app, said);
+  return box::supervised("previzd", *written, [&] {
+    confine(*written);
+    return do_stoppable(app, said);
+  });
 }
 
 }  // namespace

@@ -19,7 +19,7 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/model/in_child.hpp"
+#include "drivers/box/in_child.hpp"
 #include "drivers/error.hpp"
 #include "drivers/keys/value.hpp"
 
@@ -242,14 +242,15 @@ void read_units(const aiMetadata& metadata, FbxContent& content) {
   content.up = up;
 }
 
-FbxContent content_of(const std::filesystem::path& path, bool has_colours) {
+FbxContent content_of(const std::filesystem::path& path, const std::string& bytes,
+                      bool has_colours) {
   Assimp::Importer importer;
   for (const char* look : {AI_CONFIG_IMPORT_FBX_READ_MATERIALS, AI_CONFIG_IMPORT_FBX_READ_TEXTURES})
     importer.SetPropertyBool(look, has_colours);
   for (const char* unneeded : {AI_CONFIG_IMPORT_FBX_READ_CAMERAS, AI_CONFIG_IMPORT_FBX_READ_LIGHTS,
                                AI_CONFIG_IMPORT_FBX_READ_ANIMATIONS})
     importer.SetPropertyBool(unneeded, false);
-  const aiScene* const scene = importer.ReadFile(path.string(), 0);
+  const aiScene* const scene = importer.ReadFileFromMemory(bytes.data(), bytes.size(), 0, "fbx");
   if (!scene || !scene->mRootNode)
     throw Error(path.string() + ": cannot be read: " + printable(importer.GetErrorString()) +
                 "; export it again, as binary PLY for example");
@@ -265,8 +266,9 @@ FbxContent content_of(const std::filesystem::path& path, bool has_colours) {
 }  // namespace
 
 FoundSurface read_fbx(const std::filesystem::path& path, ScanTextures* textures, ScanFile& file) {
-  const std::string packed = in_child(path.string(), [&] {
-    FbxContent content = content_of(path, textures != nullptr);
+  const std::string file_bytes = scan_bytes(path);
+  const std::string packed = box::in_child(path.string(), [&] {
+    FbxContent content = content_of(path, file_bytes, textures != nullptr);
     Packer packer;
     pass(content, packer);
     return std::move(packer.bytes);

@@ -19,9 +19,9 @@
 
 #include "drivers/aravis/child_process.hpp"
 #include "drivers/aravis/protocol.hpp"
-#include "drivers/aravis/receiver/bpf.hpp"
 #include "drivers/aravis/receiver/sandbox.hpp"
 #include "drivers/aravis/receiver_process.hpp"
+#include "drivers/box/bpf.hpp"
 #include "drivers/lifeline.hpp"
 #include "tests/devices/hostile_network.hpp"
 #include "tests/support/child_process.hpp"
@@ -288,7 +288,6 @@ TEST(Sandbox, SignalsNobodyByWayOfADescriptor) {
 template <class Call>
 std::string trouble_without(long system_call, int error, const Call& call) {
   return text_of_child([&] {
-    namespace bpf = aravis::bpf;
     bpf::Program filter =
         bpf::all({bpf::load(BPF_W, offsetof(seccomp_data, nr)),
                   bpf::when(BPF_JEQ, static_cast<std::uint32_t>(system_call),

@@ -1,7 +1,7 @@
 // Gives every UDP socket of this process a packet filter before it can receive anything.
 #pragma once
 
-#include "drivers/aravis/receiver/bpf.hpp"
+#include "drivers/box/bpf.hpp"
 
 namespace previz::aravis {
 

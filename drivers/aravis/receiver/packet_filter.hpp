@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "drivers/aravis/receiver/bpf.hpp"
+#include "drivers/box/bpf.hpp"
 
 namespace previz::aravis {
 

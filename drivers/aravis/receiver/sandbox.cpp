@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <linux/audit.h>
-#include <linux/landlock.h>
 #include <linux/netlink.h>
 #include <linux/seccomp.h>
 #include <linux/sockios.h>
@@ -20,7 +19,8 @@
 #include <cstring>
 #include <string>
 
-#include "drivers/aravis/receiver/bpf.hpp"
+#include "drivers/box/bpf.hpp"
+#include "drivers/box/confinement.hpp"
 #include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 
@@ -160,39 +160,15 @@ Program files(bool usb) {
   });
 }
 
-// What is to be done so that Landlock's first call does not end with this error.
-std::string way_to_landlock(int error) {
-  if (error == ENOSYS) return "this kernel has no Landlock; install Linux 5.13 or later with it";
-  if (error == EOPNOTSUPP)
-    return "Landlock is switched off; add landlock to lsm= on the kernel's command line";
-  return std::string(std::strerror(error)) +
-         "; allow the service the system calls landlock_create_ruleset, landlock_add_rule and"
-         " landlock_restrict_self";
-}
-
 // libusb opens devices by their paths as they are plugged in, and a filter of system calls cannot
 // read paths, so that without Landlock any file of the user could be opened.
-void confine_files() {
-  const std::string trouble = "its receiver cannot be kept from other files than the USB's: ";
-  landlock_ruleset_attr handled{};
-  handled.handled_access_fs = (LANDLOCK_ACCESS_FS_MAKE_SYM << 1) - 1;  // all of its first version
-  const OwnedDescriptor rules(static_cast<int>(
-      syscall(SYS_landlock_create_ruleset, &handled, sizeof handled.handled_access_fs, 0)));
-  if (!rules) throw Error(trouble + way_to_landlock(errno));
-  const auto may = [&](const char* where, std::uint64_t access) {
-    const OwnedDescriptor folder(open(where, O_PATH | O_CLOEXEC));
-    if (!folder) return;
-    landlock_path_beneath_attr beneath{};
-    beneath.allowed_access = access;
-    beneath.parent_fd = folder.get();
-    syscall(SYS_landlock_add_rule, rules.get(), LANDLOCK_RULE_PATH_BENEATH, &beneath, 0);
-  };
-  const std::uint64_t read = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
-  may("/dev/bus/usb", read | LANDLOCK_ACCESS_FS_WRITE_FILE);
-  may("/sys", read);
-  may("/run/udev", read);
-  if (syscall(SYS_landlock_restrict_self, rules.get(), 0) != 0)
-    throw Error(trouble + way_to_landlock(errno));
+void confine_to_usb() {
+  try {
+    box::confine_files({{"/dev/bus/usb", "/sys", "/run/udev"}, {"/dev/bus/usb"}});
+  } catch (const Error& error) {
+    throw Error(std::string("its receiver cannot be kept from other files than the USB's: ") +
+                error.what());
+  }
 }
 
 }  // namespace
@@ -219,7 +195,7 @@ bool limit_resources(int parent) {
 void enter_sandbox(bool usb) {
   if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0)
     throw Error(std::string("privileges cannot be given up: ") + std::strerror(errno));
-  if (usb) confine_files();
+  if (usb) confine_to_usb();
   Program filter = all({
       load(BPF_W, offsetof(seccomp_data, arch)),
       when_not(BPF_JEQ, architecture, verdict(SECCOMP_RET_KILL_PROCESS)),

@@ -12,8 +12,8 @@
 #include <glm/geometric.hpp>
 
 #include "daemon/model/glb.hpp"
-#include "daemon/model/in_child.hpp"
 #include "daemon/model/scan_mesh.hpp"
+#include "drivers/box/in_child.hpp"
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

@@ -12,8 +12,8 @@
 #include <glm/geometric.hpp>
 
 #include "daemon/model/glb.hpp"
-#include "daemon/model/in_child.hpp"
 #include "daemon/model/scan_mesh.hpp"
+#include "drivers/box/in_child.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -82,21 +82,20 @@ TEST_F(ScanRead, WhatIsNotAMeshIsRefused) {
 
 // A library that crashes costs an error; what it returns or throws comes back.
 TEST(InChild, OnlyTheChildEnds) {
-  EXPECT_EQ(model::in_child("a.fbx", [] { return std::string("a\0b", 3); }),
-            std::string("a\0b", 3));
-  EXPECT_EQ(model::in_child("a.fbx", [] { return std::string(1 << 22, 'x'); }).size(), 1u << 22);
+  EXPECT_EQ(box::in_child("a.fbx", [] { return std::string("a\0b", 3); }), std::string("a\0b", 3));
+  EXPECT_EQ(box::in_child("a.fbx", [] { return std::string(1 << 22, 'x'); }).size(), 1u << 22);
   EXPECT_EQ(error_of([] {
-              model::in_child("a.fbx", []() -> std::string { throw Error("a.fbx: is empty"); });
+              box::in_child("a.fbx", []() -> std::string { throw Error("a.fbx: is empty"); });
             }),
             "a.fbx: is empty");
   EXPECT_THAT(error_of([] {
-                model::in_child("a.fbx", []() -> std::string {
+                box::in_child("a.fbx", []() -> std::string {
                   std::raise(SIGSEGV);
                   return "";
                 });
               }),
               HasSubstr("a.fbx: the library that reads this format was stopped by it"));
-  EXPECT_THAT(error_of([] { model::in_child("a.fbx", []() -> std::string { std::_Exit(3); }); }),
+  EXPECT_THAT(error_of([] { box::in_child("a.fbx", []() -> std::string { std::_Exit(3); }); }),
               HasSubstr("a.fbx: the process that reads it ended without a result"));
 }
 

@@ -8,7 +8,7 @@
 #include <initializer_list>
 #include <vector>
 
-namespace previz::aravis::bpf {
+namespace previz::bpf {
 
 // A program, or a part of one. It has one value at a time, which loads replace and tests look at;
 // a load from behind a packet's end drops the packet.
@@ -46,4 +46,4 @@ inline Program all(std::initializer_list<Program> parts) {
   return program;
 }
 
-}  // namespace previz::aravis::bpf
+}  // namespace previz::bpf

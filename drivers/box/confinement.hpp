@@ -1,0 +1,23 @@
+// Takes away from this process, and from those that it makes, what it does not need, by Landlock
+// and a filter of system calls. Neither can be undone.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+namespace previz::box {
+
+// What stays in reach, each with all that is below it; what is not there is passed over.
+struct Reach {
+  std::vector<std::filesystem::path> read;   // files and folders
+  std::vector<std::filesystem::path> write;  // changed, made and removed; not read by itself
+};
+
+// Leaves only these files in reach. Throws previz::Error that says what the kernel lacks.
+void confine_files(const Reach& reach);
+
+// Refuses from now on, to the thread that calls and those that it starts, sockets of the network,
+// the running of other programs, and a look into other processes. Throws previz::Error.
+void leave_network_and_programs();
+
+}  // namespace previz::box

@@ -1,0 +1,110 @@
+// Processes that foreign files are read in: what they have in reach, and what their end costs.
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+
+#include "drivers/box/confinement.hpp"
+#include "drivers/box/in_child.hpp"
+#include "drivers/box/now_reading.hpp"
+#include "drivers/box/supervised.hpp"
+#include "drivers/session/draft.hpp"
+#include "tests/support/content_of.hpp"
+#include "tests/support/temporary_directory.hpp"
+#include "tests/support/test.hpp"
+
+namespace previz::box_test {
+
+namespace fs = std::filesystem;
+using testing::ExitedWithCode;
+
+class SupervisedDeathTest : public testing::Test {
+ protected:
+  SupervisedDeathTest() { GTEST_FLAG_SET(death_test_style, "threadsafe"); }
+
+  // Ends as the command would.
+  [[noreturn]] void run(const std::function<int()>& work) {
+    ::_exit(box::supervised("previzd", {directory_.path()}, work));
+  }
+  test::TemporaryDirectory directory_;
+};
+
+TEST_F(SupervisedDeathTest, EndsAsItsWorkDoes) {
+  EXPECT_EXIT(run([] { return 0; }), ExitedWithCode(0), "^$");
+  EXPECT_EXIT(run([] { return 75; }), ExitedWithCode(75), "^$");
+}
+
+TEST_F(SupervisedDeathTest, ACrashIsALineAndLeavesNothingHalfDone) {
+  const auto crash = [&] {
+    const session::DraftFolder draft(directory_ / "take");
+    std::ofstream(draft.path() / "observer.mkv") << "half of it";
+    box::now_reading("clip.mov");
+    std::signal(SIGSEGV, SIG_DFL);  // a sanitizer has its own
+    std::raise(SIGSEGV);
+    return 0;
+  };
+  EXPECT_EXIT(run(crash), ExitedWithCode(1),
+              "previzd: clip.mov: what reads it was stopped .Segmentation fault.; the file is "
+              "damaged, or meets a fault of a library: export it again\n$");
+  EXPECT_TRUE(fs::is_empty(directory_.path()));
+}
+
+TEST_F(SupervisedDeathTest, PassesSignalsOn) {
+  const auto wait = [] {
+    sigset_t term;
+    sigemptyset(&term);
+    sigaddset(&term, SIGTERM);
+    sigprocmask(SIG_BLOCK, &term, nullptr);
+    ::kill(::getppid(), SIGTERM);
+    int signal = 0;
+    sigwait(&term, &signal);
+    return 128 + signal;
+  };
+  EXPECT_EXIT(run(wait), ExitedWithCode(128 + SIGTERM), "^$");
+}
+
+// A thread of this program is enough for the kernel, and a process of its own for the test.
+TEST_F(SupervisedDeathTest, ConfinedItWritesWhereItMayAndHasNoNetworkAndNoPrograms) {
+  const auto try_all = [&] {
+    fs::create_directories(directory_ / "mine");
+    fs::create_directories(directory_ / "others");
+    std::ofstream(directory_ / "others/secret") << "text";
+    try {
+      box::leave_network_and_programs();
+      box::confine_files({{"/"}, {directory_ / "mine"}});
+    } catch (const Error& error) {
+      return std::string(error.what()).find("Landlock") != std::string::npos ? 77 : 2;
+    }
+    std::ofstream(directory_ / "mine/a") << "text";
+    fs::create_directory(directory_ / "mine/folder");
+    fs::rename(directory_ / "mine/a", directory_ / "mine/folder/b");
+    std::ofstream(directory_ / "others/secret") << "changed";
+    std::error_code refused;
+    fs::remove(directory_ / "others/secret", refused);
+    const bool is_kept = test::content_of(directory_ / "others/secret") == "text" &&
+                         test::content_of(directory_ / "mine/folder/b") == "text";
+    const bool has_network =
+        ::socket(AF_INET, SOCK_STREAM, 0) >= 0 || ::socket(AF_INET6, SOCK_DGRAM, 0) >= 0;
+    ::execl("/bin/true", "true", nullptr);  // returns where it is refused
+    return is_kept && !has_network ? 0 : 1;
+  };
+  const auto is_well = [](int status) {  // 77: this kernel has no Landlock
+    return WIFEXITED(status) && (WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == 77);
+  };
+  EXPECT_EXIT(run(try_all), is_well, "");
+}
+
+// A library that reads for a child has nothing else in reach.
+TEST(InChild, HasNoFiles) {
+  const test::TemporaryDirectory directory;
+  std::ofstream(directory / "secret") << "text";
+  const std::string read = box::in_child("a.fbx", [&] {
+    std::ofstream(directory / "made") << "text";
+    return test::content_of(directory / "secret");
+  });
+  EXPECT_EQ(fs::exists(directory / "made"), !read.empty()) << "where there is no Landlock";
+}
+
+}  // namespace previz::box_test
