@@ -63,6 +63,20 @@ previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the use
 Members of the group previz may operate the rig with previzctl.
 )"};
 
+const Chapter security_chapter{"SECURITY", R"(
+What a command line and a set file of yours name is trusted: they may name any file. Takes, footage, models, scans, lens files and jobs of a farm are data that may come from anybody:
+
+their files: A take or a job reads and writes nothing outside of its folder, by links or by names, unless `--any-paths` allows it. A pipe, a device or a link in the place of a file is named and not opened; a file larger than its kind can be is refused before it is read.
+
+their bytes: `import`, `export`, `track` and `model` work in a process that has no network, runs no program and writes only into the folders that it was asked to (by seccomp and Landlock; where the kernel lacks them, a line of the log says so). What crashes there ends with a line that names the file, and leaves nothing half done. FBX files and cameras of a network are read by processes without any file. `render`, `calibrate` and the tasks of a farm read in their own process: render takes of strangers as a user who has nothing to lose.
+
+their words: Names and texts of others are shown with control characters as \x1b and the like.
+
+Whoever may use the D-Bus service operates the rig: root and the group previz.
+
+A fault by which a file reaches what it should not is best reported in private to whom previzd is from, with what `previzd --version` says.
+)"};
+
 const Chapter examples_chapter{"EXAMPLES",
                                R"(
 previzd devices: Lists the cameras, buttons and screens that are plugged in, by the names that a set file uses.
@@ -176,7 +190,7 @@ const Chapter previzd_status{"EXIT STATUS", R"(
 1: Error; one line on standard error says what is wrong.
 2: The command line cannot be understood.
 75: The service ended to be restarted, outside a take: another version was installed, or the driver of a graphics card was loaded after the service started.
-128+N: Stopped by signal N. Finished frames are on disk, and the same render command continues there. (Stopping a live rig is not an error: 0.)
+128+N: Stopped by signal N, within two seconds. Files that were not complete are removed; finished frames are on disk, and the same render command continues there. (Stopping a live rig is not an error: 0.)
 )"};
 
 const Chapter previzd_cameras{"NETWORK CAMERAS", R"(
@@ -232,7 +246,7 @@ Chapter see_also(const std::string& pages) {
 std::vector<Page> man_pages() {
   return {{"previzd.8",
            man_page(general_commands(), 8,
-                    {service_chapter, examples_chapter, tags_chapter, model_chapter, lenses_chapter,
+                    {service_chapter, security_chapter, examples_chapter, tags_chapter, model_chapter, lenses_chapter,
                      glossary_chapter, previzd_cameras, previzd_files, previzd_formats,
                      previzd_status, see_also("previzctl(1), previzd-farm(1), previz-set(5)")})},
           {"previzd-farm.1", man_page(farm_commands(), 1, farm_chapters())},
