@@ -285,10 +285,6 @@ void add_trade(CLI::App& app, trade::TradeOptions& options) {
   add_device_options(command, options.device);
 }
 
-}  // namespace
-
-namespace {
-
 // A range lets "nan" pass, as no comparison with it holds, and what is computed with it is lost.
 void refuse_what_is_no_number(CLI::App& app) {
   const auto refusal = [](const std::string& text) -> std::string {

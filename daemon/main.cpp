@@ -9,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <optional>
 #include <sstream>
@@ -165,11 +166,14 @@ int do_command(const CLI::App& app, CommandLine& said, const StopOnSignal& stop)
 }
 
 // Commands end within two seconds of a signal. A rig takes as long as its take needs to be closed,
-// and a stop is its orderly end.
+// and a stop is its orderly end. A farm's machine may write down how its task ended while a disk is
+// slow; Slurm kills it after half a minute.
 int do_stoppable(const CLI::App& app, CommandLine& said) {
-  constexpr std::chrono::milliseconds patience(1500);
+  constexpr std::chrono::milliseconds of_a_command(1500), of_a_task(20'000);
   const bool is_rig = app.got_subcommand("run");
-  const StopOnSignal stop(is_rig ? std::nullopt : std::optional(patience));
+  const StopOnSignal stop(is_rig                       ? std::nullopt
+                          : app.got_subcommand("farm") ? std::optional(of_a_task)
+                                                       : std::optional(of_a_command));
   int status = 1;
   try {
     status = do_command(app, said, stop);
@@ -179,31 +183,50 @@ int do_stoppable(const CLI::App& app, CommandLine& said) {
   return stop.received() != 0 && !is_rig ? 128 + stop.received() : status;
 }
 
-// The folders that a command writes into, of those that do nothing but read what others made and
-// write what was asked for; nothing: of another command.
-std::optional<std::vector<std::filesystem::path>> written_folders(const CLI::App& app,
-                                                                  const CommandLine& said) {
-  std::vector<std::filesystem::path> written;
-  const auto add = [&](const std::filesystem::path& file) {
-    if (file.empty()) return;
-    const std::filesystem::path whole = std::filesystem::absolute(file / "").lexically_normal();
-    written.push_back(output::existing_part(whole.parent_path().parent_path()));
-  };
-  const auto add_given = [&](const std::optional<std::filesystem::path>& file) {
-    if (file) add(*file);
-  };
+// Where a command writes.
+struct Written {
+  std::vector<std::filesystem::path> reach;   // folders that exist
+  std::vector<std::filesystem::path> drafts;  // folders of what it makes, which may not exist yet
+
+  // A file or a folder that is made, wherever links lead.
+  void add(const std::filesystem::path& made) {
+    if (made.empty()) return;
+    std::error_code unknown;
+    const std::filesystem::path as_written = std::filesystem::absolute(made, unknown);
+    if (unknown) return;  // the current folder is gone, and nothing can be made in it
+    for (const auto& place :
+         {as_written.lexically_normal(), std::filesystem::weakly_canonical(as_written, unknown)}) {
+      if (place.empty()) continue;
+      drafts.push_back((place.has_filename() ? place : place.parent_path()).parent_path());
+      reach.push_back(output::existing_part(drafts.back()));
+    }
+  }
+  // A folder that files are made in.
+  void add_folder(const std::filesystem::path& folder) {
+    add(folder);
+    if (!folder.empty()) add(folder / "file");
+  }
+};
+
+// Returns that of the commands that do nothing but read what others made and write what was asked
+// for; nothing for other commands.
+std::optional<Written> written_by(const CLI::App& app, const CommandLine& said) {
+  Written written;
+  const std::filesystem::path none;
   if (app.got_subcommand("import")) {
-    add(said.import_session.session);
+    written.add(said.import_session.session);
   } else if (app.got_subcommand("export")) {
-    add(said.export_take.directory);
+    written.add_folder(said.export_take.directory);
   } else if (app.got_subcommand("track")) {
-    add_given(said.track.out);
+    written.add(said.track.out.value_or(none));
   } else if (app.got_subcommand("model")) {
-    add(said.model.footage);
-    add(said.model.parts_file);
+    const model::ModelOptions& model = said.model;
+    written.add("a model that is named as the take is");
     for (const auto& file :
-         {said.model.set_file, said.model.out, said.model.pictures, said.model.overlay})
-      add_given(file);
+         {model.footage, model.parts_file, model.set_file.value_or(none), model.out.value_or(none)})
+      written.add(file);
+    written.add_folder(model.pictures.value_or(none));
+    written.add_folder(model.overlay.value_or(none));
   } else {
     return std::nullopt;
   }
@@ -212,17 +235,22 @@ std::optional<std::vector<std::filesystem::path>> written_folders(const CLI::App
 
 // Keeps from the command what it does not need, whatever the libraries do that read for it.
 void confine(std::vector<std::filesystem::path> written) {
+  std::error_code none;
   for (const char* folder : {"/dev", "/proc", "/tmp", "/var/tmp"}) written.emplace_back(folder);
-  written.push_back(std::filesystem::temp_directory_path());
+  written.push_back(std::filesystem::temp_directory_path(none));
   if (const auto cache = render::cache_folder(); !cache.empty())
     written.push_back(cache.parent_path());  // also of drivers of graphics cards
-  try {
-    box::leave_network_and_programs();
-    box::confine_files({{"/"}, std::move(written)});
-  } catch (const Error& error) {
-    report::log(
-        {report::Severity::info, "", std::string("the command is not confined: ") + error.what()});
-  }
+  const auto try_to = [](const char* otherwise, const std::function<void()>& call) {
+    try {
+      call();
+    } catch (const Error& error) {
+      report::log({report::Severity::info, "", std::string(otherwise) + error.what()});
+    }
+  };
+  try_to("the command keeps the network: ", box::leave_network_and_programs);
+  try_to("the command may write anywhere: ", [&] {
+    box::confine_files({{"/"}, std::move(written), {}});
+  });
 }
 
 int do_line(int argc, char** argv) {
@@ -243,10 +271,10 @@ int do_line(int argc, char** argv) {
     return 1;
   }
   report::start_log(report::severity_named(said.log_level));
-  const auto written = written_folders(app, said);
+  const auto written = written_by(app, said);
   if (!written) return do_stoppable(app, said);
-  return box::supervised("previzd", *written, [&] {
-    confine(*written);
+  return box::supervised("previzd", written->drafts, [&] {
+    confine(written->reach);
     return do_stoppable(app, said);
   });
 }

@@ -38,15 +38,19 @@ StopOnSignal::StopOnSignal(std::optional<std::chrono::milliseconds> patience) {
   pthread_sigmask(SIG_BLOCK, &hangup, &before);
   waiter_ = std::jthread([this, signals, patience](const std::stop_token& done) {
     using Clock = std::chrono::steady_clock;
-    const timespec poll{0, 100'000'000};  // how late the destructor may be noticed
-    std::optional<Clock::time_point> deadline;
+    const timespec poll{0, 100'000'000};              // how late the destructor may be noticed
+    constexpr std::chrono::milliseconds as_one(300);  // a group and its leader may both be told
+    Clock::time_point first;
     while (!done.stop_requested()) {
       const int signal = sigtimedwait(&signals, nullptr, &poll);
-      if (deadline && Clock::now() > *deadline) end_by(received_);
+      const auto since = Clock::now() - first;
+      if (received_ != 0 && patience && since > *patience && !done.stop_requested())
+        end_by(received_);
       if (signal <= 0) continue;
-      if (received_ != 0) end_by(signal);
+      if (received_ != 0 && since > as_one) end_by(signal);
+      if (received_ != 0) continue;
       received_ = signal;
-      if (patience) deadline = Clock::now() + *patience;
+      first = Clock::now();
       stop_.request_stop();
     }
   });

@@ -53,7 +53,8 @@ std::string without_commands(std::string_view text) {
   for (std::size_t at = 0; at < text.size();) {
     const Character character = character_at(text, at);
     const std::size_t bytes = character.bytes > 0 ? character.bytes : 1;
-    if (text[at] == '\n' || (character.bytes > 0 && !commands_a_terminal(character.code)))
+    if (text[at] == '\n' || text[at] == '\t' ||
+        (character.bytes > 0 && !commands_a_terminal(character.code)))
       safe.append(text, at, bytes);
     else
       for (std::size_t i = at; i < at + bytes; ++i) safe += escaped(text[i]);

@@ -9,8 +9,8 @@
 
 namespace previz {
 
-// Returns `text` with control characters but line breaks (also those of C1), the marks that turn
-// the direction of writing, and bytes that are not UTF-8 as \xNN.
+// Returns `text` with control characters but line breaks and tabs (also those of C1), the marks
+// that turn the direction of writing, and bytes that are not UTF-8 as \xNN.
 std::string without_commands(std::string_view text);
 
 // Returns the same on one line: line breaks and tabs as spaces, none at the end.

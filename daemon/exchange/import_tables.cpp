@@ -1,8 +1,6 @@
 #include "daemon/exchange/import_tables.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <sstream>
 
 #include "drivers/error.hpp"

@@ -1,8 +1,6 @@
 #include "daemon/exchange/json_members.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <limits>
 
 #include "daemon/set/problems.hpp"

@@ -205,7 +205,6 @@ post::RenderOptions JobFolder::render_options(const Job& job, const JobTake& tak
   post::RenderOptions options = job.render;
   options.session = take.session;
   if (!job.set_file.empty()) options.set_file = place(job.set_file);
-  options.of_set_file = set::Origin::job;
   if (!job.with_file.empty()) options.with = place(job.with_file);
   for (const auto& [name, in_folder] : job.set_assets)
     options.set_assets.emplace_back(name, place(in_folder));

@@ -61,6 +61,7 @@ Json json_of(const post::RenderOptions& options) {
 
 post::RenderOptions options_of(const Json& json) {
   post::RenderOptions options;
+  options.of_set_file = set::Origin::job;
   options.scale = session::number_at<decltype(options.scale)>(json, "scale");
   if (!(options.scale >= 0.05 && options.scale <= 1)) throw Error("\"scale\" is not in 0.05 to 1");
   get(json, "samples", options.samples);

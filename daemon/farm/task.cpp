@@ -293,7 +293,8 @@ int Task::run() {
 
 }  // namespace
 
-void check_paths(const JobFolder& folder, const Job& job, bool any_paths) {
+void check_paths(const JobFolder& folder, Job& job, bool any_paths) {
+  if (any_paths) job.render.of_set_file = set::Origin::crew;
   if (any_paths) return;
   const std::string mine = "; if the job is yours, allow it with --any-paths";
   for (const JobTake& take : job.takes)

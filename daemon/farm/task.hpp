@@ -32,7 +32,7 @@ inline constexpr int missing_sums = 66, machine_fault = 75;
 // Throws JobFault if pictures would be written outside of the job's folder and of the one that it
 // lies in, or if the takes' own sets might name any file, unless `any_paths`: a plan that came from
 // elsewhere does not choose where files are written and read.
-void check_paths(const JobFolder& folder, const Job& job, bool any_paths);
+void check_paths(const JobFolder& folder, Job& job, bool any_paths);
 
 // Renders what is missing of a chunk into the chunk's own folder. Two tasks with one chunk share
 // its frames, or, where the file system has no locks that both see, one waits for the other. What a

@@ -34,8 +34,8 @@ std::uint64_t free_on_disk_of(
 // Used by one thread, since every call may wait for a disk.
 class TakeFolders {
  public:
-  // Bytes that are free on a folder's disk; throws std::filesystem::filesystem_error.
   using Note = std::function<void(const std::string&)>;
+  // Bytes that are free on a folder's disk; throws std::filesystem::filesystem_error.
   using FreeBytes = std::function<std::uint64_t(const std::filesystem::path& folder)>;
 
   // `folders` in the order of preference, at least one; none of them need exist. A folder with less

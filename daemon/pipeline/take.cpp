@@ -7,7 +7,6 @@
 #include "daemon/set/file_edit.hpp"
 #include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
 
 namespace previz::pipeline {
 namespace {

@@ -8,7 +8,6 @@
 #include "daemon/post/render_files.hpp"
 #include "daemon/post/sample_ranges.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
 
 namespace previz::post {
 namespace {

@@ -93,9 +93,11 @@ void check_room(const output::ListedTake& take, const fs::path& folder) {
   std::error_code unknown;
   const fs::space_info space = fs::space(folder, unknown);
   if (!unknown && space.available < take.bytes)
-    throw Error(folder.string() + ": has room for " + std::to_string(space.available / 1'000'000) +
-                " MB; " + take.directory.filename().string() + " has " +
-                std::to_string(take.bytes / 1'000'000) + " MB");
+    throw Error(folder.string() + ": the disk lacks " +
+                std::to_string((take.bytes - space.available) / 1000 + 1) +
+                " kB: it has room for " + std::to_string(space.available / 1000) + " kB, and " +
+                take.directory.filename().string() + " has " +
+                std::to_string(take.bytes / 1000 + 1) + " kB");
 }
 
 }  // namespace

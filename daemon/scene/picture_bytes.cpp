@@ -57,7 +57,7 @@ class PngReader {
     constexpr std::size_t most_cached = 1 << 26;
     constexpr std::uint32_t most_side = 0x7fffffff;
     spng_set_image_limits(png_.get(), most_side, most_side);
-    spng_set_chunk_limits(png_.get(), bytes.size(), most_cached);
+    spng_set_chunk_limits(png_.get(), most_cached, most_cached);  // as what it unpacks to
     check(spng_set_png_buffer(png_.get(), bytes.data(), bytes.size()));
     check(spng_get_ihdr(png_.get(), &header_));
   }
@@ -92,8 +92,7 @@ class PngReader {
  private:
   void check(int code) const {
     if (code == 0) return;
-    if (code == SPNG_IO_EOF || code == SPNG_EIDAT_TOO_SHORT || code == SPNG_ECHUNK_SIZE ||
-        code == SPNG_ECHUNK_LIMITS)
+    if (code == SPNG_IO_EOF || code == SPNG_EIDAT_TOO_SHORT)
       throw Error(where_ + ": is cut short: a part of it is longer than what is left of the file");
     refuse_damaged(where_, std::string("it is a damaged PNG: ") + spng_strerror(code));
   }

@@ -57,22 +57,16 @@ Set parse_set(const std::string& text, const std::filesystem::path& file, const 
 
 namespace {
 
-std::string text_of(const std::filesystem::path& file, const char* what) {
-  try {
-    return session::read_file(file, {what, 1 << 22});
-  } catch (const Error& error) {
-    throw Error(std::string(error.what()) + "; allowed: " + what + " (TOML)");
-  }
-}
+constexpr std::uint64_t most_bytes = 1 << 22;
 
 }  // namespace
 
 std::string read_set_file(const std::filesystem::path& file) {
-  return text_of(file, "a set file");
+  return session::read_file(file, {"a set file (TOML)", most_bytes});
 }
 
 Overlay read_overlay(const std::filesystem::path& file) {
-  return {file, text_of(file, "a file of settings")};
+  return {file, session::read_file(file, {"a file of settings (TOML)", most_bytes})};
 }
 
 Set load_set(const std::filesystem::path& file) {

@@ -29,13 +29,12 @@ constexpr std::uint32_t architecture = AUDIT_ARCH_AARCH64;
 #error "confinement.cpp does not know this processor's name in linux/audit.h"
 #endif
 
-constexpr std::uint64_t read_rights =
-    LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR | LANDLOCK_ACCESS_FS_EXECUTE;
+constexpr std::uint64_t read_rights = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
 // All of Landlock's first version, and the move of a file to another folder, of its second.
 constexpr std::uint64_t first_rights = (LANDLOCK_ACCESS_FS_MAKE_SYM << 1) - 1;
 constexpr std::uint64_t move_right = LANDLOCK_ACCESS_FS_MAKE_SYM << 1;
 constexpr std::uint64_t rights_of_a_file =
-    LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_WRITE_FILE | LANDLOCK_ACCESS_FS_EXECUTE;
+    LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_WRITE_FILE;
 
 // What is to be done so that Landlock's first call does not end with this error.
 std::string way_to_landlock(int error) {
@@ -80,7 +79,9 @@ void confine_files(const Reach& reach) {
   };
   for (const std::filesystem::path& place : reach.read) allow(place, read_rights);
   for (const std::filesystem::path& place : reach.write)
-    allow(place, (first_rights | move_right) & ~read_rights);
+    allow(place, (first_rights | move_right) & ~(read_rights | LANDLOCK_ACCESS_FS_EXECUTE));
+  for (const std::filesystem::path& place : reach.change)
+    allow(place, LANDLOCK_ACCESS_FS_WRITE_FILE);
   if (::syscall(SYS_landlock_restrict_self, rules.get(), 0) != 0) fail();
 }
 

@@ -9,8 +9,9 @@ namespace previz::box {
 
 // What stays in reach, each with all that is below it; what is not there is passed over.
 struct Reach {
-  std::vector<std::filesystem::path> read;   // files and folders
-  std::vector<std::filesystem::path> write;  // changed, made and removed; not read by itself
+  std::vector<std::filesystem::path> read;    // files and folders
+  std::vector<std::filesystem::path> write;   // changed, made and removed; not read by itself
+  std::vector<std::filesystem::path> change;  // files whose content may be changed; likewise
 };
 
 // Leaves only these files in reach. Throws previz::Error that says what the kernel lacks.

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -34,7 +35,7 @@ std::string all_of(int pipe) {
 }
 
 // The first letter says what follows: a result, or the words of an error.
-[[noreturn]] void work_and_end(const std::string& subject, int pipe,
+[[noreturn]] void work_and_end(const std::string& subject, int pipe, pid_t parent,
                                const std::function<std::string()>& work) {
   const auto limit = [](__rlimit_resource_t what, rlim_t most) {
     const rlimit limits{most, most};
@@ -46,13 +47,20 @@ std::string all_of(int pipe) {
   limit(RLIMIT_AS, static_cast<rlim_t>(::sysconf(_SC_PHYS_PAGES)) / 4 * 3 *
                        static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)));
 #endif
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (::getppid() != parent) ::_exit(1);
+  sigset_t none;
+  sigemptyset(&none);
+  ::sigprocmask(SIG_SETMASK, &none, nullptr);
   for (const int signal : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTERM, SIGINT})
     ::signal(signal, SIG_DFL);
-  try {
-    leave_network_and_programs();
-    confine_files({});
-  } catch (const Error&) {
-    // The kernel cannot: whoever confined the command has said so.
+  for (const auto& leave :
+       {std::function(leave_network_and_programs), std::function([] { confine_files({}); })}) {
+    try {
+      leave();
+    } catch (const Error&) {
+      // The kernel cannot: whoever confined the command has said so.
+    }
   }
   std::string bytes;
   try {
@@ -76,10 +84,11 @@ std::string in_child(const std::string& subject, const std::function<std::string
   std::array<int, 2> pipe{};
   if (::pipe2(pipe.data(), O_CLOEXEC) != 0)
     throw Error(subject + ": no process can be made to read it: " + std::strerror(errno));
+  const pid_t parent = ::getpid();
   const pid_t child = ::fork();
   if (child == 0) {
     ::close(pipe[0]);
-    work_and_end(subject, pipe[1], work);
+    work_and_end(subject, pipe[1], parent, work);
   }
   ::close(pipe[1]);
   std::string bytes = child > 0 ? all_of(pipe[0]) : std::string();

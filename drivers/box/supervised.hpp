@@ -11,8 +11,8 @@ namespace previz::box {
 
 // Returns the exit status of `work` in a process of its own; it ends with this one. SIGINT and
 // SIGTERM are passed on to it. Where a signal ended it, a line on standard error says so and what
-// it read (now_reading.hpp), and the status is 1; its drafts in these folders are removed. Call it
-// before there are threads.
+// it read last (now_reading.hpp), and the status is 1; its drafts in these folders are removed.
+// Call it before there are threads.
 int supervised(const std::string& program, const std::vector<std::filesystem::path>& folders,
                const std::function<int()>& work);
 

@@ -8,12 +8,14 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <mutex>
 #include <random>
 #include <set>
+#include <shared_mutex>
 #include <utility>
 
 #include "drivers/error.hpp"
@@ -53,7 +55,8 @@ bool is_draft_name(const std::string& name) {
 // The drafts of this process that are not in their place. Never destroyed: threads may outlive the
 // end of main().
 struct OwnDrafts {
-  std::mutex mutex;  // held while one of them is put in place
+  std::shared_timed_mutex placing;  // held, together, by those that put one in place
+  std::mutex mutex;                 // of `paths`; no disk is waited for under it
   std::set<fs::path> paths;
 
   void add(const fs::path& draft) {
@@ -84,9 +87,9 @@ bool lock(const OwnedDescriptor& draft, const fs::path& path) {
 
 // Renames a draft, whose path is empty afterwards.
 void put_in_place(fs::path& draft, const fs::path& target, const char* failure) {
-  const std::lock_guard lock(own_drafts().mutex);
+  const std::shared_lock placing(own_drafts().placing);
   if (std::rename(draft.c_str(), target.c_str()) != 0) fail_draft(target, failure);
-  own_drafts().paths.erase(std::exchange(draft, {}));
+  own_drafts().forget(std::exchange(draft, {}));
 }
 
 void sync_folder_of(const fs::path& file) {
@@ -144,7 +147,7 @@ void Draft::put(Sync sync) {
 
 bool Draft::put_as_new(const fs::path& target) {
   file_.sync();
-  const std::lock_guard lock(own_drafts().mutex);
+  std::shared_lock placing(own_drafts().placing);
   const bool is_linked = ::link(path_.c_str(), target.c_str()) == 0;
   const bool has_no_links = errno == EPERM || errno == EOPNOTSUPP || errno == ENOSYS;
   if (is_linked) {
@@ -157,7 +160,8 @@ bool Draft::put_as_new(const fs::path& target) {
     if (errno == EEXIST) return false;
     fail_draft(target, "cannot be renamed into place");
   }
-  own_drafts().paths.erase(std::exchange(path_, {}));
+  own_drafts().forget(std::exchange(path_, {}));
+  placing.unlock();
   sync_folder_of(target);
   return true;
 }
@@ -196,8 +200,10 @@ void DraftFolder::put() {
 }
 
 void abandon_drafts() {
+  constexpr std::chrono::milliseconds patience(200);  // a disk may hang
   OwnDrafts& own = own_drafts();
-  own.mutex.lock();  // never unlocked
+  if (!own.placing.try_lock_for(patience)) return;  // never unlocked
+  const std::lock_guard lock(own.mutex);
   for (const fs::path& draft : own.paths)
     for (int tries = 0; tries < 10; ++tries) {  // other threads may still write into a folder
       std::error_code failure;

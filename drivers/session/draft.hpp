@@ -73,7 +73,8 @@ class DraftFolder {
 void replace_file(const std::filesystem::path& file, const std::string& content);
 
 // Removes all drafts of this process, none of which can be put in place any more: its threads wait
-// for ever where they try to. For a process that ends in the middle of its work.
+// for ever where they try to. They stay where a disk holds up one that is just being put in place.
+// For a process that ends in the middle of its work.
 void abandon_drafts();
 
 // Removes the drafts, files and folders, that dead processes left in a folder, and returns their

@@ -114,17 +114,14 @@ std::string words_of(mode_t mode) {
   return "a device";
 }
 
-}  // namespace
-
-namespace {
-
 OpenFile open_named_file(const std::filesystem::path& file, std::string_view what) {
   // Without O_NONBLOCK the opening of a pipe waits for somebody who writes.
   OpenFile open(file, O_RDONLY | O_NONBLOCK);
   struct stat known {};
   if (::fstat(open.get(), &known) == 0 && !S_ISREG(known.st_mode))
     throw Error(file.string() + ": is " + words_of(known.st_mode) + " and not " +
-                std::string(what));
+                std::string(what) +
+                (S_ISFIFO(known.st_mode) ? "; write what comes through it to a file first" : ""));
   return open;
 }
 
@@ -176,28 +173,38 @@ std::string read_plain_file(const std::filesystem::path& file, const FileKind& k
   return content_of(open_plain_file(file), kind);
 }
 
+void PlainLines::read_more() {
+  block_.erase(0, std::exchange(at_, 0));
+  const std::size_t before = block_.size();
+  block_.resize(before + (1 << 16));
+  const ssize_t count = ::read(file_.get(), block_.data() + before, 1 << 16);
+  block_.resize(before + static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
+  if (count < 0 && errno != EINTR) fail(file_.name(), "cannot be read");
+  has_ended_ = count == 0;
+}
+
 bool PlainLines::next(std::string& line) {
+  std::size_t skipped = 0;
   for (std::size_t looked_at = at_;;) {
     const std::size_t end = block_.find('\n', looked_at);
-    if (end != std::string::npos) {
-      line.assign(block_, at_, end - at_);
-      at_ = end + 1;
-      return true;
+    if (end != std::string::npos || has_ended_) {
+      if (skipped == 0) line.assign(block_, at_, std::min(end, block_.size()) - at_);
+      const bool is_there = end != std::string::npos || at_ < block_.size() || skipped > 0;
+      at_ = end == std::string::npos ? block_.size() : end + 1;
+      return is_there;
     }
-    if (has_ended_ || block_.size() - at_ > most_bytes_a_line) {
-      line.assign(block_, at_);
+    const std::size_t held = block_.size() - at_;
+    if (held > most_bytes_a_line || skipped > 0) {
+      if (skipped == 0) line.assign(block_, at_);
+      skipped += held;
       at_ = block_.size();
-      const bool has_more = !line.empty();
-      has_ended_ = true;
-      return has_more;
+      if (skipped > most_bytes_skipped) {
+        has_ended_ = true;
+        return true;
+      }
     }
-    block_.erase(0, std::exchange(at_, 0));
-    looked_at = block_.size();
-    block_.resize(looked_at + (1 << 16));
-    const ssize_t count = ::read(file_.get(), block_.data() + looked_at, 1 << 16);
-    block_.resize(looked_at + static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
-    if (count < 0 && errno != EINTR) fail(file_.name(), "cannot be read");
-    has_ended_ = count == 0;
+    looked_at = block_.size() - at_;
+    read_more();
   }
 }
 

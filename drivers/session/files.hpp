@@ -80,12 +80,14 @@ class PlainLines {
  public:
   // Throws previz::Error, as open_plain_file() does.
   explicit PlainLines(const std::filesystem::path& file) : file_(open_plain_file(file)) {}
-  // Takes the next line, without its end; false behind the last one. A line longer than any record
-  // can be ends the file: its beginning is the last line. Throws previz::Error.
+  // Takes the next line, without its end; false behind the last one. Of a line longer than any
+  // record can be, only the beginning is taken; one of 64 MiB ends the file. Throws previz::Error.
   bool next(std::string& line);
 
  private:
-  static constexpr std::size_t most_bytes_a_line = 1 << 20;
+  void read_more();
+
+  static constexpr std::size_t most_bytes_a_line = 1 << 20, most_bytes_skipped = 1 << 26;
   OpenFile file_;
   std::string block_;   // what was read
   std::size_t at_ = 0;  // of it was taken

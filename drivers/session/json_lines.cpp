@@ -220,9 +220,6 @@ bool in_order(const MarkEvent&, const MarkEvent&) {
   return true;
 }
 
-// A file that has more is not what a recorder writes, and is not read further.
-constexpr std::size_t most_bad_lines = 10'000;
-
 // `parse` returns nothing for a line of another kind.
 template <typename Record, typename Parse>
 Lines<Record> read_lines(const std::filesystem::path& file, Parse parse) {

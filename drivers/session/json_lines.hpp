@@ -27,11 +27,13 @@ std::string to_line(const ButtonEvent& event);
 std::string to_line(const MarkEvent& mark);
 std::string to_line(std::int64_t timestamp_ns, const std::string& event);
 
+// A file with so many bad lines is not what a recorder writes, and is not read further.
+inline constexpr std::size_t most_bad_lines = 10'000;
+
 template <typename Record>
 struct Lines {
-  std::vector<Record> records;  // of whole lines; frames strictly increase
-  std::vector<std::uint64_t>
-      bad_lines;  // numbers, from 1, of lines that cannot be understood; 10,000 end the file
+  std::vector<Record> records;           // of whole lines; frames strictly increase
+  std::vector<std::uint64_t> bad_lines;  // numbers, from 1, of lines that cannot be understood
 };
 
 // Read every line that can be read; a file that is not there has no lines.

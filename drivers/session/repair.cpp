@@ -116,8 +116,10 @@ class Repairer {
     if (is_there) {
       PlainLines from(damaged_ / name);
       std::uint64_t number = 0;
-      for (std::string line; from.next(line);)
+      for (std::string line; from.next(line);) {
         if (!std::ranges::binary_search(bad, ++number)) to.append(line);
+        if (bad.size() == most_bad_lines && number == bad.back()) break;
+      }
     }
     if (!more.empty()) to.append(more);
     to.sync();

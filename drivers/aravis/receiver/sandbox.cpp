@@ -164,7 +164,7 @@ Program files(bool usb) {
 // read paths, so that without Landlock any file of the user could be opened.
 void confine_to_usb() {
   try {
-    box::confine_files({{"/dev/bus/usb", "/sys", "/run/udev"}, {"/dev/bus/usb"}});
+    box::confine_files({{"/dev/bus/usb", "/sys", "/run/udev"}, {}, {"/dev/bus/usb"}});
   } catch (const Error& error) {
     throw Error(std::string("its receiver cannot be kept from other files than the USB's: ") +
                 error.what());

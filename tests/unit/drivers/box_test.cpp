@@ -46,8 +46,9 @@ TEST_F(SupervisedDeathTest, ACrashIsALineAndLeavesNothingHalfDone) {
     return 0;
   };
   EXPECT_EXIT(run(crash), ExitedWithCode(1),
-              "previzd: clip.mov: what reads it was stopped .Segmentation fault.; the file is "
-              "damaged, or meets a fault of a library: export it again\n$");
+              "previzd: the command was stopped .Segmentation fault.; it last read clip.mov. If it "
+              "ends so again, this file is damaged or meets a fault of a library: export it again, "
+              "or do without it\n$");
   EXPECT_TRUE(fs::is_empty(directory_.path()));
 }
 
@@ -73,7 +74,7 @@ TEST_F(SupervisedDeathTest, ConfinedItWritesWhereItMayAndHasNoNetworkAndNoProgra
     std::ofstream(directory_ / "others/secret") << "text";
     try {
       box::leave_network_and_programs();
-      box::confine_files({{"/"}, {directory_ / "mine"}});
+      box::confine_files({{"/"}, {directory_ / "mine"}, {}});
     } catch (const Error& error) {
       return std::string(error.what()).find("Landlock") != std::string::npos ? 77 : 2;
     }

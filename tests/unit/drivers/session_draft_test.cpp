@@ -144,6 +144,12 @@ TEST(PlainLines, EndWithALineThatIsNone) {
   EXPECT_THAT(read(), ElementsAre("first", "", block, block, "last"));
   std::ofstream(file, std::ios::app) << "\n";
   EXPECT_THAT(read(), ElementsAre("first", "", block, block, "last"));
+  std::ofstream(file) << "first\n" << std::string(3 << 20, '\0') << "\nlast\n";
+  const std::vector<std::string> holed = read();  // as a disk leaves it whose sectors are bad
+  ASSERT_EQ(holed.size(), 3u);
+  EXPECT_LT(holed[1].size(), 2u << 20);
+  EXPECT_EQ(holed[2], "last");
+  std::ofstream(file) << "first\n\n" << block << "\n" << block << "\nlast\n";
   fs::resize_file(file, std::uintmax_t{40} << 30);
   const std::vector<std::string> cut = read();
   ASSERT_EQ(cut.size(), 6u);

@@ -84,6 +84,35 @@ INSTANTIATE_TEST_SUITE_P(
                     "daemon/previzd farm TAKE --dry-run", "daemon/control/previzctl actions"),
     [](const auto& name) { return name_of(name.param); });
 
+// Commands that are confined write where they were asked to, also by links and by names of their
+// own; not in /tmp, where anybody may.
+TEST_F(Ending, ConfinedCommandsWriteWhereTheyWereAskedTo) {
+  const fs::path folder = fs::path(PREVIZ_BINARY_DIR) / "tests/confined";
+  fs::remove_all(folder);
+  fs::create_directories(folder / "real");
+  fs::create_directory_symlink("real", folder / "link");
+  fs::copy(directory_ / "session", folder / "take", fs::copy_options::recursive);
+  for (const char* file : {"set.toml", "floor.gltf", "card.gltf"})
+    fs::copy(directory_ / file, folder / file);
+  cv::imwrite(folder / "0.png", cv::Mat(36, 48, CV_8UC3, cv::Scalar(9, 9, 9)));
+  std::ofstream(folder / "frames.json")
+      << R"({"observer": {"fps": 25, "start_ns": 0, "exposure": 1, "pictures": ["0.png"]}})";
+  const auto run = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), "daemon/previzd");
+    const test::Ended ended = test::run_program(words);
+    EXPECT_EQ(ended.status, 0) << ended.said;
+  };
+  run({"import", folder / "frames.json", folder / "new/a/take"});
+  run({"import", folder / "frames.json", folder / "link/take"});
+  run({"export", folder / "take", folder / "link"});
+  run({"export", folder / "take", folder / "exported/here"});
+  run({"track", folder / "take", "--out", folder / "link/track.jsonl"});
+  for (const char* made : {"new/a/take/session.toml", "real/take/session.toml", "real/camera.usda",
+                           "exported/here/camera.usda", "real/track.jsonl"})
+    EXPECT_TRUE(fs::exists(folder / made)) << made;
+  fs::remove_all(folder);
+}
+
 // Names and arguments are anybody's: none commands the terminal, forges a line or fills it.
 TEST_F(Ending, WordsOfOthersAreShownAndNotObeyed) {
   const fs::path takes = directory_ / "takes";
@@ -108,6 +137,11 @@ TEST_F(Ending, WordsOfOthersAreShownAndNotObeyed) {
     EXPECT_THAT(ended.said, Not(HasSubstr("\nK_take009")));
     EXPECT_LT(ended.said.size(), 10'000u);
   }
+}
+
+TEST_F(Ending, ActionsAreATable) {
+  const test::Ended ended = test::run_program({"daemon/control/previzctl", "actions"});
+  EXPECT_THAT(ended.said, AllOf(HasSubstr("record"), Not(HasSubstr("\\x"))));
 }
 
 class StoppedCommand : public Ending, public testing::WithParamInterface<const char*> {};
