@@ -244,17 +244,18 @@ Chapter see_also(const std::string& pages) {
 }  // namespace
 
 std::vector<Page> man_pages() {
-  return {{"previzd.8",
-           man_page(general_commands(), 8,
-                    {service_chapter, security_chapter, examples_chapter, tags_chapter, model_chapter, lenses_chapter,
-                     glossary_chapter, previzd_cameras, previzd_files, previzd_formats,
-                     previzd_status, see_also("previzctl(1), previzd-farm(1), previz-set(5)")})},
-          {"previzd-farm.1", man_page(farm_commands(), 1, farm_chapters())},
-          {"previzctl.1", man_page(previzctl_commands(), 1,
-                                   {{"ACTIONS", actions_text()},
-                                    previzctl_status,
-                                    see_also("previzd(8), previz-set(5)")})},
-          {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
+  return {
+      {"previzd.8",
+       man_page(general_commands(), 8,
+                {service_chapter, security_chapter, examples_chapter, tags_chapter, model_chapter,
+                 lenses_chapter, glossary_chapter, previzd_cameras, previzd_files, previzd_formats,
+                 previzd_status, see_also("previzctl(1), previzd-farm(1), previz-set(5)")})},
+      {"previzd-farm.1", man_page(farm_commands(), 1, farm_chapters())},
+      {"previzctl.1",
+       man_page(
+           previzctl_commands(), 1,
+           {{"ACTIONS", actions_text()}, previzctl_status, see_also("previzd(8), previz-set(5)")})},
+      {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
 }
 
 std::vector<Page> bash_completions() {

@@ -27,15 +27,16 @@ struct RenderOptions {
   std::optional<std::filesystem::path> with;      // replaces settings of either (set::Overlay)
   // The session's own set may read and write outside of the session's folder.
   bool any_paths = false;
-  std::optional<FrameRange> frames;   // absent: all
-  double scale = 1;                   // of the pictures' size; above 0, at most 1
-  std::optional<int> samples;         // quality.samples
-  std::optional<double> error;        // quality.error
-  std::optional<bool> adaptive;       // quality.adaptive
-  std::optional<bool> denoise;        // quality.denoise
-  std::optional<int> neighbours;      // quality.neighbours
-  std::optional<double> seconds;      // quality.seconds
-  std::optional<std::uint32_t> seed;  // estimation.seed
+  set::Origin of_set_file = set::Origin::crew;  // whose `set_file` is
+  std::optional<FrameRange> frames;             // absent: all
+  double scale = 1;                             // of the pictures' size; above 0, at most 1
+  std::optional<int> samples;                   // quality.samples
+  std::optional<double> error;                  // quality.error
+  std::optional<bool> adaptive;                 // quality.adaptive
+  std::optional<bool> denoise;                  // quality.denoise
+  std::optional<int> neighbours;                // quality.neighbours
+  std::optional<double> seconds;                // quality.seconds
+  std::optional<std::uint32_t> seed;            // estimation.seed
   std::optional<set::Estimator> estimator;
   std::optional<bool> hides_tags;  // [tags] hide, whatever was recorded
   // For the pictures of this take; absent: by output.directory, render_folder().
@@ -52,7 +53,6 @@ struct RenderOptions {
   std::function<void(const pipeline::Shot&)> on_frame;
   // Files that stand in for those of `set_file`, by the names that it has for them.
   std::vector<std::pair<std::string, std::filesystem::path>> set_assets;
-  set::Origin of_set_file = set::Origin::crew;  // whose `set_file` is
   // Rendered on in place of a device that is opened by `device`; null: none is open.
   std::shared_ptr<render::Device> open_device;
   // Called once all that the take and the set name has been read, and frames are next: what fails
