@@ -182,7 +182,7 @@ TEST_F(LoadEnvironment, SaysWhatIsWrongWithAFile) {
   settings.environment = directory / "none.exr";
   EXPECT_THAT(refusal(), HasSubstr("none.exr"));
   settings.environment = directory.path();
-  EXPECT_THAT(refusal(), HasSubstr("cannot be read"));
+  EXPECT_THAT(refusal(), HasSubstr("is a folder and not a file"));
 }
 
 // A file of some kilobytes may claim to hold a picture that no memory holds.
