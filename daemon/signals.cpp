@@ -18,7 +18,7 @@ sigset_t stop_signals() {
   return signals;
 }
 
-// Ends the process. Other threads go on meanwhile, and may hold any lock but that of the drafts.
+// Ends a command without its drafts. Its other threads go on meanwhile, and may hold any lock.
 [[noreturn]] void end_by(int signal) {
   session::abandon_drafts();
   constexpr std::string_view words = "previzd: stopped; files that were not complete are removed\n";
@@ -47,6 +47,8 @@ StopOnSignal::StopOnSignal(std::optional<std::chrono::milliseconds> patience) {
       if (received_ != 0 && patience && since > *patience && !done.stop_requested())
         end_by(received_);
       if (signal <= 0) continue;
+      // A rig's disk may hang, at which nobody waits; the next start removes what is left.
+      if (received_ != 0 && since > as_one && !patience) _exit(128 + signal);
       if (received_ != 0 && since > as_one) end_by(signal);
       if (received_ != 0) continue;
       received_ = signal;

@@ -13,7 +13,8 @@ namespace previz {
 // and in every thread started after it. The first signal to arrive requests a stop; a second one
 // ends the process at once, and so does the end of its patience, whatever keeps it busy. What it
 // had not finished is then removed (session::abandon_drafts()), and its exit status is 128 + the
-// signal. Construct the object in main, before any other thread.
+// signal; a process without patience, a rig, leaves its drafts to the next start. Construct the
+// object in main, before any other thread.
 class StopOnSignal {
  public:
   explicit StopOnSignal(std::optional<std::chrono::milliseconds> patience = std::nullopt);

@@ -27,7 +27,7 @@ constexpr std::uint64_t transaction_byte = 0, first_frame_byte = 1;
 constexpr std::uint64_t video_byte = std::uint64_t{1} << 61;       // above all frames
 constexpr std::uint64_t first_line_byte = std::uint64_t{1} << 62;  // of the processes' lines
 constexpr std::uint64_t frames_end = video_byte - first_frame_byte;
-// Of the file, which is a few hundred bytes for each process that renders into the folder.
+// The file has a few hundred bytes for each process that renders into the folder.
 constexpr std::uint64_t most_lines = 4096;
 constexpr std::size_t most_bytes = 1 << 20;
 

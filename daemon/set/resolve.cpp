@@ -89,22 +89,18 @@ class Resolver {
   fs::path existing(const Given& table, const std::string& key, const fs::path& as_written) {
     if (!table.good(key)) return {};
     auto path = located(as_written);
-    bool is_brought = false;
-    for (const auto& [name, stand_in] : assets_)
-      if (name == as_written.string()) {
-        path = located(stand_in);
-        is_brought = true;
-      }
+    bool may_be_elsewhere = origin_ == Origin::crew || origin_ == Origin::trusted_session;
+    for (const auto& [name, stand_in] : assets_) {
+      if (name != as_written.string()) continue;
+      path = located(stand_in);
+      may_be_elsewhere |= origin_ == Origin::job;
+    }
+    const std::string whole = origin_ == Origin::job ? "job" : "take";
     std::error_code error;
-    const bool may_be_elsewhere = origin_ == Origin::crew || origin_ == Origin::trusted_session ||
-                                  (origin_ == Origin::job && is_brought);
     if (!may_be_elsewhere && !session::lies_within(folder_, path))
       problem(table, key,
-              origin_ == Origin::job
-                  ? "lies outside the job's folder, and is not read; allowed: files that the job "
-                    "brings along, or --any-paths for a job that is yours"
-                  : "lies outside the take's folder, and is not read; allowed: files of the take, "
-                    "or --any-paths for a take that you trust");
+              "lies outside the " + whole + "'s folder, and is not read; allowed: files of the " +
+                  whole + ", or --any-paths for a " + whole + " that you trust");
     else if (!fs::is_regular_file(path, error))
       problem(table, key,
               "no such file: " + path.string() +

@@ -2,6 +2,7 @@
 // calls: see linux/filter.h.
 #pragma once
 
+#include <linux/audit.h>
 #include <linux/filter.h>
 
 #include <cstdint>
@@ -13,6 +14,15 @@ namespace previz::bpf {
 // A program, or a part of one. It has one value at a time, which loads replace and tests look at;
 // a load from behind a packet's end drops the packet.
 using Program = std::vector<sock_filter>;
+
+// This processor, as a filter of system calls sees it.
+#if defined(__x86_64__)
+inline constexpr std::uint32_t architecture = AUDIT_ARCH_X86_64;
+#elif defined(__aarch64__)
+inline constexpr std::uint32_t architecture = AUDIT_ARCH_AARCH64;
+#else
+#error "this processor's name in linux/audit.h is not known here"
+#endif
 
 inline Program load(unsigned size, std::uint32_t at) {
   return {sock_filter{static_cast<std::uint16_t>(BPF_LD | BPF_ABS | size), 0, 0, at}};

@@ -1,7 +1,6 @@
 #include "drivers/box/confinement.hpp"
 
 #include <fcntl.h>
-#include <linux/audit.h>
 #include <linux/landlock.h>
 #include <linux/seccomp.h>
 #include <sys/prctl.h>
@@ -20,14 +19,6 @@
 
 namespace previz::box {
 namespace {
-
-#if defined(__x86_64__)
-constexpr std::uint32_t architecture = AUDIT_ARCH_X86_64;
-#elif defined(__aarch64__)
-constexpr std::uint32_t architecture = AUDIT_ARCH_AARCH64;
-#else
-#error "confinement.cpp does not know this processor's name in linux/audit.h"
-#endif
 
 constexpr std::uint64_t read_rights = LANDLOCK_ACCESS_FS_READ_FILE | LANDLOCK_ACCESS_FS_READ_DIR;
 // All of Landlock's first version, and the move of a file to another folder, of its second.
@@ -100,7 +91,7 @@ void leave_network_and_programs() {
            bpf::when(BPF_JEQ, AF_NETLINK, allow), refuse(EAFNOSUPPORT)});
   bpf::Program filter = all({
     bpf::load(BPF_W, offsetof(seccomp_data, arch)),
-        bpf::when_not(BPF_JEQ, architecture, bpf::verdict(SECCOMP_RET_KILL_PROCESS)),
+        bpf::when_not(BPF_JEQ, bpf::architecture, bpf::verdict(SECCOMP_RET_KILL_PROCESS)),
         bpf::load(BPF_W, offsetof(seccomp_data, nr)),
 #if defined(__x86_64__)
         bpf::when(BPF_JGE, 0x40000000, refuse(EPERM)),  // the same calls by other numbers (x32)

@@ -9,7 +9,7 @@
 
 namespace previz::convert {
 
-// Of pixels that are vectors of doubles.
+// A pixel is a vector of doubles, or one.
 template <typename Pixel>
 class AreaAverage {
  public:

@@ -71,7 +71,7 @@ inline Ended run_program(const std::vector<std::string>& words, const ProgramLim
       ::waitpid(child, &status, 0);
       break;
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));  // between two looks
   }
   ended.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   ended.status = WIFSIGNALED(status) ? 128 + WTERMSIG(status) : WEXITSTATUS(status);

@@ -1,7 +1,6 @@
 #include "drivers/aravis/receiver/sandbox.hpp"
 
 #include <fcntl.h>
-#include <linux/audit.h>
 #include <linux/netlink.h>
 #include <linux/seccomp.h>
 #include <linux/sockios.h>
@@ -38,14 +37,6 @@ using bpf::when_not;
 constexpr bool sanitized = true;  // shadow memory takes terabytes of addresses
 #else
 constexpr bool sanitized = false;
-#endif
-
-#if defined(__x86_64__)
-constexpr std::uint32_t architecture = AUDIT_ARCH_X86_64;
-#elif defined(__aarch64__)
-constexpr std::uint32_t architecture = AUDIT_ARCH_AARCH64;
-#else
-#error "enter_sandbox() does not know this processor's name in linux/audit.h"
 #endif
 
 // The frames (a gibibyte at most), Aravis' own memory, and address space that threads reserve.
@@ -198,7 +189,7 @@ void enter_sandbox(bool usb) {
   if (usb) confine_to_usb();
   Program filter = all({
       load(BPF_W, offsetof(seccomp_data, arch)),
-      when_not(BPF_JEQ, architecture, verdict(SECCOMP_RET_KILL_PROCESS)),
+      when_not(BPF_JEQ, bpf::architecture, verdict(SECCOMP_RET_KILL_PROCESS)),
       load(BPF_W, offsetof(seccomp_data, nr)), memory_and_threads(), signals_and_time(),
       sockets(usb), descriptors(), files(usb),
       refuse(EPERM),  // all others, those of other ABIs too, whose numbers are other ones

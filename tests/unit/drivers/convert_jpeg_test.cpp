@@ -15,7 +15,7 @@ constexpr WireFormat mjpeg{Layout::mjpeg, 8, Packing::words, YuvMatrix::bt601, Y
 // As webcams send them: 4:2:2, the standard Huffman tables left out where `abbreviated`.
 // Where `scans` is not empty, the picture is a progressive one of these scans.
 Bytes jpeg_of(int width, int height, const Bytes& rgb, bool abbreviated = false,
-              const std::vector<jpeg_scan_info>& scans = {}) {
+              const std::vector<jpeg_scan_info>& scans = {}, J_COLOR_SPACE space = JCS_RGB) {
   jpeg_compress_struct encoder{};
   jpeg_error_mgr errors{};
   encoder.err = jpeg_std_error(&errors);
@@ -25,11 +25,11 @@ Bytes jpeg_of(int width, int height, const Bytes& rgb, bool abbreviated = false,
   jpeg_mem_dest(&encoder, &data, &size);
   encoder.image_width = static_cast<JDIMENSION>(width);
   encoder.image_height = static_cast<JDIMENSION>(height);
-  encoder.input_components = 3;
-  encoder.in_color_space = JCS_RGB;
+  encoder.input_components = space == JCS_CMYK ? 4 : 3;
+  encoder.in_color_space = space;
   jpeg_set_defaults(&encoder);
   jpeg_set_quality(&encoder, 100, TRUE);
-  encoder.comp_info[0].h_samp_factor = 2;
+  encoder.comp_info[0].h_samp_factor = space == JCS_CMYK ? 1 : 2;
   encoder.comp_info[0].v_samp_factor = 1;
   if (abbreviated)
     for (int i = 0; i < 2; ++i)
@@ -40,7 +40,8 @@ Bytes jpeg_of(int width, int height, const Bytes& rgb, bool abbreviated = false,
   }
   jpeg_start_compress(&encoder, abbreviated ? FALSE : TRUE);
   for (int y = 0; y < height; ++y) {
-    auto* row = const_cast<JSAMPLE*>(&rgb[std::size_t{3} * static_cast<std::size_t>(y * width)]);
+    auto* row =
+        const_cast<JSAMPLE*>(&rgb[static_cast<std::size_t>(encoder.input_components * y * width)]);
     jpeg_write_scanlines(&encoder, &row, 1);
   }
   jpeg_finish_compress(&encoder);
@@ -52,28 +53,9 @@ Bytes jpeg_of(int width, int height, const Bytes& rgb, bool abbreviated = false,
 
 // 8x8 pixels of these inks, with the mark of Adobe's programs, which store what is missing of each.
 Bytes jpeg_of_inks(const std::array<std::uint8_t, 4>& missing) {
-  jpeg_compress_struct encoder{};
-  jpeg_error_mgr errors{};
-  encoder.err = jpeg_std_error(&errors);
-  jpeg_create_compress(&encoder);
-  unsigned char* data = nullptr;
-  unsigned long size = 0;
-  jpeg_mem_dest(&encoder, &data, &size);
-  encoder.image_width = encoder.image_height = 8;
-  encoder.input_components = 4;
-  encoder.in_color_space = JCS_CMYK;
-  jpeg_set_defaults(&encoder);
-  jpeg_set_quality(&encoder, 100, TRUE);
-  jpeg_start_compress(&encoder, TRUE);
-  Bytes row;
-  for (int x = 0; x < 8; ++x) row.insert(row.end(), missing.begin(), missing.end());
-  JSAMPLE* samples = row.data();
-  for (int y = 0; y < 8; ++y) jpeg_write_scanlines(&encoder, &samples, 1);
-  jpeg_finish_compress(&encoder);
-  jpeg_destroy_compress(&encoder);
-  Bytes jpeg(data, data + size);
-  std::free(data);
-  return jpeg;
+  Bytes samples;
+  for (int i = 0; i < 64; ++i) samples.insert(samples.end(), missing.begin(), missing.end());
+  return jpeg_of(8, 8, samples, false, {}, JCS_CMYK);
 }
 
 Bytes flat(int width, int height, const std::array<std::uint8_t, 3>& colour) {

@@ -435,7 +435,7 @@ TEST(FolderLocks, WithoutLocksOfTheFileSystemEveryClaimSucceedsAndThatIsSaid) {
   EXPECT_TRUE(locks.others().empty());
 }
 
-// Of the lines, those count whose bytes are locked; a file of a million others is made small.
+// Lines count whose bytes are locked; a file of a million others is made small.
 TEST(FolderLocks, LinesThatNobodyHoldsAreNotLookedAt) {
   const test::TemporaryDirectory directory;
   const std::filesystem::path file = directory / FolderLocks::file_name;
