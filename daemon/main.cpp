@@ -20,7 +20,6 @@
 #include "daemon/command_line.hpp"
 #include "daemon/device_rules.hpp"
 #include "daemon/devices.hpp"
-#include "daemon/output/take_folders.hpp"
 #include "daemon/post/check.hpp"
 #include "daemon/post/render_takes.hpp"
 #include "daemon/report/log.hpp"
@@ -28,6 +27,7 @@
 #include "daemon/rig/service.hpp"
 #include "daemon/signals.hpp"
 #include "daemon/trade/page.hpp"
+#include "daemon/written_by.hpp"
 #include "drivers/box/confinement.hpp"
 #include "drivers/box/supervised.hpp"
 #include "drivers/error.hpp"
@@ -183,59 +183,16 @@ int do_stoppable(const CLI::App& app, CommandLine& said) {
   return stop.received() != 0 && !is_rig ? 128 + stop.received() : status;
 }
 
-// Where a command writes.
-struct Written {
-  std::vector<std::filesystem::path> reach;   // folders that exist
-  std::vector<std::filesystem::path> drafts;  // folders of what it makes, which may not exist yet
-
-  // A file or a folder that is made, wherever links lead.
-  void add(const std::filesystem::path& made) {
-    if (made.empty()) return;
-    std::error_code unknown;
-    const std::filesystem::path as_written = std::filesystem::absolute(made, unknown);
-    if (unknown) return;  // the current folder is gone, and nothing can be made in it
-    for (const auto& place :
-         {as_written.lexically_normal(), std::filesystem::weakly_canonical(as_written, unknown)}) {
-      if (place.empty()) continue;
-      drafts.push_back((place.has_filename() ? place : place.parent_path()).parent_path());
-      reach.push_back(output::existing_part(drafts.back()));
-    }
-  }
-  // A folder that files are made in.
-  void add_folder(const std::filesystem::path& folder) {
-    add(folder);
-    if (!folder.empty()) add(folder / "file");
-  }
-};
-
-// Returns that of the commands that do nothing but read what others made and write what was asked
-// for; nothing for other commands.
-std::optional<Written> written_by(const CLI::App& app, const CommandLine& said) {
-  Written written;
-  const std::filesystem::path none;
-  if (app.got_subcommand("import")) {
-    written.add(said.import_session.session);
-  } else if (app.got_subcommand("export")) {
-    written.add_folder(said.export_take.directory);
-  } else if (app.got_subcommand("track")) {
-    written.add(said.track.out.value_or(none));
-  } else if (app.got_subcommand("model")) {
-    const model::ModelOptions& model = said.model;
-    written.add("a model that is named as the take is");
-    for (const auto& file :
-         {model.footage, model.parts_file, model.set_file.value_or(none), model.out.value_or(none)})
-      written.add(file);
-    written.add_folder(model.pictures.value_or(none));
-    written.add_folder(model.overlay.value_or(none));
-  } else {
-    return std::nullopt;
-  }
-  return written;
-}
-
 // Keeps from the command what it does not need, whatever the libraries do that read for it.
 void confine(std::vector<std::filesystem::path> written) {
   std::error_code none;
+  // Without its devices NVIDIA's driver starts a program that makes them as root.
+  if (std::filesystem::exists("/proc/driver/nvidia", none) &&
+      !std::filesystem::exists("/dev/nvidiactl", none))
+    return report::log(
+        {report::Severity::info, "",
+         "the command keeps the network and may write anywhere, because the graphics "
+         "card's devices are not made yet (nvidia-modprobe)"});
   for (const char* folder : {"/dev", "/proc", "/tmp", "/var/tmp"}) written.emplace_back(folder);
   written.push_back(std::filesystem::temp_directory_path(none));
   if (const auto cache = render::cache_folder(); !cache.empty())
@@ -273,9 +230,15 @@ int do_line(int argc, char** argv) {
   report::start_log(report::severity_named(said.log_level));
   const auto written = written_by(app, said);
   if (!written) return do_stoppable(app, said);
-  return box::supervised("previzd", written->drafts, [&] {
-    confine(written->reach);
-    return do_stoppable(app, said);
+  box::Supervision supervision;
+  supervision.folders = written->drafts;
+  if (app.got_subcommand("farm") && app.get_subcommand("farm")->got_subcommand("task"))
+    supervision.when_stopped = [&](pid_t task, const std::string& words) {
+      return farm::end_stopped_task(said.farm.task, farm::this_machine(), task, words);
+    };
+  return box::supervised("previzd", supervision, [&] {
+    if (written->reach) confine(*written->reach);
+    return finished_output("previzd", do_stoppable(app, said));
   });
 }
 

@@ -17,6 +17,7 @@
 #include "daemon/exchange/picture_sequence.hpp"
 #include "daemon/lighting/exr_picture.hpp"
 #include "daemon/tracking/photometry.hpp"
+#include "drivers/box/reading.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
@@ -49,6 +50,7 @@ struct Tags {
 
 // Nothing where they are damaged; the picture may be whole.
 std::optional<Tags> tags_of(const std::string& file, const std::string& content) try {
+  const box::Reading reading(file);
   const auto image = Exiv2::ImageFactory::open(file);
   image->readMetadata();
   Tags tags{{}, color_tag_of(content, *image)};
@@ -176,6 +178,7 @@ class PictureFiles final : public Footage {
 
   // Returns grey, or red, green and blue, of 8 or 16 bits.
   static cv::Mat decode(const std::string& name, bool has_deep_planes) try {
+    const box::Reading reading(name);
     // UNCHANGED keeps the bit depth, and leaves EXIF's rotation to us: IMREAD_COLOR would turn it.
     cv::Mat image = has_deep_planes ? read_planes(name) : cv::imread(name, cv::IMREAD_UNCHANGED);
     if (image.empty()) throw Error(name + ": cannot be read as a picture; it is damaged");

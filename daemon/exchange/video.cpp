@@ -17,7 +17,7 @@
 #include "daemon/exchange/video_picture.hpp"
 #include "daemon/exchange/video_tags.hpp"
 #include "drivers/av.hpp"
-#include "drivers/box/now_reading.hpp"
+#include "drivers/box/reading.hpp"
 
 namespace previz::exchange {
 namespace {
@@ -176,7 +176,7 @@ class VideoFile final : public Footage {
     AVFormatContext* context = nullptr;
     // "file:" keeps a name with a colon from being taken for another protocol.
     url_ = "file:" + std::filesystem::absolute(file_).string();
-    box::now_reading(file_);
+    const box::Reading reading(file_);
     const int opened = avformat_open_input(&context, url_.c_str(), nullptr, Limits().get());
     if (opened < 0) refuse_undecodable(nullptr);
     av::check(opened, file_, "cannot be read as a video");
@@ -260,6 +260,7 @@ class VideoFile final : public Footage {
   // Returns false after the last frame.
   bool decode() {
     for (;;) {
+      const box::Reading reading(file_);
       const int got = avcodec_receive_frame(decoder_.get(), frame_.get());
       if (got == AVERROR_EOF) {
         if (!next_part_) return false;

@@ -321,4 +321,16 @@ int run_task(const TaskOptions& options, const Machine& machine, std::ostream& o
   return Task(options, machine, out).run();
 }
 
+int end_stopped_task(const TaskOptions& options, const Machine& machine, std::int64_t task,
+                     const std::string& words) try {
+  const JobFolder folder(options.job);
+  const std::optional<TaskState> last = folder.read_state(options.chunk);
+  if (last && last->outcome == TaskOutcome::running && last->host == machine.host &&
+      last->pid == task)
+    folder.write_state(options.chunk, state_now(TaskOutcome::machine, machine.host, words));
+  return task_status::machine_fault;
+} catch (const std::exception&) {
+  return task_status::machine_fault;  // no disk to write it to; the words are in the log
+}
+
 }  // namespace previz::farm

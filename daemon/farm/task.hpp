@@ -1,8 +1,10 @@
 // Renders a chunk of a job, as every task does.
 #pragma once
 
+#include <cstdint>
 #include <iosfwd>
 #include <stop_token>
+#include <string>
 
 #include "daemon/farm/folder.hpp"
 #include "daemon/farm/machine.hpp"
@@ -40,5 +42,10 @@ void check_paths(const JobFolder& folder, Job& job, bool any_paths);
 // checked before the first frame, and the outcome is written into the job's folder; `out` gets the
 // same line. Returns a status of task_status; a stop counts as done.
 int run_task(const TaskOptions& options, const Machine& machine, std::ostream& out);
+
+// Writes down that a signal ended the process `task`, which ran the task, in these words; returns
+// the task's status, by which it is tried again.
+int end_stopped_task(const TaskOptions& options, const Machine& machine, std::int64_t task,
+                     const std::string& words);
 
 }  // namespace previz::farm

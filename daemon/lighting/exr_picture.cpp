@@ -17,6 +17,7 @@
 #include "daemon/lighting/exr_color.hpp"
 #include "daemon/lighting/exr_header.hpp"
 #include "daemon/lighting/picture_rows.hpp"
+#include "drivers/box/reading.hpp"
 #include "drivers/error.hpp"
 #include "drivers/letters.hpp"
 
@@ -217,6 +218,7 @@ LinearPicture pixels_of(Imf::InputFile& file, const Chosen& chosen, const Window
 
 LinearPicture read(const std::filesystem::path& path, std::vector<std::string>& notes,
                    const ExrReading& reading) {
+  const box::Reading at(path);
   check_exr_header(path);
   Imf::InputFile file(path.c_str());
   const Imf::Header& header = file.header();

@@ -20,6 +20,7 @@
 #include <utility>
 
 #include "daemon/output/exr_file.hpp"
+#include "drivers/box/reading.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/nominal_rate.hpp"
 
@@ -181,6 +182,7 @@ void write_exr(const std::filesystem::path& path, const render::Layers& layers,
 }
 
 render::Layers read_exr(const std::filesystem::path& path) {
+  const box::Reading reading(path);
   try {
     require_exr(path);
     Imf::InputFile file(path.c_str());

@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "daemon/output/exr_file.hpp"
+#include "drivers/box/reading.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::output {
@@ -143,6 +144,7 @@ void write_sums_exr(const std::filesystem::path& path, const RangeSums& sums) {
 }
 
 RangeSums read_sums_exr(const std::filesystem::path& path) {
+  const box::Reading reading(path);
   try {
     require_exr(path);
     Imf::InputFile file(path.c_str());

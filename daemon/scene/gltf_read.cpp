@@ -14,6 +14,7 @@
 #include "daemon/scene/named_file.hpp"
 #include "daemon/scene/scene.hpp"
 #include "daemon/set/problems.hpp"
+#include "drivers/box/reading.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::scene {
@@ -124,6 +125,7 @@ std::vector<unsigned char> with_json(const std::vector<unsigned char>& bytes, st
 }  // namespace
 
 tinygltf::Model read_gltf(const fs::path& path, Notes& notes, NameRules rules) {
+  const box::Reading reading(path);
   const std::string file = path.string();
   std::vector<unsigned char> bytes;
   if (const std::string wrong = read_regular_file(path, bytes); !wrong.empty())

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "daemon/scene/scene.hpp"
+#include "drivers/box/reading.hpp"
 #include "drivers/convert/convert.hpp"
 #include "drivers/error.hpp"
 
@@ -134,6 +135,7 @@ bool is_webp(std::span<const unsigned char> bytes) {
 }
 
 PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std::string& where) {
+  const box::Reading reading(where);
   const bool is_png = begins_with(bytes, png_signature);
   if (!is_png && !begins_with(bytes, jpeg_signature) && !is_webp(bytes))
     throw Error(where + ": is neither PNG, JPEG nor WebP; export it as PNG or JPEG");
@@ -151,6 +153,7 @@ PictureSize checked_picture_size(std::span<const unsigned char> bytes, const std
 
 void decode_rows(std::span<const unsigned char> bytes, PictureSize size, const std::string& where,
                  const std::function<void(const PictureRow&)>& take) {
+  const box::Reading reading(where);
   RowTaker taker(size.width, take);
   const auto rgba = [&](const auto* samples) { taker.rgba(samples); };
   if (begins_with(bytes, png_signature)) {

@@ -73,4 +73,15 @@ Set load_set(const std::filesystem::path& file) {
   return parse_set(read_set_file(file), file);
 }
 
+std::optional<std::filesystem::path> output_folder(const std::filesystem::path& file) try {
+  Problems problems(file.string());
+  Draft draft;
+  const std::vector<Section> all = sections(draft);
+  read_tables(parse_toml(read_set_file(file), file.string(), all, problems), all, home_of,
+              problems);
+  return file.parent_path() / draft.set.output.directory;
+} catch (const Error&) {
+  return std::nullopt;
+}
+
 }  // namespace previz::set

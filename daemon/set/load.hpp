@@ -36,4 +36,8 @@ Set parse_set(const std::string& text, const std::filesystem::path& file,
 // read.
 Set load_set(const std::filesystem::path& file);
 
+// Returns the folder that the file's [output] names, whatever else is wrong in the file; nothing if
+// it cannot be read.
+std::optional<std::filesystem::path> output_folder(const std::filesystem::path& file);
+
 }  // namespace previz::set

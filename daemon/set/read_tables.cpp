@@ -5,6 +5,7 @@
 #include <sstream>
 #include <utility>
 
+#include "drivers/box/reading.hpp"
 #include "drivers/keys/toml_value.hpp"
 
 namespace previz::set {
@@ -173,6 +174,7 @@ std::string home_among(const std::vector<Section>& sections, const std::string& 
 
 toml::table parse_toml(const std::string& text, const std::string& file,
                        const std::vector<Section>& sections, Problems& problems) {
+  const box::Reading reading(file);
   try {
     return toml::parse(text, file);
   } catch (const toml::parse_error& error) {

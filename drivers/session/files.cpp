@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/box/now_reading.hpp"
+#include "drivers/box/reading.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::session {
@@ -86,7 +86,7 @@ std::string words_of_size(std::uint64_t bytes) {
 }
 
 std::string content_of(const OpenFile& file, const FileKind& kind) {
-  box::now_reading(file.name());
+  const box::Reading reading(file.name());
   const auto check = [&](std::uint64_t bytes) {
     if (bytes > kind.most_bytes)
       throw Error(file.name().string() + ": is too large for " + std::string(kind.words) +

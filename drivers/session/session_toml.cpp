@@ -13,6 +13,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "drivers/box/reading.hpp"
 #include "drivers/calibration/read.hpp"
 #include "drivers/error.hpp"
 #include "drivers/keys/toml_value.hpp"
@@ -394,6 +395,7 @@ std::string to_toml(const SessionFile& file) {
 }
 
 SessionFile parse_session_toml(const std::string& text, const std::filesystem::path& path) {
+  const box::Reading reading(path);
   toml::table root;
   try {
     root = toml::parse(text, path.string());

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "drivers/av.hpp"
+#include "drivers/box/reading.hpp"
 #include "drivers/session/crc32.hpp"
 #include "drivers/session/ffv1.hpp"
 #include "drivers/session/files.hpp"
@@ -79,6 +80,7 @@ struct VideoReader::Impl {
 
   // Returns false at the end of what can be read.
   bool next_packet() {
+    const box::Reading reading(file);
     do {
       av_packet_unref(packet.get());
       if (av_read_frame(demuxer.get(), packet.get()) < 0) return false;
@@ -149,6 +151,7 @@ std::vector<VideoReader::PacketInfo> VideoReader::scan(const std::stop_token& st
 
 std::vector<std::uint8_t> VideoReader::read(const PacketInfo& wanted) {
   Impl& s = *impl_;
+  const box::Reading reading(s.file);
   if (!s.find(wanted)) throw Error(s.failure(wanted, "is no longer in the file"));
   if (s.is_raw()) {
     if (static_cast<std::size_t>(s.packet->size) !=

@@ -9,6 +9,9 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <string>
 #include <thread>
@@ -21,6 +24,8 @@ struct Ended {
   bool ran_over = false;  // its time was over, and it was killed
   double seconds = 0;     // that it ran, by the clock
   std::string said;       // on standard output and standard error
+  // Of the process that did its work when a signal was sent to that: /proc/PID/status.
+  std::string worker_status;
 };
 
 struct ProgramLimits {
@@ -29,8 +34,14 @@ struct ProgramLimits {
   // Sends this signal after so long.
   int signal = 0;
   std::chrono::duration<double> signal_after{0};
-  std::string output;  // the file of its standard output; empty: `said`
+  bool signals_worker = false;  // the process that does its work gets it (box/supervised.hpp)
+  std::string output;           // the file of its standard output; empty: `said`
 };
+
+inline std::string content_of_proc(const std::string& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
 
 // `words` begins with the program, below the folder of the build: "daemon/previzd".
 inline Ended run_program(const std::vector<std::string>& words, const ProgramLimits& limits = {}) {
@@ -62,7 +73,14 @@ inline Ended run_program(const std::vector<std::string>& words, const ProgramLim
   while (::waitpid(child, &status, WNOHANG) == 0) {
     const auto ran = Clock::now() - begin;
     if (!is_signalled && ran > limits.signal_after) {
-      ::kill(child, limits.signal);
+      const std::string proc = "/proc/" + std::to_string(child);
+      const std::string worker =
+          content_of_proc(proc + "/task/" + std::to_string(child) + "/children");
+      if (limits.signals_worker)
+        ended.worker_status =
+            content_of_proc("/proc/" + std::to_string(std::atoi(worker.c_str())) + "/status");
+      ::kill(limits.signals_worker && !worker.empty() ? std::atoi(worker.c_str()) : child,
+             limits.signal);
       is_signalled = true;
     }
     if (ran > limits.time) {

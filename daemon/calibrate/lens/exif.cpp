@@ -3,6 +3,7 @@
 #include <cmath>
 #include <exiv2/exiv2.hpp>
 
+#include "drivers/box/reading.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
@@ -24,6 +25,7 @@ std::optional<double> times(std::optional<double> value, double factor) {
 }  // namespace
 
 PhotoData read_exif(const std::filesystem::path& file) try {
+  const box::Reading reading(file);
   const auto image = Exiv2::ImageFactory::open(file.string());
   image->readMetadata();
   const Exiv2::ExifData& data = image->exifData();

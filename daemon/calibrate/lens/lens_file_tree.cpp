@@ -11,6 +11,7 @@
 #include <sstream>
 #include <utility>
 
+#include "drivers/box/reading.hpp"
 #include "drivers/error.hpp"
 #include "drivers/keys/value.hpp"
 
@@ -218,6 +219,7 @@ void add_whole_element(const tinyxml2::XMLElement& element, TreeBuilder& builder
 }
 
 void parse(std::string_view text, const std::string& file, tinyxml2::XMLDocument& document) {
+  const box::Reading reading(file);
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
     fail_at({file, document.ErrorLineNum(), ""},
             fmt::format("is not valid XML: {}", printable(document.ErrorName())));
@@ -238,6 +240,7 @@ void fail_at(const FilePlace& place, const std::string& what) {
 }
 
 YamlTree parse_yaml(std::string_view text, const std::string& file) {
+  const box::Reading reading(file);
   std::string lines(text);
   // OpenCV's own first line, "%YAML:1.0", is not a directive of YAML.
   if (lines.starts_with("%YAML")) lines.replace(0, std::min(lines.find('\n'), lines.size()), "");

@@ -4,11 +4,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <csignal>
+#include <thread>
 
 #include "drivers/box/confinement.hpp"
 #include "drivers/box/in_child.hpp"
-#include "drivers/box/now_reading.hpp"
+#include "drivers/box/reading.hpp"
 #include "drivers/box/supervised.hpp"
 #include "drivers/session/draft.hpp"
 #include "tests/support/content_of.hpp"
@@ -22,13 +24,17 @@ using testing::ExitedWithCode;
 
 class SupervisedDeathTest : public testing::Test {
  protected:
-  SupervisedDeathTest() { GTEST_FLAG_SET(death_test_style, "fast"); }
+  SupervisedDeathTest() {
+    GTEST_FLAG_SET(death_test_style, "fast");
+    supervision_.folders = {directory_.path()};
+  }
 
   // Ends as the command would.
   [[noreturn]] void run(const std::function<int()>& work) {
-    ::_exit(box::supervised("previzd", {directory_.path()}, work));
+    ::_exit(box::supervised("previzd", supervision_, work));
   }
   test::TemporaryDirectory directory_;
+  box::Supervision supervision_;
 };
 
 TEST_F(SupervisedDeathTest, EndsAsItsWorkDoes) {
@@ -40,16 +46,67 @@ TEST_F(SupervisedDeathTest, ACrashIsALineAndLeavesNothingHalfDone) {
   const auto crash = [&] {
     const session::DraftFolder draft(directory_ / "take");
     std::ofstream(draft.path() / "observer.mkv") << "half of it";
-    box::now_reading("clip.mov");
+    const box::Reading reading("clip.mov");
     std::signal(SIGSEGV, SIG_DFL);  // a sanitizer has its own
     std::raise(SIGSEGV);
     return 0;
   };
-  EXPECT_EXIT(run(crash), ExitedWithCode(1),
-              "previzd: the command was stopped .Segmentation fault.; it last read clip.mov. If it "
-              "ends so again, this file is damaged or meets a fault of a library: export it again, "
-              "or do without it\n$");
+  EXPECT_EXIT(
+      run(crash), ExitedWithCode(1),
+      "previzd: the command was stopped: Segmentation fault, while it read clip.mov. If it ends so "
+      "again, this file is damaged or meets a fault of a library: export it again, or do without "
+      "it\n$");
   EXPECT_TRUE(fs::is_empty(directory_.path()));  // that the child has as well: the style is fast
+}
+
+// What was read before is named, and not blamed.
+TEST_F(SupervisedDeathTest, ACrashWhileNothingIsReadBlamesNoFile) {
+  supervision_.when_stopped = [](pid_t worker, const std::string& words) {
+    return worker > 0 && words.ends_with("is clip.mov") ? 75 : 1;
+  };
+  const auto crash = [&] {
+    { const box::Reading reading("clip.mov"); }
+    std::signal(SIGABRT, SIG_DFL);
+    std::raise(SIGABRT);
+    return 0;
+  };
+  EXPECT_EXIT(run(crash), ExitedWithCode(75),
+              "the command was stopped: Aborted; what it read last is clip.mov\n$");
+}
+
+TEST_F(SupervisedDeathTest, AFileThatALibraryNeverEndsWithEndsTheCommand) {
+  supervision_.longest_reading = std::chrono::milliseconds(500);
+  const auto hang = [] {
+    { const box::Reading before("other.mov"); }
+    const box::Reading reading("clip.mov");
+    for (;;) ::pause();
+    return 0;
+  };
+  EXPECT_EXIT(run(hang), ExitedWithCode(1),
+              "one file took a library more than ten minutes, while it read clip.mov\\.");
+}
+
+TEST_F(SupervisedDeathTest, AFileThatTakesAllMemoryEndsTheCommand) {
+  supervision_.most_memory = 1;
+  const auto hang = [] {
+    const box::Reading reading("clip.mov");
+    for (;;) ::pause();
+    return 0;
+  };
+  EXPECT_EXIT(run(hang), ExitedWithCode(1),
+              "a file took more memory than three quarters of this computer's, while it read clip");
+}
+
+// A render may take as long, and as much, as it likes.
+TEST_F(SupervisedDeathTest, WorkThatReadsNothingIsLeftAlone) {
+  supervision_.longest_reading = std::chrono::milliseconds(1);
+  supervision_.most_memory = 1;
+  const auto work = [] {
+    { const box::Reading reading("clip.mov"); }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2200));
+    return 0;
+  };
+  EXPECT_EXIT(run(work), ExitedWithCode(0), "^$");
 }
 
 TEST_F(SupervisedDeathTest, PassesSignalsOn) {

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "tests/support/content_of.hpp"
 #include "tests/support/program.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -27,6 +28,7 @@ class Ending : public testing::Test {
       if (word == "SET") word = directory_ / "set.toml";
       if (word == "FOOTAGE_SET") word = directory_ / "footage.toml";
       if (word == "PICTURES") word = directory_ / "pictures";
+      if (word == "JOB") word = directory_ / "job";
       if (word == "JSON") word = directory_ / "frames.json";
       if (word == "NEW") word = directory_ / "new/it";
       words.push_back(word);
@@ -56,6 +58,13 @@ class Ending : public testing::Test {
       description["observer"]["pictures"].push_back(name.string());
     }
     std::ofstream(directory_ / "frames.json") << description;
+  }
+
+  void make_job() {
+    const test::Ended ended = test::run_program(
+        {"daemon/previzd", "farm", directory_ / "session", "--spp", "1000000", "--out",
+         directory_ / "new/it", "--job", directory_ / "job", "--openjd", directory_ / "job.json"});
+    ASSERT_EQ(ended.status, 0) << ended.said;
   }
 
   test::TemporaryDirectory directory_;
@@ -107,8 +116,22 @@ TEST_F(Ending, ConfinedCommandsWriteWhereTheyWereAskedTo) {
   run({"export", folder / "take", folder / "link"});
   run({"export", folder / "take", folder / "exported/here"});
   run({"track", folder / "take", "--out", folder / "link/track.jsonl"});
-  for (const char* made : {"new/a/take/session.toml", "real/take/session.toml", "real/camera.usda",
-                           "exported/here/camera.usda", "real/track.jsonl"})
+  run({"render", folder / "take", "--spp", "1", "--out", folder / "rendered/here"});
+  std::ofstream(folder / "other.toml")
+      << test::content_of(folder / "set.toml") << "\n[output]\ndirectory = \"by/the/set\"\n";
+  run({"render", folder / "take", "--spp", "1", "--set", folder / "other.toml"});
+  run({"takes", "mark", folder / "take"});
+  run({"takes", "copy", folder / "take", "--to", folder / "copies/here"});
+  run({"calibrate", "lens", "--set", folder / "set.toml", "--focal-length", "35", "--f-number", "2",
+       "--focus", "2", "--sensor-width", "36", "--out", folder / "tables.toml"});
+  run({"farm", folder / "take", "--spp", "1", "--out", folder / "night", "--job",
+       folder / "night.farm", "--openjd", folder / "night.json"});
+  run({"farm", "task", folder / "night.farm", "0"});
+  run({"farm", "finish", folder / "night.farm"});
+  for (const char* made :
+       {"new/a/take/session.toml", "real/take/session.toml", "real/camera.usda",
+        "exported/here/camera.usda", "real/track.jsonl", "rendered/here/0000.png",
+        "by/the/set/0000.png", "copies/here/take/session.toml", "tables.toml", "night/0000.png"})
     EXPECT_TRUE(fs::exists(folder / made)) << made;
   fs::remove_all(folder);
 }
@@ -143,6 +166,41 @@ TEST_F(Ending, ActionsAreATable) {
   const test::Ended ended = test::run_program({"daemon/control/previzctl", "actions"});
   EXPECT_THAT(ended.said, AllOf(HasSubstr("record"), Not(HasSubstr("\\x"))));
 }
+
+class CrashedCommand : public Ending, public testing::WithParamInterface<const char*> {};
+
+// As if a library that reads for it crashed.
+TEST_P(CrashedCommand, IsConfinedAndEndsWithALineAndWithoutHalfFiles) {
+  write_long_footage();
+  write_set_of_footage();
+  fs::create_directories(directory_ / "new");
+  const bool is_task = std::string(GetParam()).find("farm task") != std::string::npos;
+  if (is_task) make_job();
+  const test::Ended ended =
+      test::run_program(words_of(GetParam()), {.signal = SIGSEGV,
+                                               .signal_after = std::chrono::milliseconds(700),
+                                               .signals_worker = true,
+                                               .output = ""});
+  EXPECT_FALSE(ended.ran_over);
+  EXPECT_EQ(ended.status, is_task ? 75 : 1);
+  EXPECT_THAT(ended.said, HasSubstr("previzd: the command was stopped: Segmentation fault"));
+  EXPECT_THAT(ended.worker_status, AllOf(HasSubstr("NoNewPrivs:\t1"), HasSubstr("Seccomp:\t2")));
+  for (const auto& entry : fs::recursive_directory_iterator(directory_.path()))
+    EXPECT_THAT(entry.path().string(), Not(HasSubstr(".part")));
+  if (!is_task) return;
+  EXPECT_THAT(test::content_of(directory_ / "job/state/0000.json"),
+              AllOf(HasSubstr("\"machine\""), HasSubstr("Segmentation fault")));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    OfEachCommand, CrashedCommand,
+    testing::Values(
+        "daemon/previzd import JSON NEW",
+        "daemon/previzd model PICTURES --tags-only --set FOOTAGE_SET",
+        "daemon/previzd calibrate observer PICTURES --board charuco:11x8:20mm:15mm:5x5_1000",
+        "daemon/previzd render TAKE --spp 1000000 --out NEW", "daemon/previzd trade TAKE --out NEW",
+        "daemon/previzd farm task JOB 0"),
+    [](const auto& name) { return name_of(name.param); });
 
 class StoppedCommand : public Ending, public testing::WithParamInterface<const char*> {};
 
