@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "daemon/control/callers.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
 
@@ -88,9 +89,15 @@ int guarded(sd_bus_error* error, Handler&& handler) noexcept {
   }
 }
 
-template <int (*Method)(sd_bus_message*, Verbs&)>
-int method(sd_bus_message* call, void* verbs, sd_bus_error* error) {
-  return guarded(error, [&] { return Method(call, *static_cast<Verbs*>(verbs)); });
+// What the handlers work on.
+struct Served {
+  Verbs verbs;
+  std::optional<Callers> callers;  // once there is a bus
+};
+
+template <int (*Method)(sd_bus_message*, Served&)>
+int method(sd_bus_message* call, void* served, sd_bus_error* error) {
+  return guarded(error, [&] { return Method(call, *static_cast<Served*>(served)); });
 }
 
 struct Property {
@@ -157,42 +164,67 @@ int invalid(sd_bus_message* call, const std::string& what) {
                                     on_the_bus(what).c_str());
 }
 
-int on_action(sd_bus_message* call, Verbs& verbs) {
+// Lets the rig do something, once it is known that the caller may. An exception must not pass
+// through the question's answer either.
+int operate(sd_bus_message* call, Served& served, const std::string& verb,
+            std::function<Answer(const std::string& who)> act) {
+  return served.callers->admit(
+      call, verb, [act = std::move(act)](sd_bus_message* asked, const std::string& who) {
+        try {
+          return answer_with(asked, act(who));
+        } catch (const std::exception& thrown) {
+          return sd_bus_reply_method_errorf(asked, failed_error, "%s",
+                                            on_the_bus(thrown.what()).c_str());
+        }
+      });
+}
+
+int perform(sd_bus_message* call, Served& served, const set::Action& action) {
+  return operate(call, served, action.name,
+                 [&](const std::string& who) { return served.verbs.perform(action, who); });
+}
+
+int on_action(sd_bus_message* call, Served& served) {
   const char* name = nullptr;
   if (const int result = sd_bus_message_read(call, "s", &name); result < 0) return result;
   const set::Action* action = set::find_action(name);
   if (!action) return invalid(call, std::string("unknown action \"") + name + "\"");
-  return answer_with(call, verbs.perform(*action));
+  return perform(call, served, *action);
 }
 
 // Performs an action that was called by its own method, whose name says which action it is.
-int on_own_method(sd_bus_message* call, Verbs& verbs) {
+int on_own_method(sd_bus_message* call, Served& served) {
   const std::string member = sd_bus_message_get_member(call);
   for (const set::Action& action : set::actions())
-    if (method_name(action.name) == member) return answer_with(call, verbs.perform(action));
+    if (method_name(action.name) == member) return perform(call, served, action);
   return invalid(call, member);
 }
 
-int on_set_mode(sd_bus_message* call, Verbs& verbs) {
+int on_set_mode(sd_bus_message* call, Served& served) {
   const char* wanted = nullptr;
   if (const int result = sd_bus_message_read(call, "s", &wanted); result < 0) return result;
   for (const auto& [name, mode] : set::names(set::Mode{}))
-    if (std::strcmp(name, wanted) == 0) return answer_with(call, verbs.go(mode));
+    if (std::strcmp(name, wanted) == 0)
+      return operate(call, served, name, [&served, mode = mode](const std::string& who) {
+        return served.verbs.go(mode, who);
+      });
   return invalid(
       call, std::string("unknown mode \"") + wanted + "\"; allowed: standby, live, refine, review");
 }
 
-int on_record(sd_bus_message* call, Verbs& verbs) {
+int on_record(sd_bus_message* call, Served& served) {
   int on = 0;
   if (const int result = sd_bus_message_read(call, "b", &on); result < 0) return result;
-  return answer_with(call, verbs.record(on != 0));
+  return operate(call, served, "record", [&served, on](const std::string& who) {
+    return served.verbs.record(on != 0, who);
+  });
 }
 
-int on_metrics(sd_bus_message* call, Verbs& verbs) {
-  return sd_bus_reply_method_return(call, "s", on_the_bus(verbs.metrics()).c_str());
+int on_metrics(sd_bus_message* call, Served& served) {
+  return sd_bus_reply_method_return(call, "s", on_the_bus(served.verbs.metrics()).c_str());
 }
 
-int on_actions(sd_bus_message* call, Verbs&) {
+int on_actions(sd_bus_message* call, Served&) {
   sd_bus_message* reply = nullptr;
   int result = sd_bus_message_new_method_return(call, &reply);
   if (result >= 0) result = sd_bus_message_open_container(reply, 'a', "(ss)");
@@ -204,12 +236,12 @@ int on_actions(sd_bus_message* call, Verbs&) {
   return result;
 }
 
-int on_get(sd_bus*, const char*, const char*, const char* name, sd_bus_message* reply, void* verbs,
+int on_get(sd_bus*, const char*, const char*, const char* name, sd_bus_message* reply, void* served,
            sd_bus_error* error) {
   return guarded(error, [&] {
     for (const Property& property : properties)
       if (std::strcmp(property.name, name) == 0)
-        return property.append(reply, static_cast<Verbs*>(verbs)->status());
+        return property.append(reply, static_cast<Served*>(served)->verbs.status());
     return -ENOENT;
   });
 }
@@ -239,29 +271,32 @@ std::string method_name(const std::string& action) {
 }
 
 struct Bus::Impl {
-  Verbs verbs;
+  Served served;
   std::deque<std::string> names;  // names of methods, which the table points at
   std::vector<sd_bus_vtable> table;
   sd_bus* bus = nullptr;
   Status published;
 
-  Impl(sd_event* loop, Verbs the_verbs) : verbs(std::move(the_verbs)) {
+  Impl(sd_event* loop, Verbs the_verbs) : served{std::move(the_verbs), std::nullopt} {
     fill_table();
     try {
       check(sd_bus_open_system(&bus), "the system bus cannot be reached");
-      check(
-          sd_bus_add_object_vtable(bus, nullptr, object_path, interface_name, table.data(), &verbs),
-          "the interface cannot be registered");
+      served.callers.emplace(bus, served.verbs.denied);
+      check(sd_bus_add_object_vtable(bus, nullptr, object_path, interface_name, table.data(),
+                                     &served),
+            "the interface cannot be registered");
       request_name();
       check(sd_bus_attach_event(bus, loop, SD_EVENT_PRIORITY_NORMAL), "cannot join the event loop");
     } catch (...) {
+      served.callers.reset();
       sd_bus_close_unref(bus);
       throw;
     }
-    published = verbs.status();
+    published = served.verbs.status();
   }
   ~Impl() {
     sd_bus_detach_event(bus);
+    served.callers.reset();
     sd_bus_close_unref(bus);  // without a flush, which would wait for a bus that stands still
   }
 
@@ -317,7 +352,7 @@ bool Bus::is_open() const {
 }
 
 void Bus::changed() {
-  const Status now = impl_->verbs.status();
+  const Status now = impl_->served.verbs.status();
   std::vector<char*> names;
   for (const Property& property : properties)
     if (!property.same(impl_->published, now)) names.push_back(const_cast<char*>(property.name));

@@ -41,12 +41,15 @@ struct Answer {
   bool refused = false;
 };
 
+// `who` is the caller: a user of this computer (Callers).
 struct Verbs {
-  std::function<Answer(const set::Action&)> perform;
-  std::function<Answer(set::Mode)> go;  // enters the mode; the mode's action toggles
-  std::function<Answer(bool)> record;   // starts or stops; the action toggles
+  std::function<Answer(const set::Action&, const std::string& who)> perform;
+  std::function<Answer(set::Mode, const std::string& who)> go;  // enters it; its action toggles
+  std::function<Answer(bool, const std::string& who)>
+      record;  // starts or stops; the action toggles
   std::function<Status()> status;
-  std::function<std::string()> metrics;  // JSON
+  std::function<std::string()> metrics;                                         // JSON
+  std::function<void(const std::string& who, const std::string& verb)> denied;  // was told so
 };
 
 // Returns the name of an action's own method on the bus: "MoveLeft" for "move_left".
@@ -54,7 +57,8 @@ std::string method_name(const std::string& action);
 
 // Serves the methods: one for each action; Action(s), SetMode(s) and Record(b), which also return
 // what the rig answers or the error org.previz.Error.Refused; Actions() -> a(ss); Metrics() -> s.
-// What a verb throws goes to the caller as org.previz.Error.Failed.
+// What a verb throws goes to the caller as org.previz.Error.Failed. What operates the rig is done
+// once Callers lets the caller.
 class Bus {
  public:
   // Connects to the system bus ($DBUS_SYSTEM_BUS_ADDRESS); the event loop serves it. Throws

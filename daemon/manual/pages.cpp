@@ -60,7 +60,7 @@ const Chapter service_chapter{"THE SERVICE", R"(
 previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. When the set file is saved, it is reloaded, or at the latest on `systemctl reload previzd`. If it has a mistake, the old one keeps running, and the journal and `previzctl status` report what is wrong. Changes made by buttons stay in effect.
 `previzctl action keep` writes what buttons have changed into the set file. As installed, the service may not write anywhere in /etc: keep the set file in /var/lib/previzd, or let the service write (`systemctl edit previzd`, ReadWritePaths=/etc/previzd) to a folder owned by previz.
 `journalctl -u previzd` shows what it reports, each line with its priority: `-p err` shows only the errors. Each loss of a device is logged, from the second on with its number ("the 3rd time in this run"). What repeats with every frame is logged only the 1st, 10th, 100th and 1000th time.
-Members of the group previz may operate the rig with previzctl.
+Members of the group previz may operate the rig with previzctl; members of previz-view see its state and its figures. polkit decides who operates it, by the action org.previz.Rig1.operate, so that a rule in /etc/polkit-1/rules.d can let others do some of it, or these not: its detail "verb" is what is to be done, an action of `previzctl actions`, a mode, or record. The journal names who did it, as in "bus, anna: recording".
 )"};
 
 const Chapter security_chapter{"SECURITY", R"(
@@ -68,11 +68,11 @@ What a command line and a set file of yours name is trusted: they may name any f
 
 their files: A take or a job reads and writes nothing outside of its folder, by links or by names, unless `--any-paths` allows it. A pipe, a device or a link in the place of a file is named and not opened; a file larger than its kind can be is refused before it is read.
 
-their bytes: `import`, `export`, `track` and `model` work in a process that has no network, runs no program and writes only into the folders that it was asked to (by seccomp and Landlock; where the kernel lacks them, a line of the log says so). What crashes there ends with a line that names the file, and leaves nothing half done. FBX files and cameras of a network are read by processes without any file. `render`, `calibrate` and the tasks of a farm read in their own process: render takes of strangers as a user who has nothing to lose.
+their bytes: Every command that reads them, but for `run`, works in a process of its own. What crashes there, takes ten minutes for one file, or three quarters of the memory while a library reads one, ends with a line that names the file, and leaves nothing half done. But for `check` and the submission to a farm, this process has no network, runs no program and writes only into the folders that it was asked to (by seccomp and Landlock; where the kernel lacks them, a line of the log says so). It can read what its user can: render takes of strangers as a user who has no secrets. FBX files and cameras of a network are read by processes without any file.
 
 their words: Names and texts of others are shown with control characters as \x1b and the like.
 
-Whoever may use the D-Bus service operates the rig: root and the group previz.
+Over D-Bus the groups previz and previz-view see the state of the rig, and root and whom polkit lets operate it (THE SERVICE). Whoever is at its buttons operates it, too.
 
 A fault by which a file reaches what it should not is best reported in private to whom previzd is from, with what `previzd --version` says.
 )"};

@@ -80,8 +80,7 @@ control::Status status_of(const Rig& rig, const set::Set& set, const render::Dev
 }
 
 control::Verbs verbs_of(Rig& rig, const set::Set& set, const render::Device& device,
-                        const report::Reports& reports,
-                        const std::function<std::string()>& metrics) {
+                        report::Reports& reports, const std::function<std::string()>& metrics) {
   const auto answer = [](const Outcome& outcome) {
     return control::Answer{outcome.said, outcome.refused};
   };
@@ -93,14 +92,21 @@ control::Verbs verbs_of(Rig& rig, const set::Set& set, const render::Device& dev
     return control::Answer{"the set lets only buttons end a take (recording.end_over_bus)", true};
   };
   control::Verbs verbs;
-  verbs.perform = [&rig, answer, ends_a_take, not_here](const set::Action& action) {
+  const auto over_bus = [](const std::string& who) { return "bus, " + who; };
+  verbs.perform = [&rig, answer, ends_a_take, not_here, over_bus](const set::Action& action,
+                                                                  const std::string& who) {
     if (std::holds_alternative<set::Record>(action.effect) && ends_a_take(false)) return not_here();
-    return answer(rig.perform(action, "bus"));
+    return answer(rig.perform(action, over_bus(who)));
   };
-  verbs.go = [&rig, answer](Mode mode) { return answer(rig.wish(wish_for(mode), "bus")); };
-  verbs.record = [&rig, answer, ends_a_take, not_here](bool on) {
+  verbs.go = [&rig, answer, over_bus](Mode mode, const std::string& who) {
+    return answer(rig.wish(wish_for(mode), over_bus(who)));
+  };
+  verbs.record = [&rig, answer, ends_a_take, not_here, over_bus](bool on, const std::string& who) {
     if (ends_a_take(on)) return not_here();
-    return answer(rig.wish(on ? Event::record_on : Event::record_off, "bus"));
+    return answer(rig.wish(on ? Event::record_on : Event::record_off, over_bus(who)));
+  };
+  verbs.denied = [&reports, over_bus](const std::string& who, const std::string& verb) {
+    reports(report::once({report::Severity::warning, over_bus(who), verb + " (not allowed)"}));
   };
   verbs.status = [&] { return status_of(rig, set, device, reports); };
   verbs.metrics = metrics;

@@ -76,9 +76,9 @@ class Conversation {
 
   control::Verbs verbs() {
     control::Verbs verbs;
-    verbs.perform = [this](const set::Action&) { return said(); };
-    verbs.go = [this](set::Mode) { return said(); };
-    verbs.record = [this](bool) { return said(); };
+    verbs.perform = [this](const set::Action&, const std::string&) { return said(); };
+    verbs.go = [this](set::Mode, const std::string&) { return said(); };
+    verbs.record = [this](bool, const std::string&) { return said(); };
     verbs.status = [this] {
       control::Status status;
       status.message = status.set = status.fault = text_;

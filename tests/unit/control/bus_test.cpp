@@ -6,6 +6,8 @@
 #include <systemd/sd-bus.h>
 #include <systemd/sd-event.h>
 
+#include "daemon/control/callers.hpp"
+#include "tests/support/content_of.hpp"
 #include "tests/support/private_bus.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
@@ -34,23 +36,27 @@ class RigOnTheBus : public testing::Test {
     if (!bus_.running()) GTEST_SKIP() << "dbus-daemon is not installed";
     sd_event_new(&event_);
     Verbs verbs;
-    verbs.perform = [this](const set::Action& action) {
+    verbs.perform = [this](const set::Action& action, const std::string& who) {
+      who_ = who;
       fall_if(fallen_ == "perform");
       status_.message = action.name;
       rig_->changed();
       return Answer{action.name, std::string(action.name) == "standby"};
     };
-    verbs.go = [this](set::Mode mode) {
+    verbs.go = [this](set::Mode mode, const std::string&) {
       status_.mode = mode == set::Mode::refine ? "refine" : "live";
       return Answer{status_.mode};
     };
-    verbs.record = [this](bool on) {
+    verbs.record = [this](bool on, const std::string&) {
       status_.recording = on;
       return Answer{on ? "recording" : "recording ended"};
     };
     verbs.status = [this] {
       fall_if(fallen_ == "status");
       return status_;
+    };
+    verbs.denied = [this](const std::string& who, const std::string& verb) {
+      denied_.push_back(who + ": " + verb);
     };
     verbs.metrics = [this] {
       fall_if(fallen_ == "metrics");
@@ -85,6 +91,8 @@ class RigOnTheBus : public testing::Test {
     if (falls) throw std::runtime_error("lamp fell down");
   }
   std::string fallen_;  // the verb that throws
+  std::string who_;     // called last
+  std::vector<std::string> denied_;
   Status status_ = first_status();
   std::unique_ptr<Bus> rig_;
   std::atomic<bool> quit_ = false;
@@ -176,29 +184,75 @@ TEST_F(RigOnTheBus, EveryActionIsAMethodAndEveryChangeASignal) {
   sd_bus_flush_close_unref(client);
 }
 
-// The policy that the package ships, for a group that there is on any machine instead of previz.
+// The policy that the package ships, for groups that there are on any machine instead of previz and
+// previz-view, and for a polkit of root's.
 class PolicyFile {
  protected:
   PolicyFile() {
-    std::string text = content_of(PREVIZ_SOURCE_DIR "/systemd/org.previz.Rig1.conf");
-    const std::string group = "group=\"previz\"";
-    text.replace(text.find(group), group.size(), std::string("group=\"") + member_group + '"');
+    std::string text = test::content_of(PREVIZ_SOURCE_DIR "/systemd/org.previz.Rig1.conf");
+    replace(text, "group=\"previz\"", std::string("group=\"") + crew + '"');
+    replace(text, "group=\"previz-view\"", std::string("group=\"") + viewers + '"');
+    replace(text, "</busconfig>",
+            "<policy user=\"root\"><allow own=\"org.freedesktop.PolicyKit1\"/><allow "
+            "send_destination=\"org.freedesktop.PolicyKit1\"/></policy></busconfig>");
     std::ofstream(policy_) << text;
   }
-  static std::string content_of(const std::filesystem::path& file) {
-    std::ifstream stream(file);
-    return {std::istreambuf_iterator<char>(stream), {}};
+  static void replace(std::string& text, const std::string& what, const std::string& with) {
+    text.replace(text.find(what), what.size(), with);
   }
-  static constexpr const char* member_group = "games";
+  static constexpr const char *crew = "games", *viewers = "news";
   const test::TemporaryDirectory folder_;
   const std::filesystem::path policy_ = folder_ / "org.previz.Rig1.conf";
 };
 
+// Lets everybody do one thing, as polkit does by its rules; where that is "", it never answers.
+class Polkit {
+ public:
+  explicit Polkit(std::string allowed) : allowed_(std::move(allowed)) {
+    static const sd_bus_vtable methods[] = {
+        SD_BUS_VTABLE_START(0),
+        SD_BUS_METHOD("CheckAuthorization", "(sa{sv})sa{ss}us", "(bba{ss})", answer,
+                      SD_BUS_VTABLE_UNPRIVILEGED),
+        SD_BUS_VTABLE_END};
+    sd_bus_open_system(&bus_);
+    sd_bus_add_object_vtable(bus_, nullptr, "/org/freedesktop/PolicyKit1/Authority",
+                             "org.freedesktop.PolicyKit1.Authority", methods, this);
+    sd_bus_request_name(bus_, "org.freedesktop.PolicyKit1", 0);
+    thread_ = std::jthread([this](const std::stop_token& stop) {
+      while (!stop.stop_requested())
+        if (sd_bus_process(bus_, nullptr) == 0) sd_bus_wait(bus_, 10'000);
+    });
+  }
+  ~Polkit() {
+    thread_ = {};
+    sd_bus_flush_close_unref(bus_);
+  }
+  Polkit(const Polkit&) = delete;
+  Polkit& operator=(const Polkit&) = delete;
+
+ private:
+  static int answer(sd_bus_message* call, void* polkit, sd_bus_error*) {
+    const char *kind = "", *key = "", *sender = "", *action = "", *detail = "", *verb = "";
+    sd_bus_message_read(call, "(sa{sv})s", &kind, 1, &key, "s", &sender, &action);
+    sd_bus_message_read(call, "a{ss}", 1, &detail, &verb);
+    const bool is_sound = kind == std::string("system-bus-name") && key == std::string("name") &&
+                          *sender == ':' && action == std::string(operate_action) &&
+                          detail == std::string("verb");
+    if (static_cast<Polkit*>(polkit)->allowed_.empty()) return 1;
+    const bool is_allowed = is_sound && verb == static_cast<Polkit*>(polkit)->allowed_;
+    return sd_bus_reply_method_return(call, "(bba{ss})", int{is_allowed}, 0, 0);
+  }
+
+  const std::string allowed_;
+  sd_bus* bus_ = nullptr;
+  std::jthread thread_;
+};
+
 // A bus that keeps to the policy. The rig is root; callers are root, a user of no group, and the
-// same as a member of the group.
+// same as a member of one of the groups.
 class ShippedPolicy : private PolicyFile, public RigOnTheBus {
  protected:
-  enum class Caller { root, nobody, member };
+  enum class Caller { root, nobody, viewer, member };
 
   ShippedPolicy() : RigOnTheBus(policy_) {}
   void SetUp() override {
@@ -208,9 +262,9 @@ class ShippedPolicy : private PolicyFile, public RigOnTheBus {
 
   static bool become(Caller caller) {
     constexpr uid_t nobody = 65534;
-    const ::group* members = getgrnam(member_group);
+    const ::group* members = getgrnam(caller == Caller::viewer ? viewers : crew);
     const gid_t groups[] = {members ? members->gr_gid : nobody};
-    const std::size_t count = caller == Caller::member ? 1 : 0;
+    const std::size_t count = caller == Caller::nobody ? 0 : 1;
     return caller == Caller::root ||
            (setgroups(count, groups) == 0 && setgid(nobody) == 0 && setuid(nobody) == 0);
   }
@@ -249,22 +303,78 @@ class ShippedPolicy : private PolicyFile, public RigOnTheBus {
   }
 };
 
-TEST_F(ShippedPolicy, MembersAndRootMayOperateTheRigNobodyElseMayAndEverybodyMayLook) {
+TEST_F(ShippedPolicy, BothGroupsAndRootMayCallTheRigAndNobodyElse) {
   std::vector<std::string> methods{"Action", "SetMode", "Record", "Metrics", "Actions"};
   for (const set::Action& action : set::actions()) methods.push_back(method_name(action.name));
-  for (const std::string& method : methods) {
+  // Without arguments that it takes, a call is wrong before anybody asks who calls.
+  const Polkit polkit("any");
+  for (const std::string& method : methods)
     EXPECT_EQ(error_of(Caller::nobody, interface_name, method), SD_BUS_ERROR_ACCESS_DENIED)
         << method;
-    for (const Caller caller : {Caller::root, Caller::member})
-      EXPECT_NE(error_of(caller, interface_name, method), SD_BUS_ERROR_ACCESS_DENIED) << method;
-  }
+  for (const char* method : {"Action", "SetMode", "Record"})
+    for (const Caller caller : {Caller::root, Caller::member, Caller::viewer})
+      EXPECT_EQ(error_of(caller, interface_name, method), SD_BUS_ERROR_INVALID_ARGS) << method;
   constexpr const char* properties = "org.freedesktop.DBus.Properties";
   EXPECT_EQ(error_of(Caller::nobody, properties, "Set"), SD_BUS_ERROR_ACCESS_DENIED);
-  for (const Caller caller : {Caller::nobody, Caller::member, Caller::root}) {
-    for (const char* method : {"Get", "GetAll"})  // for which the arguments are missing
+  for (const char* method : {"Get", "GetAll"}) {  // for which the arguments are missing
+    EXPECT_EQ(error_of(Caller::nobody, properties, method), SD_BUS_ERROR_ACCESS_DENIED) << method;
+    for (const Caller caller : {Caller::viewer, Caller::member, Caller::root})
       EXPECT_EQ(error_of(caller, properties, method), SD_BUS_ERROR_INVALID_ARGS) << method;
-    EXPECT_EQ(error_of(caller, "org.freedesktop.DBus.Introspectable", "Introspect"), "");
   }
+  for (const Caller caller : {Caller::viewer, Caller::member, Caller::root})
+    EXPECT_EQ(error_of(caller, interface_name, "Metrics"), "");
+}
+
+// Rules of a department can tell one thing that the rig does from another.
+TEST_F(ShippedPolicy, WhatACallerMayDoPolkitSays) {
+  const Polkit polkit("mark");
+  for (const Caller caller : {Caller::viewer, Caller::member}) {
+    EXPECT_EQ(error_of(caller, interface_name, "MoveLeft"), SD_BUS_ERROR_ACCESS_DENIED);
+    EXPECT_EQ(error_of(caller,
+                       [](sd_bus* bus, sd_bus_error* error) {
+                         sd_bus_call_method(bus, bus_name, object_path, interface_name, "Record",
+                                            error, nullptr, "b", 1);
+                       }),
+              SD_BUS_ERROR_ACCESS_DENIED);
+    EXPECT_EQ(who_, "");
+  }
+  EXPECT_EQ(error_of(Caller::viewer, interface_name, "Mark"), "");
+  EXPECT_EQ(who_, "nobody");
+  EXPECT_EQ(error_of(Caller::root, interface_name, "MoveLeft"), "");
+  EXPECT_EQ(who_, "root");
+  EXPECT_EQ(denied_, (std::vector<std::string>{"nobody: move_left", "nobody: record",
+                                               "nobody: move_left", "nobody: record"}));
+}
+
+TEST_F(ShippedPolicy, WithoutPolkitOnlyRootMayOperateAndTheOthersAreToldWhy) {
+  EXPECT_EQ(error_of(Caller::member, interface_name, "MoveLeft"), SD_BUS_ERROR_ACCESS_DENIED);
+  EXPECT_EQ(error_of(Caller::root, interface_name, "MoveLeft"), "");
+  EXPECT_EQ(error_of(Caller::member, interface_name, "Metrics"), "");
+}
+
+// The rig answers others meanwhile, and says to the rest that it is busy.
+TEST_F(ShippedPolicy, CallsThatWaitForPolkitHoldUpNobodyAndAreAtMost64) {
+  const Polkit polkit("");
+  EXPECT_EQ(error_of(Caller::member,
+                     [](sd_bus* bus, sd_bus_error* error) {
+                       const auto keep = [](sd_bus_message* answer, void* errors, sd_bus_error*) {
+                         if (const sd_bus_error* why = sd_bus_message_get_error(answer))
+                           static_cast<std::vector<std::string>*>(errors)->emplace_back(why->name);
+                         return 0;
+                       };
+                       std::vector<std::string> errors;
+                       for (int i = 0; i < 80; ++i)
+                         sd_bus_call_method_async(bus, nullptr, bus_name, object_path,
+                                                  interface_name, "MoveLeft", keep, &errors,
+                                                  nullptr);
+                       sd_bus_call_method(bus, bus_name, object_path, interface_name, "Metrics",
+                                          error, nullptr, nullptr);
+                       for (int i = 0; errors.empty() && i < 1000; ++i)
+                         if (sd_bus_process(bus, nullptr) == 0) sd_bus_wait(bus, 10'000);
+                       if (errors.empty() || errors[0] != SD_BUS_ERROR_LIMITS_EXCEEDED)
+                         sd_bus_error_set_const(error, "none.is.refused", "");
+                     }),
+            "");
 }
 
 // Who could own the name could pretend to be the rig.
