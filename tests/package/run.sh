@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The Debian packages, as a rig and a farm's computer get them: builds them, asks lintian, and installs,
-# upgrades, removes and purges them in a bare Debian 12 that is made for this and thrown away; also reads
-# their SPDX lists. Takes three minutes and the network; as root, or as anyone who may make
+# upgrades, removes and purges them in a bare Debian 12 that is made for this and thrown away; also signs
+# copies and reads their SPDX lists. Takes three minutes and the network; as root, or as anyone who may make
 # user namespaces.
 #   tests/package/run.sh [previzd.deb previzd-farm.deb]      packages that are there, instead of a build
 set -euo pipefail
@@ -47,6 +47,7 @@ FILES
 cmp "$work/farm/usr/bin/previzd" "$work/unpacked/usr/bin/previzd"
 "$here/check_spdx.py" previzd "$work/unpacked"
 "$here/check_spdx.py" previzd-farm "$work/farm"
+"$here/signed.sh" "$work/previzd.deb" "$work/previzd-farm.deb"
 
 # The same package with a later version and another default set: what an upgrade brings.
 dpkg-deb --raw-extract "$work/previzd.deb" "$work/later"
