@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # The Debian packages, as a rig and a farm's computer get them: builds them, asks lintian, and installs,
 # upgrades, removes and purges them in a bare Debian 12 that is made for this and thrown away; also signs
-# copies and reads their SPDX lists. Takes three minutes and the network; as root, or as anyone who may make
-# user namespaces.
+# copies, reads their SPDX lists, and builds the last commit twice more to compare. Takes three minutes
+# besides the builds, and the network; as root, or as anyone who may make user namespaces.
 #   tests/package/run.sh [previzd.deb previzd-farm.deb]      packages that are there, instead of a build
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -18,6 +18,7 @@ else
   cmake --build --preset release --parallel "$(nproc)" --target deb
   cp build/release/previzd_*.deb "$work/previzd.deb"
   cp build/release/previzd-farm_*.deb "$work/previzd-farm.deb"
+  "$here/reproducible.sh"
 fi
 
 version=$(dpkg-deb --field "$work/previzd.deb" Version)
