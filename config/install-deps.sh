@@ -26,7 +26,7 @@ packages=(
   # tests
   libgtest-dev libgmock-dev libusbredirparser-dev groff-base poppler-utils
   # package, and its test in a bare system
-  dpkg-dev file lintian mmdebstrap systemd
+  dpkg-dev python3 file lintian mmdebstrap systemd debsigs debsig-verify
 )
 
 missing=()

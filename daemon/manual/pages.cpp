@@ -74,6 +74,8 @@ their words: Names and texts of others are shown with control characters as \x1b
 
 Over D-Bus the groups previz and previz-view see the state of the rig, and root and whom polkit lets operate it (THE SERVICE). Whoever is at its buttons operates it, too.
 
+What a package contains and was made of is in its SPDX list, /usr/share/doc/previzd/previzd.spdx.json (previzd-farm has its own). A department signs a package with `debsigs --sign=origin` and an Ed25519 key, and `debsig-verify` verifies it by the policy in /etc/debsig/policies.
+
 A fault by which a file reaches what it should not is best reported in private to whom previzd is from, with what `previzd --version` says.
 )"};
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # The Debian packages, as a rig and a farm's computer get them: builds them, asks lintian, and installs,
-# upgrades, removes and purges them in a bare Debian 12 that is made for this and thrown away. Takes
-# three minutes and the network; as root, or as anyone who may make user namespaces.
+# upgrades, removes and purges them in a bare Debian 12 that is made for this and thrown away; also signs
+# copies, reads their SPDX lists, and builds the last commit twice more to compare. Takes three minutes
+# besides the builds, and the network; as root, or as anyone who may make user namespaces.
 #   tests/package/run.sh [previzd.deb previzd-farm.deb]      packages that are there, instead of a build
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -17,6 +18,7 @@ else
   cmake --build --preset release --parallel "$(nproc)" --target deb
   cp build/release/previzd_*.deb "$work/previzd.deb"
   cp build/release/previzd-farm_*.deb "$work/previzd-farm.deb"
+  "$here/reproducible.sh"
 fi
 
 version=$(dpkg-deb --field "$work/previzd.deb" Version)
@@ -29,7 +31,7 @@ dpkg-deb --raw-extract "$work/previzd.deb" "$work/unpacked"
 "$here/hardened.sh" "$work"/unpacked/usr/{bin/previz{d,ctl},libexec/previzd/previzd-aravis}
 lintian --fail-on error --info "$work/previzd.deb" "$work/previzd-farm.deb"
 
-# A farm's computer starts no rig: of the files, only the program, its pages and its completion.
+# A farm's computer starts no rig: of the files, only the program, its pages, its completion and its lists.
 dpkg-deb --raw-extract "$work/previzd-farm.deb" "$work/farm"
 (cd "$work/farm" && find . -type f -not -path './DEBIAN/md5sums' | sort) >"$work/farm_files"
 diff - "$work/farm_files" <<'FILES'
@@ -38,11 +40,15 @@ diff - "$work/farm_files" <<'FILES'
 ./usr/share/bash-completion/completions/previzd
 ./usr/share/doc/previzd-farm/changelog.gz
 ./usr/share/doc/previzd-farm/copyright
+./usr/share/doc/previzd-farm/previzd-farm.spdx.json
 ./usr/share/man/man1/previzd-farm.1.gz
 ./usr/share/man/man5/previz-set.5.gz
 ./usr/share/man/man8/previzd.8.gz
 FILES
 cmp "$work/farm/usr/bin/previzd" "$work/unpacked/usr/bin/previzd"
+"$here/check_spdx.py" previzd "$work/unpacked"
+"$here/check_spdx.py" previzd-farm "$work/farm"
+"$here/signed.sh" "$work/previzd.deb" "$work/previzd-farm.deb"
 
 # The same package with a later version and another default set: what an upgrade brings.
 dpkg-deb --raw-extract "$work/previzd.deb" "$work/later"
