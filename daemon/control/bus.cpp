@@ -262,7 +262,7 @@ struct Bus::Impl {
   }
   ~Impl() {
     sd_bus_detach_event(bus);
-    sd_bus_close_unref(bus);  // without a flush, which would wait for a bus that stands still
+    sd_bus_close_unref(bus);  // without a flush, which may wait
   }
 
   // Nobody is held up by a bus that stands still.
