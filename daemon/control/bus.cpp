@@ -297,10 +297,10 @@ struct Bus::Impl {
   ~Impl() {
     sd_bus_detach_event(bus);
     served.callers.reset();
-    sd_bus_close_unref(bus);  // without a flush, which would wait for a bus that stands still
+    sd_bus_close_unref(bus);  // without a flush, which may wait
   }
 
-  // sd-bus itself would wait for minutes for a bus that stands still.
+  // Nobody is held up by a bus that stands still.
   void request_name() {
     const std::string what = std::string("the name ") + bus_name;
     const auto end = std::chrono::steady_clock::now() + longest_answer;

@@ -16,8 +16,7 @@
 namespace previz::lighting {
 namespace {
 
-// Bytes of the types that have one size (OpenEXR, "Predefined Attribute Types"). OpenEXR reads as
-// many of them whatever an attribute says, and takes what follows for the next attribute.
+// Bytes of the types that have one size (OpenEXR, "Predefined Attribute Types").
 constexpr std::array<std::pair<std::string_view, std::int32_t>, 23> sizes = {
     {{"box2i", 16},      {"box2f", 16},   {"chromaticities", 32},
      {"compression", 1}, {"double", 8},   {"envmap", 1},

@@ -5,10 +5,9 @@
 
 namespace previz::lighting {
 
-// Walks the attributes of a file's first header (OpenEXR's "File Layout"), which OpenEXR itself
-// asks memory for by the sizes that they claim. Throws previz::Error naming the file where one
-// claims more bytes than the file has, or the picture too many pixels (check_size()). What else is
-// wrong is left to OpenEXR.
+// Walks the attributes of a file's first header (OpenEXR's "File Layout"). Throws previz::Error
+// naming the file where one claims more bytes than the file has, or the picture too many pixels
+// (check_size()). What else is wrong is left to OpenEXR.
 void check_exr_header(const std::filesystem::path& path);
 
 }  // namespace previz::lighting

@@ -1,5 +1,5 @@
 // By libjpeg itself and not by its TurboJPEG, which keeps only the text of the first warning, so
-// that padding before a marker would hide samples that are missing, and takes 500 scans.
+// that padding before a marker would hide samples that are missing, and has its own bound of scans.
 #include <csetjmp>
 #include <cstdio>
 // jpeglib.h needs what <cstdio> declares.
@@ -54,8 +54,7 @@ struct Reports {
   }
 };
 
-// libjpeg's own progressive pictures have ten scans. Each scan costs as much time as a picture, and
-// a hostile one may have thousands in a few bytes.
+// libjpeg's own progressive pictures have ten scans. Each scan costs as much time as a picture.
 constexpr int most_scans = 20;
 
 // Every block of 8x8 pixels takes a bit at least, so that a picture has no more pixels than this

@@ -14,8 +14,7 @@ class Request;
 
 namespace previz::libcam {
 
-// A signal of libcamera 0.0.3 may be disconnected only while nobody emits it: it copies its list of
-// receivers and calls them afterwards, and would call one that was deleted meanwhile. A mailbox is
+// A signal of libcamera 0.0.3 may be disconnected only while nobody emits it. A mailbox is
 // therefore never disconnected. The camera's signals own it, and every opening of the same camera
 // uses the same one.
 class Mailbox {

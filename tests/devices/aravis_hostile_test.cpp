@@ -1,7 +1,8 @@
-// Hosts of the network that mean harm, and cameras that do: packets that are none, from others and
-// in the camera's name, answers that promise an answer in weeks, descriptions that name files of
-// this machine; and a receiving process that is killed or stands still. The process that has the
-// take goes on, with frames or without.
+// Hosts of the network that mean harm, and cameras that do: packets that nobody asked for, from
+// others and in the camera's name, answers that promise a late answer, descriptions that name a
+// file of this machine; and a receiving process that is killed or stands still. The process that
+// has the take goes on, with frames or without. None of what is sent here would harm Aravis: what
+// must be shown is that it is refused.
 #include <arpa/inet.h>
 #include <arv.h>
 #include <fcntl.h>
@@ -11,11 +12,11 @@
 #include <sys/ioctl.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 
 #include <csignal>
+#include <random>
 
 #include "drivers/aravis/child_process.hpp"
 #include "drivers/aravis/protocol.hpp"
@@ -31,11 +32,17 @@
 
 namespace previz::test::aravis_hostile_test {
 
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+const std::string most_memory = "unlimited";  // for what the sanitizers reserve
+#else
+const std::string most_memory = "3221225472 ";
+#endif
+
 TEST_F(HostileNetwork, FramesGoOnAmongPacketsOfAnotherHost) {
   expect_frames_among(another);
 }
 
-TEST_F(HostileNetwork, FramesGoOnAmongMalformedPacketsInTheCamerasName) {
+TEST_F(HostileNetwork, FramesGoOnAmongPacketsOutOfPlaceInTheCamerasName) {
   expect_frames_among(address);
 }
 
@@ -43,11 +50,11 @@ TEST_F(HostileNetwork, FramesGoOnAmongMalformedPacketsInTheCamerasName) {
 TEST_F(HostileNetwork, AForgedPromiseOfAnAnswerHoldsUpNoCall) {
   const auto camera = open_streaming();
   const std::vector<std::uint16_t> ports = udp_ports();
-  for (const char* from : {another, address}) Sender(from).send(pending(0x7fffffff), ports);
+  for (const char* from : {another, address}) Sender(from).send(pending(too_much_ms), ports);
   EXPECT_TRUE(camera->set_exposure(0.004, 1));
   EXPECT_TRUE(takes_a_frame(*camera));
   camera_.reset();  // the camera is unplugged
-  for (const char* from : {another, address}) Sender(from).send(pending(0x7fffffff), ports);
+  for (const char* from : {another, address}) Sender(from).send(pending(too_much_ms), ports);
   // Two seconds are what a call may take; what is above is for a machine that is busy.
   const auto in_time = [](const auto& call) {
     const auto begin = Clock::now();
@@ -60,23 +67,18 @@ TEST_F(HostileNetwork, AForgedPromiseOfAnAnswerHoldsUpNoCall) {
 }
 
 TEST_F(HostileNetwork, ADescriptionThatIsAFileOfThisMachineIsRefused) {
-  const fs::path fifo = directory_ / "fifo", described = directory_ / "camera.xml";
-  ASSERT_EQ(mkfifo(fifo.c_str(), 0600), 0);
+  const fs::path described = directory_ / "camera.xml";
   std::size_t size = 0;
   const char* xml = arv_fake_camera_get_genicam_xml(fake_, &size);
   std::ofstream(described).write(xml, static_cast<std::streamsize>(size));
-  for (const std::string& url :
-       {std::string("Local:a.xml;0;FFFFFFFFFFF"), std::string("Local:a.xml;0;10000"),
-        std::string("File:///dev/zero"), "File://" + fifo.string(), "File://" + described.string(),
-        "http://" + described.string(), std::string("none"), std::string(";;;"), std::string()}) {
-    Bytes bytes(512);  // a register of zeros, but for the text
-    std::ranges::copy(url, bytes.begin());
-    ASSERT_TRUE(arv_fake_camera_write_memory(fake_, url_register,
-                                             static_cast<guint32>(bytes.size()), bytes.data()));
-    const auto begin = Clock::now();
-    EXPECT_THAT(error_of(open), StartsWith("127.0.0.1: ")) << url;
-    EXPECT_LT(Clock::now() - begin, seconds(5)) << url;
-  }
+  const std::string url = "File://" + described.string();
+  Bytes bytes(512);  // a register of zeros, but for the text
+  std::ranges::copy(url, bytes.begin());
+  ASSERT_TRUE(arv_fake_camera_write_memory(fake_, url_register, static_cast<guint32>(bytes.size()),
+                                           bytes.data()));
+  const auto begin = Clock::now();
+  EXPECT_THAT(error_of(open), StartsWith("127.0.0.1: "));
+  EXPECT_LT(Clock::now() - begin, seconds(5));
 }
 
 TEST_F(HostileNetwork, CamerasAreFoundByProcessesOfTheirOwn) {
@@ -144,6 +146,10 @@ TEST_F(HostileNetwork, AReceiverHasNothingElseInReach) {
   }
   EXPECT_THAT(session::content_of(process / "status"),
               AllOf(HasSubstr("NoNewPrivs:\t1"), HasSubstr("Seccomp:\t2")));
+  EXPECT_THAT(session::content_of(process / "limits"),
+              AllOf(testing::ContainsRegex("Max core file size +0 "),
+                    testing::ContainsRegex("Max open files +256 "),
+                    testing::ContainsRegex("Max address space +" + most_memory)));
   EXPECT_EQ(session::content_of(process / "environ"), "");
   close(secret);
 }

@@ -1,12 +1,15 @@
-// The sockets of a receiving process have their packet filters before they can receive: seen on the
-// sockets themselves, while nothing answers, and in a flood that never pauses.
+// What the packet filters of a receiving process let pass, on sockets that nobody but the test
+// reads; and that its sockets have them before they can receive: seen on the sockets themselves,
+// while nothing answers, and in a flood that never pauses.
 #include <linux/filter.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include "drivers/aravis/protocol.hpp"
+#include "drivers/aravis/receiver/packet_filter.hpp"
 #include "drivers/aravis/receiver_process.hpp"
 #include "drivers/aravis/shared_buffers.hpp"
 #include "tests/devices/hostile_network.hpp"
@@ -15,6 +18,70 @@
 namespace previz::test::aravis_sockets_test {
 
 using namespace aravis_hostile_test;
+
+constexpr std::uint32_t camera_address = INADDR_LOOPBACK;  // `address`
+
+// Returns whether a socket with this filter receives the packet.
+bool passes(const bpf::Program& filter, const char* from, const Bytes& bytes) {
+  const OwnedDescriptor socket(::socket(AF_INET, SOCK_DGRAM, 0));
+  sockaddr_in own{};
+  own.sin_family = AF_INET;
+  own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof own;
+  if (!aravis::attach(socket.get(), filter) ||
+      bind(socket.get(), reinterpret_cast<const sockaddr*>(&own), size) != 0 ||
+      getsockname(socket.get(), reinterpret_cast<sockaddr*>(&own), &size) != 0)
+    throw Error("no socket with a filter");
+  Sender(from).send(bytes, {ntohs(own.sin_port)});
+  pollfd comes{socket.get(), POLLIN, 0};
+  return poll(&comes, 1, 200) == 1;
+}
+
+// The operands of the instructions of this kind.
+std::vector<std::uint32_t> operands(const bpf::Program& filter, unsigned kind) {
+  std::vector<std::uint32_t> all;
+  for (const sock_filter& instruction : filter)
+    if (instruction.code == kind) all.push_back(instruction.k);
+  return all;
+}
+
+TEST(PacketFilter, OfAStreamPassesTheCamerasPicturesOnly) {
+  const bpf::Program filter =
+      aravis::stream_filter(camera_address, packet_size, std::int64_t{width} * height);
+  for (const bool is_extended : {false, true})
+    for (const Bytes& part : whole_picture(is_extended, 1)) {
+      EXPECT_TRUE(passes(filter, address, part));
+      EXPECT_FALSE(passes(filter, another, part));
+    }
+  for (const Bytes& part : out_of_place()) EXPECT_FALSE(passes(filter, address, part));
+}
+
+// The last numbers that a trailer and a payload packet may have, and the last byte of a leader.
+TEST(PacketFilter, OfAStreamEndsWithThePicture) {
+  const bpf::Program filter =
+      aravis::stream_filter(camera_address, packet_size, std::int64_t{width} * height);
+  EXPECT_THAT(operands(filter, BPF_JMP | BPF_JGT | BPF_K), testing::ElementsAre(4, 3, 4, 3));
+  const std::vector<std::uint32_t> bytes = operands(filter, BPF_LD | BPF_B | BPF_ABS);
+  for (const std::uint32_t header : {8u, 20u})
+    EXPECT_THAT(bytes, testing::Contains(8 + header + picture_terms().size() - 1));
+}
+
+TEST(PacketFilter, OfAnswersPassesPromisesOfASecond) {
+  const bpf::Program filter = aravis::control_filter(camera_address);
+  EXPECT_TRUE(passes(filter, address, pending(1'000)));
+  EXPECT_FALSE(passes(filter, address, pending(1'001)));
+  EXPECT_FALSE(passes(filter, another, pending(1'000)));
+}
+
+TEST(PacketFilter, OfASearchPassesWholeAnnouncements) {
+  const bpf::Program filter = aravis::discovery_filter();
+  Bytes announcement(8 + 248);
+  put(announcement, 2, 3, 2);
+  EXPECT_TRUE(passes(filter, another, announcement));
+  put(announcement, 2, 5, 2);  // the answer to another request
+  EXPECT_FALSE(passes(filter, another, announcement));
+  EXPECT_EQ(operands(filter, BPF_LD | BPF_B | BPF_ABS).front(), 8 + announcement.size() - 1);
+}
 
 // What the kernel says of the bound UDP sockets of another process.
 struct Sockets {
@@ -106,7 +173,7 @@ TEST_F(ReceiversSockets, HaveTheirFiltersWhileCamerasAreLookedFor) {
 TEST_F(ReceiversSockets, HaveTheirFiltersWhileStreamsBegin) {
   CameraSettings settings;
   settings.device = address;
-  settings.packet_size = 1500;
+  settings.packet_size = packet_size;
   aravis::ReceiverProcess receiver(aravis::Reach::network);
   Watch watch(receiver);
   receiver.ask(aravis::Kind::open, aravis::Writer()(aravis::Order{settings}), seconds(5));
@@ -119,8 +186,7 @@ TEST_F(ReceiversSockets, HaveTheirFiltersWhileStreamsBegin) {
   expect_filtered(watch.end());
 }
 
-// Sends to each port as soon as there is one, until it is destroyed: what is no packet of a stream,
-// and, from another host than the camera, also what would be one (number 1).
+// Sends what is not wanted to each port as soon as there is one, until it is destroyed.
 class Flood {
  public:
   explicit Flood(const char* from) : thread_([this, from] { run(from); }) {}
@@ -134,14 +200,7 @@ class Flood {
  private:
   void run(const char* from) const {
     const Sender sender(from);
-    std::vector<Bytes> packets;
-    std::vector<std::uint32_t> numbers{0, 0x7fffffff, 0xffffffff};
-    if (from != std::string(address)) numbers.push_back(1);
-    for (const std::uint32_t number : numbers)
-      for (const std::uint8_t type : {1, 2, 3}) {
-        packets.push_back(extended(type, number, 9000, 0));  // 20 bytes
-        packets.push_back(packet(type, number & 0xffffff, 9000, 12));
-      }
+    const std::vector<Bytes> packets = unwanted(from);
     while (!done_) {
       const std::vector<std::uint16_t> ports = udp_ports();
       for (const Bytes& bytes : packets) sender.send(bytes, ports);

@@ -1,4 +1,4 @@
-// Packets of hosts that mean harm to the receiver of a network camera, and its process.
+// Packets that the receiver of a network camera must not see, who sends them, and its process.
 #pragma once
 
 #include <arpa/inet.h>
@@ -9,8 +9,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "drivers/descriptor.hpp"
@@ -23,6 +23,10 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr const char* address = "127.0.0.1";  // the camera's
 constexpr const char* another = "127.0.0.9";
+constexpr std::uint16_t width = 64, height = 48;  // three packets, a leader and a trailer
+constexpr std::uint16_t packet_size = 1500;
+constexpr std::uint8_t forged = 0x41;         // every byte of a picture that is not the camera's
+constexpr std::uint32_t too_much_ms = 5'000;  // longer than any call to the camera may take
 
 // The processes that this one has started to receive from cameras.
 inline std::vector<pid_t> receivers(pid_t parent = getpid()) {
@@ -92,60 +96,64 @@ inline void put(Bytes& bytes, std::size_t at, std::uint32_t number, std::size_t 
 }
 
 // A packet of the streaming protocol with a header of 8 bytes, or of 20 with extended ids.
-inline Bytes packet(std::uint8_t type, std::uint32_t number, std::uint16_t frame,
-                    std::size_t rest) {
-  Bytes bytes(8);
-  put(bytes, 2, frame, 2);
-  bytes[4] = type;
-  put(bytes, 5, number, 3);
-  bytes.resize(bytes.size() + rest, 0x41);
-  return bytes;
-}
-inline Bytes extended(std::uint8_t type, std::uint32_t number, std::uint16_t frame,
-                      std::size_t rest) {
-  Bytes bytes(20);
-  bytes[4] = static_cast<std::uint8_t>(0x80 | type);
-  put(bytes, 14, frame, 2);
-  put(bytes, 16, number, 4);
-  bytes.resize(bytes.size() + rest, 0x41);
+inline Bytes packet(bool extended, std::uint8_t type, std::uint32_t number, std::uint16_t frame,
+                    const Bytes& body) {
+  Bytes bytes(extended ? 20 : 8);
+  bytes[4] = static_cast<std::uint8_t>(extended ? 0x80 | type : type);
+  put(bytes, extended ? 14 : 2, frame, 2);
+  put(bytes, extended ? 16 : 5, number, extended ? 4 : 3);
+  bytes.insert(bytes.end(), body.begin(), body.end());
   return bytes;
 }
 
-// Returns what is no packet of this stream: short, empty, with numbers of packets that there are
-// not, with parts and kinds that its pictures have not.
-inline std::vector<Bytes> malformed() {
-  std::vector<Bytes> all{{}};
-  for (std::uint8_t type = 0; type <= 8; ++type) {
-    for (const std::uint16_t frame : {std::uint16_t{9000}, std::uint16_t{40000}}) {
-      for (const std::uint32_t number : {0u, 1u, 4u, 5u, 0x4000u, 0xfff000u, 0xffffffu}) {
-        all.push_back(packet(type, number, frame, 0));
-        all.push_back(packet(type, number, frame, 1400));
-      }
-      for (const std::uint32_t number : {0u, 1u, 5u, 0x7fffffffu, 0xfffffffeu, 0xffffffffu}) {
-        all.push_back(extended(type, number, frame, 0));
-        all.push_back(extended(type, number, frame, 1400));
-      }
-    }
-    for (std::size_t size = 1; size < 20; ++size) {
-      Bytes cut = extended(type, 0, 9001, 0);
-      cut.resize(size);
-      all.push_back(cut);
-      cut[std::min<std::size_t>(4, size - 1)] = type;
-      all.push_back(cut);
-    }
+// What a leader says of the camera's pictures.
+inline Bytes picture_terms() {
+  Bytes terms(36);
+  put(terms, 2, 1, 2);             // a picture
+  put(terms, 12, 0x0108'0001, 4);  // Mono8
+  put(terms, 16, width, 4);
+  put(terms, 20, height, 4);
+  return terms;
+}
+
+// The packets of a whole picture of `forged` bytes, as the camera could send it.
+inline std::vector<Bytes> whole_picture(bool extended, std::uint16_t frame) {
+  std::vector<Bytes> packets{packet(extended, 1, 0, frame, picture_terms())};
+  const std::size_t room = packet_size - 28 - (extended ? 20 : 8);  // without IPv4 and UDP
+  std::size_t left = std::size_t{width} * height;
+  std::uint32_t number = 1;
+  for (; left > 0; ++number) {
+    const Bytes part(std::min(left, room), forged);
+    packets.push_back(packet(extended, 3, number, frame, part));
+    left -= part.size();
   }
-  Bytes parts = packet(1, 255, 9002, 12);  // a leader of 255 parts, of which none is there
-  parts[10] = 0, parts[11] = 10;           // payload type: multipart
-  all.push_back(parts);
-  return all;
+  Bytes end(8);
+  put(end, 2, 1, 2);
+  put(end, 4, height, 4);
+  packets.push_back(packet(extended, 2, number, frame, end));
+  return packets;
 }
 
-// Bytes that are no packet but by chance, of a kind that Aravis knows where they are long enough.
-inline Bytes noise(std::mt19937& random) {
-  Bytes bytes(random() % 60);
-  std::ranges::generate(bytes, [&] { return static_cast<std::uint8_t>(random()); });
-  if (bytes.size() > 4) bytes[4] = static_cast<std::uint8_t>(bytes[4] & 0x83);
-  return bytes;
+// Packets of a stream that has no such: each is whole, and Aravis would leave it out by itself.
+inline std::vector<Bytes> out_of_place() {
+  std::vector<Bytes> packets;
+  for (const bool is_extended : {false, true}) {
+    const auto frame = static_cast<std::uint16_t>(is_extended ? 20'000 : 10'000);
+    packets.push_back(packet(is_extended, 1, 1, frame, picture_terms()));  // a leader is number 0
+    packets.push_back(packet(is_extended, 3, 4, frame + 1, Bytes(1400, forged)));  // of 3
+  }
+  return packets;
+}
+
+// What a receiver must not see of such a host, although none of it would do Aravis any harm. In
+// the camera's name nobody can be kept from sending whole pictures.
+inline std::vector<Bytes> unwanted(const std::string& from) {
+  std::vector<Bytes> packets = out_of_place();
+  if (from == address) return packets;
+  for (const bool is_extended : {false, true})
+    for (Bytes& part : whole_picture(is_extended, is_extended ? 22'000 : 12'000))
+      packets.push_back(std::move(part));
+  return packets;
 }
 
 // An answer on the control channel that says that the answer takes so long.

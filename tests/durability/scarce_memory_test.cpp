@@ -1,8 +1,6 @@
 // A recorder on a computer whose memory runs out at any allocation: the take goes on or ends with
 // its reason, every frame is on the disk or counted, and the next take is whole. Some libraries end
-// the process (nlohmann's json and the standard library's directory_iterator where a destructor or
-// a noexcept function lacks memory, libavformat where it opens a file); what they leave is then
-// brought in order by the next process, as after any crash.
+// the process; what they leave is then brought in order by the next process, as after any crash.
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>

@@ -20,7 +20,8 @@ namespace device_targets_cpp {
 void wire_picture(Bytes bytes) {
   Choices choices(bytes);
   convert::WirePicture picture;
-  picture.format.layout = static_cast<convert::Layout>(choices.up_to(12));
+  // The one behind yv12 is JPEG, whose bytes libjpeg reads: see mjpeg().
+  picture.format.layout = static_cast<convert::Layout>(choices.up_to(11));
   const int bits = 8 + choices.up_to(8);
   const auto packing = static_cast<convert::Packing>(choices.up_to(3));
   if (picture.format.layout <= convert::Layout::bgr) {  // the others have 8 bits

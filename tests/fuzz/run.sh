@@ -4,11 +4,15 @@
 #   tests/fuzz/run.sh PROGRAM merge [TARGET...]
 # It begins with tests/fuzz/corpus and goes on from what was found before: found/ beside the program,
 # which begins as tests/fuzz/found.tar.xz. Ends with a line a target, and with status 0 only if none
-# was broken. What broke one is in crashes/ beside the program: mend the reader and keep the bytes in
-# tests/fuzz/corpus/TARGET, small (-minimize_crash=1), under a name that says what they are.
+# was broken. What broke one is in crashes/ beside the program: mend the reader. If the bytes broke
+# code of ours and not a library of others, keep them in tests/fuzz/corpus/TARGET, small
+# (-minimize_crash=1), under a name that says what they are.
 # "merge" leaves of found/ only few and small inputs that together reach all that was reached, and
-# writes those of all targets to tests/fuzz/found.tar.xz, to be committed.
+# writes those of the targets in `own` to tests/fuzz/found.tar.xz, to be committed.
 set -euo pipefail
+# Whose bytes only code of ours reads. What another target finds may harm a library of others, be it
+# without our checks before it, and stays on the machine that found it.
+own=(aravis frames_csv hid v4l2 wire)
 program=$(realpath "$1")
 seconds=$2
 cd "$(dirname "$0")/corpus"
@@ -44,7 +48,8 @@ if [[ $seconds == merge ]]; then
     mkdir -p "$found/$target" "$crashes"
     merge "$target"
   done
-  tar -C "$(dirname "$program")" --sort=name --owner=0 --group=0 --numeric-owner --mtime=@0 -c found |
+  tar -C "$(dirname "$program")" --sort=name --owner=0 --group=0 --numeric-owner --mtime=@0 -c \
+    "${own[@]/#/found/}" |
     xz -9e >../found.tar.xz
   exit
 fi

@@ -67,7 +67,7 @@ build_layer() {
   cp "$here/$1.json" "$out/layer/"
 }
 
-# The display's driver is Mesa's, too, and crashes where it draws with 16 lanes.
+# The display's driver is Mesa's, too, and cannot draw with 16 lanes.
 on_lanes() {
   local cases settings=("VK_DRIVER_FILES=$lavapipe" "LP_NATIVE_VECTOR_WIDTH=$(($1 * 32))")
   cases=$(gate_cases render)

@@ -1,6 +1,6 @@
 // The storm over a rig whose film camera is on a network with hosts that mean harm: it is plugged
 // and unplugged, whoever receives from it is killed or stands still, and every port gets packets
-// that are none, from others and in the camera's name.
+// that nobody asked for, from others and in the camera's name.
 #include <arv.h>
 
 #include <csignal>
@@ -14,8 +14,6 @@ namespace previz::rig::network_storm_test {
 
 using namespace test::hostile;
 using storm_test::Gust;
-
-constexpr int width = 64, height = 48;
 
 // The small take's floor from 0.75 m above it, with one tag of 40 pixels.
 std::vector<std::uint8_t> picture_of_a_tag() {
@@ -92,18 +90,13 @@ class NetworkStorm : public storm_test::Storm {
               "name = \"" + contact_ + action.name + "\"\naction");
   }
 
-  // Somebody on the network sends whatever there is to every port.
+  // Somebody on the network sends to every port what is not wanted there.
   Gust flood(const char* from) {
-    return [this, sender = std::make_shared<Sender>(from), bad = malformed(),
-            random = std::mt19937(1)]() mutable {
+    return [this, sender = std::make_shared<Sender>(from), packets = unwanted(from)] {
       const std::vector<std::uint16_t> ports = udp_ports();
-      for (int i = 0; i < 50; ++i) {
-        const bool promise = dice_.one_in(50);
-        sender->send(promise           ? pending(0x7fffffff)
-                     : dice_.one_in(2) ? bad[dice_.below(bad.size())]
-                                       : noise(random),
+      for (int i = 0; i < 50; ++i)
+        sender->send(dice_.one_in(50) ? pending(too_much_ms) : packets[dice_.below(packets.size())],
                      ports);
-      }
       tally_.packets += 50 * static_cast<int>(ports.size());
       dice_.rest(20);
     };

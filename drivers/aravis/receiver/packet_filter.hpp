@@ -1,5 +1,5 @@
 // Lets the kernel drop the packets that Aravis must not see: those of other hosts than the camera,
-// and those that Aravis would take on trust and write or read beyond its memory.
+// and those that are not as the camera's streams and answers have to be.
 #pragma once
 
 #include <cstddef>
@@ -11,17 +11,16 @@ namespace previz::aravis {
 
 // Lets pass the packets of a stream that come from `camera` (IPv4, host order) and are what the
 // GigE Vision streaming protocol allows for pictures of `payload` bytes in packets of `packet_size`
-// bytes: leaders that are whole, payload that lies within the picture, and trailers. Aravis 0.8
-// allocates by the packet number of a trailer and copies to the place that a payload packet names.
-// Throws previz::Error if such packets hold nothing.
+// bytes: leaders that are whole, payload that lies within the picture, and trailers. Throws
+// previz::Error if such packets hold nothing.
 bpf::Program stream_filter(std::uint32_t camera, std::int64_t packet_size, std::int64_t payload);
 
 // Lets pass answers of `camera` on the control channel. An answer that asks for more patience than
-// a second (PENDING_ACK) is dropped; Aravis 0.8 would wait as long as it says, up to weeks.
+// a second (PENDING_ACK) is dropped.
 bpf::Program control_filter(std::uint32_t camera);
 
-// Lets pass what answers a search for cameras, from whomever: announcements (DISCOVERY_ACK) that
-// are whole, as Aravis 0.8 reads all of one whatever has come.
+// Lets pass what answers a search for cameras, from whomever: whole announcements
+// (DISCOVERY_ACK).
 bpf::Program discovery_filter();
 
 // Puts a filter on a UDP socket for good. Returns false, with errno, if the kernel refuses.

@@ -336,11 +336,12 @@ TEST(PictureHeader, OfATiffWithTwoWidthsIsNone) {
   EXPECT_FALSE(picture_size(tiff({wide, narrow, high})));
 }
 
+// One column more than the most, without any pixels.
 TEST(PictureHeader, MorePixelsThanAnybodyHasAreRefused) {
   Shoot shoot;
   const auto file = shoot.folder() / "huge.png";
   session::write_content(
-      file, std::string("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\x01\0\0\0\x01\0\0\x08\x02\0\0\0", 29));
+      file, std::string("\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x40\x01\0\0\x40\0\x08\x02\0\0\0", 29));
   EXPECT_THROW(check_picture_file(file, test::content_of(file)), Error);
 }
 

@@ -185,27 +185,25 @@ TEST_F(LoadEnvironment, SaysWhatIsWrongWithAFile) {
   EXPECT_THAT(refusal(), HasSubstr("is a folder and not a file"));
 }
 
-// A file of some kilobytes may claim to hold a picture that no memory holds.
+// A window is looked at before there are pixels.
 TEST_F(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
   {
-    Imf::Header header(65536, 32768);
+    Imf::Header header(static_cast<int>(most_side) + 1, 1);
     header.compression() = Imf::ZIP_COMPRESSION;
     for (const char* channel : {"R", "G", "B"})
       header.channels().insert(channel, Imf::Channel(Imf::HALF));
     const Imf::OutputFile without_pixels(file.c_str(), header);
   }
-  EXPECT_THAT(refusal(), HasSubstr("65536x32768 pixels; allowed: at most"));
+  EXPECT_THAT(refusal(), HasSubstr(std::to_string(most_side + 1) + "x1 pixels; allowed: at most"));
 }
 
-// So may an attribute of its header, which OpenEXR would ask as much memory for.
-TEST_F(LoadEnvironment, AHugeAttributeIsRefusedBeforeMemoryIsAskedFor) {
+TEST_F(LoadEnvironment, AnAttributeThatEndsBehindTheFileIsRefused) {
   const std::string name("owner\0string\0", 13);
   std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name
-                                        << std::string("\xff\xff\xff\x7f", 4) << "and little more";
+                                        << std::string("\x10\0\0\0", 4) << "15 of 16 bytes.";
   EXPECT_THAT(refusal(), HasSubstr("its header is damaged"));
 }
 
-// And an attribute of another size than its type has, behind which OpenEXR reads on elsewhere.
 TEST_F(LoadEnvironment, AnAttributeOfAnotherSizeThanItsTypesIsRefused) {
   const std::string name("pixelAspectRatio\0float\0", 23);
   std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name

@@ -247,7 +247,7 @@ TEST_F(Exr, OnAFullDiskThereIsTheWholeFileOrNone) {
   EXPECT_EQ(read_exr(file_).depth, layers.depth);
 }
 
-// A data window that lies elsewhere, or claims more pixels than anybody has, is refused before
+// A data window that lies elsewhere, or has a side that is too long, is refused before
 // anything is read into memory that was made for it.
 TEST_F(Exr, ADataWindowThatDoesNotBeginAtZeroIsRefused) {
   const render::Layers layers = sample_layers(4, 4);
@@ -266,7 +266,7 @@ TEST_F(Exr, ADataWindowThatDoesNotBeginAtZeroIsRefused) {
   EXPECT_THROW(read_exr(window_of(-2, -2, 1, 1)), Error);
   EXPECT_THROW(read_exr(window_of(2, 2, 5, 5)), Error);
   EXPECT_THROW(read_exr(window_of(5, 5, 2, 2)), Error);
-  EXPECT_THROW(read_exr(window_of(0, 0, 1 << 30, 1 << 30)), Error);
+  EXPECT_THROW(read_exr(window_of(0, 0, 1 << 16, 0)), Error);
 }
 
 }  // namespace previz::output::exr_test

@@ -412,8 +412,8 @@ TEST_F(GltfMaterials, NamesImagesThatCannotBeRead) {
   broken.at(42) ^= 0xff;  // the header of the compressed texels
   // Width in the PNG's header, big-endian at byte 16: larger than allowed, and more than its bytes.
   std::vector<unsigned char> huge = png(2, 1, two_texels), large = huge;
-  huge[16] = 0x01;
-  large[18] = large[22] = 0x20;
+  huge[18] = 0x40;
+  large[18] = large[22] = 0x04;
   expect_refused({{"/images/0", image_of(broken), "image 0: cannot be decoded"},
                   {"/images/0", image_of(huge), "image 0"},
                   {"/images/0", image_of(large), "is cut short"},
