@@ -13,6 +13,7 @@
 namespace previz::control {
 namespace {
 
+constexpr const char* denied_error = "org.previz.Error.Denied";
 constexpr std::size_t most_waiting = 64;
 constexpr std::uint64_t longest_answer_us = 3'000'000;
 
@@ -103,8 +104,8 @@ class Callers::Waiting {
   int deny(const std::string& why) {
     const std::string who = who_.empty() ? "somebody" : who_;
     if (callers_.denied_) callers_.denied_(who, verb_);
-    return end(sd_bus_reply_method_errorf(call_, SD_BUS_ERROR_ACCESS_DENIED, "%s: %s: %s",
-                                          verb_.c_str(), who.c_str(), why.c_str()));
+    return end(sd_bus_reply_method_errorf(call_, denied_error, "%s: %s: %s", verb_.c_str(),
+                                          who.c_str(), why.c_str()));
   }
   int end(int result) {
     callers_.waiting_.remove_if([this](const Waiting& waiting) { return &waiting == this; });

@@ -28,8 +28,8 @@ class Callers {
 
   // Calls `act` with the caller's name, "anna", or "uid 1000" if /etc/passwd has none, once it is
   // known that it may do `verb`: root and this process's own user may, others if polkit says so.
-  // Whoever may not gets an error, and so does whoever calls while 64 calls wait for polkit. Does
-  // not wait. Returns what a handler of sd-bus does.
+  // Whoever may not gets the error org.previz.Error.Denied, and whoever calls while 64 calls wait
+  // LimitsExceeded. Does not wait. Returns what a handler of sd-bus does.
   int admit(sd_bus_message* call, const std::string& verb, Act act);
 
  private:

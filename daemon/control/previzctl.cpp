@@ -40,6 +40,11 @@ class ErrorText {
     if (sd_bus_error_has_name(&error_, SD_BUS_ERROR_SERVICE_UNKNOWN) != 0 ||
         sd_bus_error_has_name(&error_, SD_BUS_ERROR_NAME_HAS_NO_OWNER) != 0)
       throw Error("previzd does not respond: it is not running, or is still loading a set");
+    if (sd_bus_error_has_name(&error_, SD_BUS_ERROR_ACCESS_DENIED) != 0)
+      throw Error(
+          "only root and members of the groups previz and previz-view may call the rig: "
+          "`adduser NAME previz` lets NAME operate it from the next login on, previz-view only "
+          "look");
     throw Error(error_.message ? error_.message : std::strerror(-result));
   }
 

@@ -329,13 +329,13 @@ TEST_F(ShippedPolicy, BothGroupsAndRootMayCallTheRigAndNobodyElse) {
 TEST_F(ShippedPolicy, WhatACallerMayDoPolkitSays) {
   const Polkit polkit("mark");
   for (const Caller caller : {Caller::viewer, Caller::member}) {
-    EXPECT_EQ(error_of(caller, interface_name, "MoveLeft"), SD_BUS_ERROR_ACCESS_DENIED);
+    EXPECT_EQ(error_of(caller, interface_name, "MoveLeft"), "org.previz.Error.Denied");
     EXPECT_EQ(error_of(caller,
                        [](sd_bus* bus, sd_bus_error* error) {
                          sd_bus_call_method(bus, bus_name, object_path, interface_name, "Record",
                                             error, nullptr, "b", 1);
                        }),
-              SD_BUS_ERROR_ACCESS_DENIED);
+              "org.previz.Error.Denied");
     EXPECT_EQ(who_, "");
   }
   EXPECT_EQ(error_of(Caller::viewer, interface_name, "Mark"), "");
@@ -347,7 +347,7 @@ TEST_F(ShippedPolicy, WhatACallerMayDoPolkitSays) {
 }
 
 TEST_F(ShippedPolicy, WithoutPolkitOnlyRootMayOperateAndTheOthersAreToldWhy) {
-  EXPECT_EQ(error_of(Caller::member, interface_name, "MoveLeft"), SD_BUS_ERROR_ACCESS_DENIED);
+  EXPECT_EQ(error_of(Caller::member, interface_name, "MoveLeft"), "org.previz.Error.Denied");
   EXPECT_EQ(error_of(Caller::root, interface_name, "MoveLeft"), "");
   EXPECT_EQ(error_of(Caller::member, interface_name, "Metrics"), "");
 }

@@ -208,6 +208,7 @@ TEST_P(StoppedCommand, EndsWithItsSignalAndWithoutHalfFiles) {
   write_long_footage();
   write_set_of_footage();
   fs::create_directories(directory_ / "new");
+  if (std::string(GetParam()).find("JOB") != std::string::npos) make_job();
   static int tries = 0;  // both signals in turn
   const int signal = ++tries % 2 == 0 ? SIGINT : SIGTERM;
   const test::Ended ended = test::run_program(
@@ -227,7 +228,7 @@ INSTANTIATE_TEST_SUITE_P(
         "daemon/previzd calibrate observer PICTURES --board charuco:11x8:20mm:15mm:5x5_1000",
         "daemon/previzd calibrate tags PICTURES --set FOOTAGE_SET",
         "daemon/previzd bench --seconds 60", "daemon/previzd render TAKE --spp 1000000 --out NEW",
-        "daemon/previzd trade TAKE --out NEW"),
+        "daemon/previzd trade TAKE --out NEW", "daemon/previzd farm task JOB 0"),
     [](const auto& name) { return name_of(name.param); });
 
 }  // namespace previz::endings_test
