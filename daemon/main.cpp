@@ -8,6 +8,7 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <iostream>
@@ -20,6 +21,7 @@
 #include "daemon/command_line.hpp"
 #include "daemon/device_rules.hpp"
 #include "daemon/devices.hpp"
+#include "daemon/output/take_folders.hpp"
 #include "daemon/post/check.hpp"
 #include "daemon/post/render_takes.hpp"
 #include "daemon/report/log.hpp"
@@ -187,16 +189,24 @@ int do_stoppable(const CLI::App& app, CommandLine& said) {
 void confine(std::vector<std::filesystem::path> written) {
   std::error_code none;
   // Without its devices NVIDIA's driver starts a program that makes them as root.
-  if (std::filesystem::exists("/proc/driver/nvidia", none) &&
-      !std::filesystem::exists("/dev/nvidiactl", none))
-    return report::log(
-        {report::Severity::info, "",
-         "the command keeps the network and may write anywhere, because the graphics "
-         "card's devices are not made yet (nvidia-modprobe)"});
+  for (const char* device : {"/dev/nvidiactl", "/dev/nvidia0", "/dev/nvidia-modeset"})
+    if (std::filesystem::exists("/usr/bin/nvidia-modprobe", none) &&
+        !std::filesystem::exists(device, none))
+      return report::log({report::Severity::info, "",
+                          "the command keeps the network and may write anywhere, because "
+                          "nvidia-modprobe has not made " +
+                              std::string(device) + " yet"});
   for (const char* folder : {"/dev", "/proc", "/tmp", "/var/tmp"}) written.emplace_back(folder);
   written.push_back(std::filesystem::temp_directory_path(none));
-  if (const auto cache = render::cache_folder(); !cache.empty())
-    written.push_back(cache.parent_path());  // also of drivers of graphics cards
+  // Of compiled shaders, ours and those of the drivers.
+  if (const auto cache = render::cache_folder(); !cache.empty()) {
+    std::filesystem::create_directories(cache, none);
+    written.push_back(cache.parent_path());
+    written.push_back(cache);
+  }
+  for (const char* name : {"MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH"})
+    if (const char* const folder = std::getenv(name))
+      written.push_back(output::existing_part(folder));
   const auto try_to = [](const char* otherwise, const std::function<void()>& call) {
     try {
       call();

@@ -26,10 +26,17 @@ class Places {
     }
   }
   void add(const std::optional<fs::path>& made) { add(made.value_or(fs::path())); }
-  // A folder that files are made in.
+  // A folder that files are made in; where it is there already, nothing beside it is.
   void add_folder(const fs::path& folder) {
-    add(folder);
+    std::error_code unknown;
+    if (!fs::is_directory(folder, unknown)) add(folder);
     if (!folder.empty()) add(folder / "file");
+  }
+  // The folders in it as well, which may be links.
+  void add_folders_in(const fs::path& folder) {
+    std::error_code unreadable;
+    for (const auto& entry : fs::directory_iterator(folder, unreadable))
+      if (entry.is_directory(unreadable)) add_folder(entry.path());
   }
   void add_folder(const std::optional<fs::path>& folder) { add_folder(folder.value_or("")); }
   // Whatever foreign files name, as the crew allowed.
@@ -42,7 +49,8 @@ class Places {
   std::vector<fs::path> reach_, drafts_;
 };
 
-// A take's own set names no folder outside of the take (check_directory()), one of the crew any.
+// A take's own set names no folder outside of the take (refuse_output_elsewhere()), one of the
+// crew any.
 void add_pictures(const std::optional<fs::path>& out, const fs::path& take,
                   const std::optional<fs::path>& set_file, bool any_paths, Places& places) {
   places.add_folder(out);
@@ -51,8 +59,11 @@ void add_pictures(const std::optional<fs::path>& out, const fs::path& take,
   if (any_paths) places.add_everything();
 }
 
-void add_render(const post::RenderOptions& options, Places& places) {
+void add_render(const post::RenderOptions& options, bool of_many, Places& places) {
   add_pictures(options.directory, options.session, options.set_file, options.any_paths, places);
+  if (!of_many) return;
+  places.add_folders_in(options.session);
+  if (options.directory) places.add_folders_in(*options.directory);
 }
 
 void add_model(const model::ModelOptions& options, Places& places) {
@@ -83,14 +94,19 @@ void add_calibrate(const calibrate::Commands& commands, Places& places) {
 
 void add_takes(const TakesCommands& commands, Places& places) {
   for (const auto* named : {&commands.marked, &commands.deleted})
-    for (const fs::path& take : *named) places.add_folder(take);
+    for (const fs::path& take : *named) {
+      places.add(take);
+      places.add_folder(take);
+    }
   places.add_folder(commands.repaired);
   places.add_folder(commands.copied.folder);
 }
 
 // A job writes into its folder and the one that it lies in (check_paths()).
 void add_job(const fs::path& job, bool any_paths, Places& places) {
-  places.add_folder(job);
+  places.add(job);
+  for (const char* folder : {"", "state", "chunks"}) places.add_folder(job / folder);
+  places.add_folders_in(job / "chunks");
   if (any_paths) places.add_everything();
 }
 
@@ -123,9 +139,9 @@ std::optional<Written> written_by(const CLI::App& app, const CommandLine& said) 
   else if (app.got_subcommand("model"))
     add_model(said.model, places);
   else if (app.got_subcommand("render"))
-    add_render(said.render, places);
+    add_render(said.render, said.render_takes.has_value(), places);
   else if (app.got_subcommand("merge"))
-    add_render(said.merge, places);
+    add_render(said.merge, false, places);
   else if (app.got_subcommand("trade"))
     add_trade(said.trade, places);
   else if (app.got_subcommand("calibrate"))

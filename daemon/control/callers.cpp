@@ -1,29 +1,45 @@
 #include "daemon/control/callers.hpp"
 
-#include <pwd.h>
 #include <systemd/sd-bus.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <cstdint>
-#include <cstdio>
-#include <memory>
+#include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <exception>
+#include <sstream>
 #include <utility>
+
+#include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::control {
 namespace {
 
 constexpr const char* denied_error = "org.previz.Error.Denied";
-constexpr std::size_t most_waiting = 64;
+constexpr std::size_t most_waiting = 1024, most_waiting_of_one = 16;
 constexpr std::uint64_t longest_answer_us = 3'000'000;
 
 // Asks only this computer: a directory of users may be far away, and the rig's loop waits for none.
-std::string name_of(std::uint32_t user) {
-  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen("/etc/passwd", "re"),
-                                                             std::fclose);
-  while (const passwd* known = file ? ::fgetpwent(file.get()) : nullptr)
-    if (known->pw_uid == user) return known->pw_name;
-  return "uid " + std::to_string(user);
+std::map<std::uint32_t, std::string> users_of_this_computer() try {
+  std::map<std::uint32_t, std::string> names;
+  std::istringstream lines(session::read_beginning("/etc/passwd", 1 << 20));
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream fields(line);
+    std::string name, password, user;
+    for (std::string* field : {&name, &password, &user}) std::getline(fields, *field, ':');
+    std::uint32_t number = 0;
+    const auto [end, wrong] = std::from_chars(user.data(), user.data() + user.size(), number);
+    if (wrong == std::errc() && end == user.data() + user.size()) names.try_emplace(number, name);
+  }
+  return names;
+} catch (const Error&) {
+  return {};
+}
+
+int refuse(sd_bus_message* call) {
+  return sd_bus_reply_method_errorf(call, SD_BUS_ERROR_LIMITS_EXCEEDED,
+                                    "too many calls wait for polkit; try again");
 }
 
 }  // namespace
@@ -54,8 +70,15 @@ class Callers::Waiting {
   template <int (Waiting::*Next)(sd_bus_message*), class... Arguments>
   int ask(const char* service, const char* path, const char* interface, const char* method,
           const char* types, Arguments... arguments) {
-    const auto answered = [](sd_bus_message* answer, void* waiting, sd_bus_error*) {
-      return (static_cast<Waiting*>(waiting)->*Next)(answer);
+    // An exception must not pass through sd-bus.
+    const auto answered = [](sd_bus_message* answer, void* waiting, sd_bus_error*) noexcept {
+      auto* const self = static_cast<Waiting*>(waiting);
+      try {
+        return (self->*Next)(answer);
+      } catch (const std::exception&) {
+        sd_bus_reply_method_errorf(self->call_, SD_BUS_ERROR_NO_MEMORY, "no memory");
+        return self->end(0);
+      }
     };
     sd_bus_message* question = nullptr;
     int result =
@@ -74,8 +97,12 @@ class Callers::Waiting {
     if (sd_bus_message_is_method_error(answer, nullptr) != 0 ||
         sd_bus_message_read(answer, "u", &user) < 0)
       return deny("the bus does not say who you are");
-    who_ = name_of(user);
+    const auto known = callers_.names_.find(user);
+    who_ = known != callers_.names_.end() ? known->second : "uid " + std::to_string(user);
     if (user == 0 || user == ::geteuid()) return allow();
+    const auto others = std::ranges::count_if(
+        callers_.waiting_, [&](const Waiting& waiting) { return waiting.who_ == who_; });
+    if (others > std::ptrdiff_t{most_waiting_of_one}) return end(refuse(call_));
     constexpr std::uint32_t without_a_dialogue = 0;
     return ask<&Waiting::know_verdict>(
         "org.freedesktop.PolicyKit1", "/org/freedesktop/PolicyKit1/Authority",
@@ -87,7 +114,7 @@ class Callers::Waiting {
   int know_verdict(sd_bus_message* answer) {
     int is_allowed = 0, may_be_asked = 0;
     if (sd_bus_message_is_method_error(answer, nullptr) != 0)
-      return deny("polkit does not answer, so that only root may; apt-get install polkitd");
+      return deny("polkit does not respond, so that only root may; apt-get install polkitd");
     if (sd_bus_message_enter_container(answer, 'r', "bba{ss}") < 0 ||
         sd_bus_message_read(answer, "bb", &is_allowed, &may_be_asked) < 0 || is_allowed == 0)
       return deny(
@@ -107,7 +134,7 @@ class Callers::Waiting {
     return end(sd_bus_reply_method_errorf(call_, denied_error, "%s: %s: %s", verb_.c_str(),
                                           who.c_str(), why.c_str()));
   }
-  int end(int result) {
+  int end(int result) noexcept {
     callers_.waiting_.remove_if([this](const Waiting& waiting) { return &waiting == this; });
     return result;
   }
@@ -120,13 +147,12 @@ class Callers::Waiting {
   sd_bus_slot* slot_ = nullptr;
 };
 
-Callers::Callers(sd_bus* bus, Denied denied) : bus_(bus), denied_(std::move(denied)) {}
+Callers::Callers(sd_bus* bus, Denied denied)
+    : bus_(bus), denied_(std::move(denied)), names_(users_of_this_computer()) {}
 Callers::~Callers() = default;
 
 int Callers::admit(sd_bus_message* call, const std::string& verb, Act act) {
-  if (waiting_.size() >= most_waiting)
-    return sd_bus_reply_method_errorf(call, SD_BUS_ERROR_LIMITS_EXCEEDED,
-                                      "%zu calls wait for polkit; try again", waiting_.size());
+  if (waiting_.size() >= most_waiting) return refuse(call);
   return waiting_.emplace_back(*this, call, verb, std::move(act)).ask_for_user();
 }
 

@@ -1,8 +1,10 @@
 // Knows who calls over the bus, and lets polkit decide whether they may operate the rig.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <list>
+#include <map>
 #include <string>
 
 struct sd_bus;
@@ -26,10 +28,11 @@ class Callers {
   Callers(const Callers&) = delete;
   Callers& operator=(const Callers&) = delete;
 
-  // Calls `act` with the caller's name, "anna", or "uid 1000" if /etc/passwd has none, once it is
+  // Calls `act` with the caller's name, "anna", or "uid 1000" if /etc/passwd had none, once it is
   // known that it may do `verb`: root and this process's own user may, others if polkit says so.
-  // Whoever may not gets the error org.previz.Error.Denied, and whoever calls while 64 calls wait
-  // LimitsExceeded. Does not wait. Returns what a handler of sd-bus does.
+  // Whoever may not gets the error org.previz.Error.Denied, and whoever calls while 16 calls of his
+  // wait for polkit, or 1024 of all, LimitsExceeded. Does not wait. Returns what a handler of
+  // sd-bus does.
   int admit(sd_bus_message* call, const std::string& verb, Act act);
 
  private:
@@ -37,6 +40,7 @@ class Callers {
 
   sd_bus* const bus_;
   const Denied denied_;
+  const std::map<std::uint32_t, std::string> names_;  // of users
   std::list<Waiting> waiting_;
 };
 

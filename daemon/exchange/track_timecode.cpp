@@ -3,6 +3,8 @@
 #include <span>
 #include <string_view>
 
+#include "drivers/box/reading.hpp"
+
 namespace previz::exchange {
 namespace {
 
@@ -71,6 +73,7 @@ std::optional<FileTimecode> track_timecode(const AVFormatContext& file, int vide
   av_dict_set(&options, "advanced_editlist", "0", 0);
   av_dict_set(&options, "protocol_whitelist", "file", 0);
   AVFormatContext* again = nullptr;
+  const box::Reading reading(url);
   const int opened = avformat_open_input(&again, url.c_str(), file.iformat, &options);
   av_dict_free(&options);
   const av::Demuxer unedited(again);

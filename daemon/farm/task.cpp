@@ -324,6 +324,7 @@ int run_task(const TaskOptions& options, const Machine& machine, std::ostream& o
 int end_stopped_task(const TaskOptions& options, const Machine& machine, std::int64_t task,
                      const std::string& words) try {
   const JobFolder folder(options.job);
+  folder.read_plan();  // refuses links
   const std::optional<TaskState> last = folder.read_state(options.chunk);
   if (last && last->outcome == TaskOutcome::running && last->host == machine.host &&
       last->pid == task)

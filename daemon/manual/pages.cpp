@@ -68,7 +68,7 @@ What a command line and a set file of yours name is trusted: they may name any f
 
 their files: A take or a job reads and writes nothing outside of its folder, by links or by names, unless `--any-paths` allows it. A pipe, a device or a link in the place of a file is named and not opened; a file larger than its kind can be is refused before it is read.
 
-their bytes: Every command that reads them, but for `run`, works in a process of its own. What crashes there, takes ten minutes for one file, or three quarters of the memory while a library reads one, ends with a line that names the file, and leaves nothing half done. But for `check` and the submission to a farm, this process has no network, runs no program and writes only into the folders that it was asked to (by seccomp and Landlock; where the kernel lacks them, a line of the log says so). It can read what its user can: render takes of strangers as a user who has no secrets. FBX files and cameras of a network are read by processes without any file.
+their bytes: Every command that reads them, but for `run`, works in a process of its own. What crashes there, or takes ten minutes or half of the computer's memory for one file, ends with a line that names the file, and leaves nothing half done. But for `check` and the submission to a farm, this process has no network, runs no program and writes only into the folders that it was asked to (by seccomp and Landlock; where the kernel lacks them, a line of the log says so). It can read what its user can: render takes of strangers as a user who has no secrets. FBX files and cameras of a network are read by processes without any file.
 
 their words: Names and texts of others are shown with control characters as \x1b and the like.
 

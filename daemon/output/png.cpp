@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/output/picture_size.hpp"
+#include "drivers/box/reading.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/files.hpp"
 
@@ -153,6 +154,7 @@ void write_png(const std::filesystem::path& path, const Plate& picture, session:
 }
 
 Plate read_png(const std::filesystem::path& path) {
+  const box::Reading reading(path);
   FilePtr file = open(path);
   PngError error;
   Reader reader(error);

@@ -7,6 +7,7 @@
 #include "daemon/set/file_edit.hpp"
 #include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
+#include "drivers/session/files.hpp"
 
 namespace previz::pipeline {
 namespace {
@@ -71,6 +72,13 @@ Take open_take(const std::filesystem::path& session_directory,
     throw Error(session_directory.string() + ": the session has no film camera frames" +
                 why_missing(take.session, "observer"));
   return take;
+}
+
+void refuse_output_elsewhere(const std::filesystem::path& session, const set::Set& set) {
+  if (!session::lies_within(session, set.output.directory))
+    throw Error(
+        session.string() + ": its set file writes to " + set.output.directory.string() +
+        ", outside the take's folder; give a folder with --out, or allow it with --any-paths");
 }
 
 std::string no_light_words() {

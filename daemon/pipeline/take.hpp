@@ -42,6 +42,10 @@ Take open_take(const std::filesystem::path& session_directory,
                const std::vector<std::pair<std::string, std::filesystem::path>>& set_assets = {},
                set::Origin of_set_file = set::Origin::crew);
 
+// A session from elsewhere does not choose where files are written: throws previz::Error where its
+// own set writes outside of its folder.
+void refuse_output_elsewhere(const std::filesystem::path& session, const set::Set& set);
+
 // Says that the light must come from a light camera, that the take has none, and what to do.
 std::string no_light_words();
 

@@ -35,15 +35,6 @@ void override_take(pipeline::Take& take, const RenderOptions& options) {
   if (options.sample_range) set.output.video = false;
 }
 
-// A session from elsewhere does not choose where files are written.
-void check_directory(const set::Set& set, const RenderOptions& options) {
-  const bool chosen = options.directory || options.set_file || options.any_paths;
-  if (!chosen && !session::lies_within(options.session, set.output.directory))
-    throw Error(
-        options.session.string() + ": its set file writes to " + set.output.directory.string() +
-        ", outside the take's folder; give a folder with --out, or allow it with --any-paths");
-}
-
 // Returns everything that decides what the pictures look like, as JSON that RenderDirectory
 // compares.
 std::string settings_of(const pipeline::Take& take, const set::Set& set,
@@ -107,7 +98,8 @@ RenderPlan plan_render(const RenderOptions& options) {
                                   plan.with, options.set_assets, options.of_set_file);
   set::Set& set = plan.take.set;
   override_take(plan.take, options);
-  check_directory(set, options);
+  if (!options.directory && !options.set_file && !options.any_paths)
+    pipeline::refuse_output_elsewhere(options.session, set);
   if (options.sample_range) check_sample_range(*options.sample_range, set.quality);
   if (!options.directory)
     set.output.directory = render_folder(options.session, plan.take.session.info.take.has_value(),

@@ -104,6 +104,10 @@ double parse_share(const std::string& text) {
 TradeReport run_trade(const TradeOptions& given, std::ostream& out) {
   const TradeOptions options = checked(given);
   TradeFrame frame(options.source, options.frame);
+  const TradeSource& source = options.source;
+  if (!options.directory && !source.set_file && !source.any_paths &&
+      fs::is_directory(source.set_or_session))
+    pipeline::refuse_output_elsewhere(source.set_or_session, frame.set());
   const fs::path directory =
       made_directory(options.directory.value_or(frame.set().output.directory / "trade"));
   const scene::Scene scene = scene::load_scene(frame.set());

@@ -89,6 +89,11 @@ void leave_network_and_programs() {
   const bpf::Program local_sockets =  // as libraries of graphics cards use them
       all({bpf::load(BPF_W, offsetof(seccomp_data, args)), bpf::when(BPF_JEQ, AF_UNIX, allow),
            bpf::when(BPF_JEQ, AF_NETLINK, allow), refuse(EAFNOSUPPORT)});
+  const auto unless_truncated = [&](std::size_t flags) {  // the number of the argument
+    return all({bpf::load(BPF_W, offsetof(seccomp_data, args) + flags * sizeof(std::uint64_t)),
+                bpf::mask(O_ACCMODE | O_TRUNC),
+                bpf::when(BPF_JEQ, O_RDONLY | O_TRUNC, refuse(EACCES)), allow});
+  };
   bpf::Program filter = all({
     bpf::load(BPF_W, offsetof(seccomp_data, arch)),
         bpf::when_not(BPF_JEQ, bpf::architecture, bpf::verdict(SECCOMP_RET_KILL_PROCESS)),
@@ -96,8 +101,13 @@ void leave_network_and_programs() {
 #if defined(__x86_64__)
         bpf::when(BPF_JGE, 0x40000000, refuse(EPERM)),  // the same calls by other numbers (x32)
 #endif
-        on(SYS_socket, local_sockets), on(SYS_execve, refuse(EPERM)),
-        on(SYS_execveat, refuse(EPERM)),
+#if defined(SYS_open)
+        on(SYS_open, unless_truncated(1)),
+#endif
+        on(SYS_openat, unless_truncated(2)),
+        on(SYS_openat2, refuse(ENOSYS)),  // whose flags are in memory
+        on(SYS_truncate, refuse(EACCES)), on(SYS_socket, local_sockets),
+        on(SYS_execve, refuse(EPERM)), on(SYS_execveat, refuse(EPERM)),
 #if !defined(__SANITIZE_ADDRESS__)  // whose look for leaks is one into its own process
         on(SYS_ptrace, refuse(EPERM)),
 #endif

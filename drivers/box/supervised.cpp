@@ -4,21 +4,27 @@
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#ifdef __SANITIZE_ADDRESS__
+#include <sanitizer/lsan_interface.h>
+#endif
 
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstring>
 #include <fstream>
 #include <iostream>
+#include <iterator>
 #include <new>
+#include <set>
+#include <sstream>
+#include <tuple>
 
 #include "drivers/box/reading.hpp"
 #include "drivers/session/draft.hpp"
 
 namespace previz::box {
 namespace {
-
-using ReadingNote = ReadingNotes::Note;
 
 // Returns the signal that came, and whether a process sent it to this one alone: those of a
 // terminal go to the child as well. Returns 0 after a second without one.
@@ -30,75 +36,107 @@ int awaited(const sigset_t& signals, bool& is_for_this_alone) {
   return std::max(signal, 0);
 }
 
-std::uint64_t page_bytes() {
-  return static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-}
-
 // Returns how much memory a process has, in bytes; 0 if it has ended.
 std::uint64_t memory_of(pid_t process) {
   std::ifstream file("/proc/" + std::to_string(process) + "/statm");
   std::uint64_t size = 0, resident = 0;
   file >> size >> resident;
-  return resident * page_bytes();
+  return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
-// Returns the reading that began first; null: nobody reads.
-const ReadingNote* longest_reading() {
-  const ReadingNotes* const all = reading_notes;
-  const ReadingNote* longest = nullptr;
-  for (std::size_t i = 0; all && i < all->notes.size(); ++i)
-    if (const ReadingNote& note = all->notes[i];
-        note.since_ms != 0 && (!longest || note.since_ms < longest->since_ms))
-      longest = &note;
-  return longest;
+std::uint64_t half_of_the_memory() {
+  return static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) / 2 *
+         static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
 }
 
-// Waits for the work, and says how it ended.
+// Returns how long a thread of a process has been at work; 0 if it has ended. See proc(5), stat.
+std::chrono::milliseconds work_of(pid_t process, pid_t thread) {
+  std::ifstream file("/proc/" + std::to_string(process) + "/task/" + std::to_string(thread) +
+                     "/stat");
+  std::string text(std::istreambuf_iterator<char>(file), {});
+  std::istringstream fields(text.substr(std::min(text.rfind(')'), text.size() - !text.empty())));
+  std::string skipped;
+  for (int i = 0; i < 12; ++i) fields >> skipped;  // the name's end, and fields 3 to 13
+  std::int64_t user = 0, system = 0;
+  fields >> user >> system;
+  return std::chrono::milliseconds((user + system) * 1000 / ::sysconf(_SC_CLK_TCK));
+}
+
+std::string file_of(const ReadingNotes::Note& note) {
+  return {note.file.data(), ::strnlen(note.file.data(), note.file.size())};
+}
+
+// Watches over the work, and says how it ended.
 class Watch {
  public:
   Watch(const Supervision& supervision, pid_t worker)
       : supervision_(supervision), worker_(worker) {}
 
-  // Ends the work if a library takes too much for a file.
+  // Ends the work if a library takes too much for a file. Waiting for a disk is no work.
   void look() {
-    const ReadingNote* const reading = longest_reading();
-    if (!reading) return;
-    const std::uint64_t most_memory =
-        supervision_.most_memory != 0
-            ? supervision_.most_memory
-            : static_cast<std::uint64_t>(::sysconf(_SC_PHYS_PAGES)) / 4 * 3 * page_bytes();
-    if (now_ms() - reading->since_ms > supervision_.longest_reading.count())
-      end("one file took a library more than ten minutes");
-    else if (memory_of(worker_) > most_memory)
-      end("a file took more memory than three quarters of this computer's");
+    const ReadingNotes* const all = reading_notes;
+    const std::uint64_t memory = memory_of(worker_);
+    for (std::size_t i = 0; all && i < all->notes.size(); ++i) {
+      const ReadingNotes::Note& note = all->notes[i];
+      const pid_t reader = note.reader;
+      if (reader == 0) continue;
+      const std::chrono::milliseconds work = work_of(worker_, reader);
+      Seen& seen = seen_[i];
+      if (const std::uint32_t count = note.count; seen.count != count) seen = {count, work, memory};
+      if (work - seen.work > supervision_.longest_reading)
+        end("one file took a library more than ten minutes", note);
+      else if (memory > seen.memory && memory - seen.memory > supervision_.most_memory)
+        end("one file took more than half of this computer's memory", note);
+    }
   }
 
   std::string words_of(int signal) const {
     std::string why = why_;
     if (why.empty()) why = ::strsignal(signal);
     if (why_.empty() && signal == SIGKILL) why += "; there may have been too little memory";
-    std::string words = "the command was stopped: " + why;
-    const ReadingNotes* const all = reading_notes;
-    if (const ReadingNote* const reading = longest_reading())
-      return words + ", while it read " + reading->file.data() +
+    const std::string words = "the command was stopped: " + why;
+    if (const std::string read = why_.empty() ? being_read() : file_; !read.empty())
+      return words + ", while it read " + read +
              ". If it ends so again, this file is damaged or meets a fault of a library: export "
              "it again, or do without it";
-    const std::string newest = all ? all->notes[all->newest].file.data() : "";
+    const ReadingNotes* const all = reading_notes;
+    const std::string newest = all ? file_of(all->notes[all->newest % all->notes.size()]) : "";
     return newest.empty() ? words : words + "; what it read last is " + newest;
   }
 
  private:
-  void end(const char* why) {
+  // What was seen of a reading the first time.
+  struct Seen {
+    std::uint32_t count = 0;
+    std::chrono::milliseconds work{0};  // of its thread, until then
+    std::uint64_t memory = 0;
+  };
+
+  void end(const char* why, const ReadingNotes::Note& note) {
     why_ = why;
+    file_ = file_of(note);
     ::kill(worker_, SIGKILL);
+  }
+
+  static std::string being_read() {
+    std::set<std::string> files;
+    const ReadingNotes* const all = reading_notes;
+    for (std::size_t i = 0; all && i < all->notes.size(); ++i)
+      if (all->notes[i].reader != 0) files.insert(file_of(all->notes[i]));
+    std::string words = files.size() > 1 ? "one of " : "";
+    for (const std::string& file : files) words += (file == *files.begin() ? "" : ", ") + file;
+    return words;
   }
 
   const Supervision& supervision_;
   const pid_t worker_;
-  std::string why_;  // it was ended here
+  std::array<Seen, std::tuple_size_v<decltype(ReadingNotes::notes)>> seen_;
+  std::string why_, file_;  // it was ended here
 };
 
 }  // namespace
+
+Supervision::Supervision() : most_memory(half_of_the_memory()) {}
 
 int supervised(const std::string& program, const Supervision& supervision,
                const std::function<int()>& work) {
@@ -120,6 +158,9 @@ int supervised(const std::string& program, const Supervision& supervision,
     if (child == 0 && (::prctl(PR_SET_PDEATHSIG, SIGKILL) != 0 || ::getppid() != parent))
       ::_exit(1);
     const int status = work();
+#ifdef __SANITIZE_ADDRESS__
+    __lsan_do_leak_check();
+#endif
     // Libraries may end threads at the exit that are the parent's, as LTTng's does, which libcamera
     // brings along.
     if (child == 0) ::_exit(status);
@@ -136,6 +177,7 @@ int supervised(const std::string& program, const Supervision& supervision,
   }
   if (ended < 0) return 1;
   if (!WIFSIGNALED(status)) ::_exit(WEXITSTATUS(status));
+  sigprocmask(SIG_UNBLOCK, &signals, nullptr);  // what follows may wait for a disk
   for (const int of_everyday : {SIGPIPE, SIGINT, SIGTERM, SIGHUP})
     if (WTERMSIG(status) == of_everyday) ::_exit(128 + of_everyday);
   for (const std::filesystem::path& folder : supervision.folders)

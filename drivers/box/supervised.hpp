@@ -14,15 +14,16 @@
 namespace previz::box {
 
 struct Supervision {
+  Supervision();
+
   std::vector<std::filesystem::path> folders;  // those of the work's drafts
   // Is told of work that a signal ended, with what it printed; returns the exit status.
   std::function<int(pid_t worker, const std::string& words)> when_stopped = [](auto...) {
     return 1;
   };
-  // What a library may take for one file (reading.hpp). While none reads, both are without limit.
+  // What a library may take for one file (reading.hpp): processor time, and memory, bytes.
   std::chrono::milliseconds longest_reading = std::chrono::minutes(10);
-  std::uint64_t most_memory =
-      0;  // of the whole process, bytes; 0: three quarters of the computer's
+  std::uint64_t most_memory;  // half of the computer's
 };
 
 // Returns the exit status of `work` in a process of its own, which ends without the program's exit

@@ -17,6 +17,7 @@ namespace previz::session {
 namespace {
 
 av::Demuxer open_demuxer(const std::filesystem::path& file) {
+  const box::Reading reading(file);
   AVFormatContext* context = nullptr;
   const AVInputFormat* matroska = av_find_input_format("matroska");
   const OpenFile plain = open_plain_file(file);  // which libav opens once more, by its descriptor

@@ -16,8 +16,8 @@ def lines(*command, cwd=None, may_fail=False):
     return done.stdout.splitlines()
 
 
-def owners(paths):
-    """The installed Debian packages, as NAME or NAME:ARCHITECTURE, that have these files."""
+def owners(paths, may_lack=False):
+    """The installed Debian packages, as NAME or NAME:ARCHITECTURE, that have these files; a compiler may be of none."""
     real = {os.path.realpath(path) for path in paths}
     # dpkg knows a file of /usr/lib by the path that its package gave it, which may be /lib.
     asked = real | {path.removeprefix("/usr") for path in real}
@@ -27,7 +27,7 @@ def owners(paths):
         if not names.startswith("diversion by"):
             found[path] = names.split(", ")[0]
     lost = sorted(path for path in real if path not in found and path.removeprefix("/usr") not in found)
-    if lost:
+    if lost and not may_lack:
         sys.exit(f"spdx: these are of no Debian package: {' '.join(lost)}")
     return set(found.values())
 
@@ -100,7 +100,7 @@ def main(build, debian, tools, package, version, root):
     # Of a package without a shared library, whatever is used has become part of the program.
     inside = {name for name in header_packages if not has_shared_library(name)} | owners(archives)
     kinds = {"DEPENDS_ON": owners(libraries), "STATIC_LINK": inside,
-             "BUILD_DEPENDENCY_OF": header_packages - inside, "BUILD_TOOL_OF": owners(tools)}
+             "BUILD_DEPENDENCY_OF": header_packages - inside, "BUILD_TOOL_OF": owners(tools, may_lack=True)}
     others = {name: debian_package(name) for name in sorted(set().union(*kinds.values()))}
 
     architecture = lines("dpkg", "--print-architecture")[0]

@@ -38,9 +38,16 @@ struct ProgramLimits {
   std::string output;           // the file of its standard output; empty: `said`
 };
 
-inline std::string content_of_proc(const std::string& file) {
-  std::ifstream stream(file);
-  return {std::istreambuf_iterator<char>(stream), {}};
+// Returns the process that does a program's work, once it is confined; 0 before.
+inline pid_t worker_of(pid_t program, std::string& status) {
+  const auto content_of_proc = [](pid_t process, const std::string& file) {
+    std::ifstream stream("/proc/" + std::to_string(process) + "/" + file);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  const pid_t worker =
+      std::atoi(content_of_proc(program, "task/" + std::to_string(program) + "/children").c_str());
+  status = worker > 0 ? content_of_proc(worker, "status") : "";
+  return status.find("Seccomp:\t2") != std::string::npos ? worker : 0;
 }
 
 // `words` begins with the program, below the folder of the build: "daemon/previzd".
@@ -73,15 +80,9 @@ inline Ended run_program(const std::vector<std::string>& words, const ProgramLim
   while (::waitpid(child, &status, WNOHANG) == 0) {
     const auto ran = Clock::now() - begin;
     if (!is_signalled && ran > limits.signal_after) {
-      const std::string proc = "/proc/" + std::to_string(child);
-      const std::string worker =
-          content_of_proc(proc + "/task/" + std::to_string(child) + "/children");
-      if (limits.signals_worker)
-        ended.worker_status =
-            content_of_proc("/proc/" + std::to_string(std::atoi(worker.c_str())) + "/status");
-      ::kill(limits.signals_worker && !worker.empty() ? std::atoi(worker.c_str()) : child,
-             limits.signal);
-      is_signalled = true;
+      const pid_t worker = limits.signals_worker ? worker_of(child, ended.worker_status) : child;
+      is_signalled = worker > 0;
+      if (is_signalled) ::kill(worker, limits.signal);
     }
     if (ran > limits.time) {
       ended.ran_over = true;

@@ -6,6 +6,8 @@
 #include <systemd/sd-bus.h>
 #include <systemd/sd-event.h>
 
+#include <future>
+
 #include "daemon/control/callers.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/private_bus.hpp"
@@ -352,29 +354,66 @@ TEST_F(ShippedPolicy, WithoutPolkitOnlyRootMayOperateAndTheOthersAreToldWhy) {
   EXPECT_EQ(error_of(Caller::member, interface_name, "Metrics"), "");
 }
 
-// The rig answers others meanwhile, and says to the rest that it is busy.
-TEST_F(ShippedPolicy, CallsThatWaitForPolkitHoldUpNobodyAndAreAtMost64) {
+TEST_F(ShippedPolicy, WhatPolkitAllowsTooLateIsNotDone) {
   const Polkit polkit("");
-  EXPECT_EQ(error_of(Caller::member,
-                     [](sd_bus* bus, sd_bus_error* error) {
-                       const auto keep = [](sd_bus_message* answer, void* errors, sd_bus_error*) {
-                         if (const sd_bus_error* why = sd_bus_message_get_error(answer))
-                           static_cast<std::vector<std::string>*>(errors)->emplace_back(why->name);
-                         return 0;
-                       };
-                       std::vector<std::string> errors;
-                       for (int i = 0; i < 80; ++i)
-                         sd_bus_call_method_async(bus, nullptr, bus_name, object_path,
-                                                  interface_name, "MoveLeft", keep, &errors,
-                                                  nullptr);
-                       sd_bus_call_method(bus, bus_name, object_path, interface_name, "Metrics",
-                                          error, nullptr, nullptr);
-                       for (int i = 0; errors.empty() && i < 1000; ++i)
-                         if (sd_bus_process(bus, nullptr) == 0) sd_bus_wait(bus, 10'000);
-                       if (errors.empty() || errors[0] != SD_BUS_ERROR_LIMITS_EXCEEDED)
-                         sd_bus_error_set_const(error, "none.is.refused", "");
-                     }),
-            "");
+  EXPECT_EQ(error_of(Caller::member, interface_name, "MoveLeft"), "org.previz.Error.Denied");
+  EXPECT_EQ(who_, "");
+}
+
+// The rig answers others meanwhile, and says to the one who asks so much that it is busy.
+TEST_F(ShippedPolicy, CallsThatWaitForPolkitHoldUpNobodyAndAreFew) {
+  const Polkit polkit("");
+  const Call flood = [](sd_bus* bus, sd_bus_error* error) {
+    const auto keep = [](sd_bus_message* answer, void* errors, sd_bus_error*) {
+      if (const sd_bus_error* why = sd_bus_message_get_error(answer))
+        static_cast<std::vector<std::string>*>(errors)->emplace_back(why->name);
+      return 0;
+    };
+    std::vector<std::string> errors;
+    for (int i = 0; i < 80; ++i)
+      sd_bus_call_method_async(bus, nullptr, bus_name, object_path, interface_name, "MoveLeft",
+                               keep, &errors, nullptr);
+    for (int i = 0; errors.size() < 64 && i < 200; ++i)
+      if (sd_bus_process(bus, nullptr) == 0) sd_bus_wait(bus, 10'000);
+    if (std::ranges::count(errors, SD_BUS_ERROR_LIMITS_EXCEEDED) != 64)
+      sd_bus_error_set_const(error, "others.are.refused", "");
+  };
+  std::future<std::string> member =
+      std::async(std::launch::async, [&] { return error_of(Caller::member, flood); });
+  do {
+    EXPECT_EQ(error_of(Caller::root, interface_name, "MoveLeft"), "");
+  } while (member.wait_for(std::chrono::milliseconds(20)) != std::future_status::ready);
+  EXPECT_EQ(member.get(), "");
+}
+
+// Signals tell of the take and of who did something.
+TEST_F(ShippedPolicy, OnlyThoseWhoMayLookHearWhatChanges) {
+  for (const auto& [caller, hears] : {std::pair(Caller::nobody, false), {Caller::viewer, true}}) {
+    int is_ready[2];
+    ASSERT_EQ(pipe(is_ready), 0);
+    const Call listen = [&](sd_bus* bus, sd_bus_error* error) {
+      bool has_heard = false;
+      sd_bus_match_signal(
+          bus, nullptr, bus_name, object_path, nullptr, nullptr,
+          [](sd_bus_message*, void* heard, sd_bus_error*) {
+            return *static_cast<bool*>(heard) = true, 0;
+          },
+          &has_heard);
+      const char is_listening = 1;
+      if (write(is_ready[1], &is_listening, 1) != 1) return;
+      for (int i = 0; !has_heard && i < 30; ++i)
+        if (sd_bus_process(bus, nullptr) == 0) sd_bus_wait(bus, 10'000);
+      if (has_heard) sd_bus_error_set_const(error, "it.heard", "");
+    };
+    std::future<std::string> listener =
+        std::async(std::launch::async, [&, who = caller] { return error_of(who, listen); });
+    char is_listening = 0;
+    ASSERT_EQ(read(is_ready[0], &is_listening, 1), 1);
+    EXPECT_EQ(error_of(Caller::root, interface_name, hears ? "MoveLeft" : "MoveRight"), "");
+    EXPECT_EQ(listener.get(), hears ? "it.heard" : "");
+    close(is_ready[0]);
+    close(is_ready[1]);
+  }
 }
 
 // Who could own the name could pretend to be the rig.

@@ -1,9 +1,11 @@
 // Processes that foreign files are read in: what they have in reach, and what their end costs.
+#include <fcntl.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <thread>
@@ -79,7 +81,7 @@ TEST_F(SupervisedDeathTest, AFileThatALibraryNeverEndsWithEndsTheCommand) {
   const auto hang = [] {
     { const box::Reading before("other.mov"); }
     const box::Reading reading("clip.mov");
-    for (;;) ::pause();
+    for (std::atomic<int> i = 0;; ++i) continue;
     return 0;
   };
   EXPECT_EXIT(run(hang), ExitedWithCode(1),
@@ -87,23 +89,65 @@ TEST_F(SupervisedDeathTest, AFileThatALibraryNeverEndsWithEndsTheCommand) {
 }
 
 TEST_F(SupervisedDeathTest, AFileThatTakesAllMemoryEndsTheCommand) {
-  supervision_.most_memory = 1;
-  const auto hang = [] {
+  supervision_.most_memory = 1 << 24;
+  const auto grow = [] {
     const box::Reading reading("clip.mov");
-    for (;;) ::pause();
+    std::vector<char> all;
+    for (std::size_t size = 1 << 22; size < 1 << 28; size += 1 << 22) {
+      all.resize(size, 'x');
+      std::this_thread::sleep_for(std::chrono::milliseconds(150));
+    }
     return 0;
   };
-  EXPECT_EXIT(run(hang), ExitedWithCode(1),
-              "a file took more memory than three quarters of this computer's, while it read clip");
+  EXPECT_EXIT(run(grow), ExitedWithCode(1),
+              "one file took more than half of this computer's memory, while it read clip");
+}
+
+// As where a disk stands still.
+TEST_F(SupervisedDeathTest, AReadingThatWaitsIsLeftAlone) {
+  supervision_.longest_reading = std::chrono::milliseconds(500);
+  const auto wait = [] {
+    const box::Reading reading("clip.mov");
+    std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+    return 0;
+  };
+  EXPECT_EXIT(run(wait), ExitedWithCode(0), "^$");
+}
+
+// It has what it wrote there in common with the one that waits for it.
+TEST_F(SupervisedDeathTest, WhateverTheWorkWritesIntoItsNotesItsEndIsSaid) {
+  const auto crash = [] {
+    box::ReadingNotes* const all = box::reading_notes;
+    for (box::ReadingNotes::Note& note : all->notes) note.file.fill('x');
+    all->newest = 4'000'000'000;
+    std::signal(SIGSEGV, SIG_DFL);
+    std::raise(SIGSEGV);
+    return 0;
+  };
+  EXPECT_EXIT(run(crash), ExitedWithCode(1), "Segmentation fault; what it read last is xxx");
+}
+
+TEST_F(SupervisedDeathTest, OfFilesThatAreReadAtOnceAllAreNamed) {
+  const auto crash = [] {
+    const box::Reading a("good.mov"), b("bad.exr");
+    std::signal(SIGSEGV, SIG_DFL);
+    std::raise(SIGSEGV);
+    return 0;
+  };
+  EXPECT_EXIT(run(crash), ExitedWithCode(1), "while it read one of bad.exr, good.mov\\. If it");
 }
 
 // A render may take as long, and as much, as it likes.
-TEST_F(SupervisedDeathTest, WorkThatReadsNothingIsLeftAlone) {
-  supervision_.longest_reading = std::chrono::milliseconds(1);
-  supervision_.most_memory = 1;
+TEST_F(SupervisedDeathTest, WorkThatReadsOneFileAfterAnotherIsLeftAlone) {
+  supervision_.longest_reading = std::chrono::milliseconds(1500);
+  supervision_.most_memory = 1 << 24;
   const auto work = [] {
-    { const box::Reading reading("clip.mov"); }
-    std::this_thread::sleep_for(std::chrono::milliseconds(2200));
+    const std::vector<char> before(1 << 26, 'x');
+    for (int i = 0; i < 22; ++i) {
+      const box::Reading reading("clip.mov");
+      const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(100);
+      while (std::chrono::steady_clock::now() < end) continue;
+    }
     return 0;
   };
   EXPECT_EXIT(run(work), ExitedWithCode(0), "^$");
@@ -141,6 +185,8 @@ TEST_F(SupervisedDeathTest, ConfinedItWritesWhereItMayAndHasNoNetworkAndNoProgra
     std::ofstream(directory_ / "others/secret") << "changed";
     std::error_code refused;
     fs::remove(directory_ / "others/secret", refused);
+    fs::resize_file(directory_ / "others/secret", 0, refused);
+    ::close(::open((directory_ / "others/secret").c_str(), O_RDONLY | O_TRUNC));
     const bool is_kept = test::content_of(directory_ / "others/secret") == "text" &&
                          test::content_of(directory_ / "mine/folder/b") == "text";
     const bool has_network =

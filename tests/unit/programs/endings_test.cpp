@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/support/content_of.hpp"
+#include "tests/support/environment_variable.hpp"
 #include "tests/support/program.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -94,44 +95,62 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& name) { return name_of(name.param); });
 
 // Commands that are confined write where they were asked to, also by links and by names of their
-// own; not in /tmp, where anybody may.
+// own. Each has a folder of its own for what it reads and makes, so that none is in reach by
+// another name, and not in /tmp, where anybody may write.
 TEST_F(Ending, ConfinedCommandsWriteWhereTheyWereAskedTo) {
   const fs::path folder = fs::path(PREVIZ_BINARY_DIR) / "tests/confined";
   fs::remove_all(folder);
-  fs::create_directories(folder / "real");
-  fs::create_directory_symlink("real", folder / "link");
-  fs::copy(directory_ / "session", folder / "take", fs::copy_options::recursive);
+  for (const char* made : {"home", "takes", "other_disk", "sets", "footage", "links"})
+    fs::create_directories(folder / made);
+  const test::EnvironmentVariable home("HOME", folder / "home");
+  const test::EnvironmentVariable cache("XDG_CACHE_HOME", ""), mesa("MESA_SHADER_CACHE_DIR", "");
+  for (const char* take : {"takes/a", "other_disk/b"})
+    fs::copy(directory_ / "session", folder / take, fs::copy_options::recursive);
+  fs::create_directory_symlink("../other_disk/b", folder / "takes/b");
   for (const char* file : {"set.toml", "floor.gltf", "card.gltf"})
-    fs::copy(directory_ / file, folder / file);
-  cv::imwrite(folder / "0.png", cv::Mat(36, 48, CV_8UC3, cv::Scalar(9, 9, 9)));
-  std::ofstream(folder / "frames.json")
+    fs::copy(directory_ / file, folder / "sets" / file);
+  std::ofstream(folder / "sets/other.toml") << test::content_of(folder / "sets/set.toml")
+                                            << "\n[output]\ndirectory = \"../by/the/set\"\n";
+  cv::imwrite(folder / "footage/0.png", cv::Mat(36, 48, CV_8UC3, cv::Scalar(9, 9, 9)));
+  std::ofstream(folder / "footage/frames.json")
       << R"({"observer": {"fps": 25, "start_ns": 0, "exposure": 1, "pictures": ["0.png"]}})";
+  // Returns a link to a folder, whose own name nobody gives.
+  const auto link_to = [&](const std::string& name) {
+    fs::create_directories(folder / "behind" / name);
+    fs::create_directory_symlink("../behind/" + name, folder / "links" / name);
+    return folder / "links" / name;
+  };
   const auto run = [&](std::vector<std::string> words) {
     words.insert(words.begin(), "daemon/previzd");
     const test::Ended ended = test::run_program(words);
     EXPECT_EQ(ended.status, 0) << ended.said;
+    EXPECT_THAT(ended.said, Not(HasSubstr("cannot be kept"))) << ended.said;
   };
-  run({"import", folder / "frames.json", folder / "new/a/take"});
-  run({"import", folder / "frames.json", folder / "link/take"});
-  run({"export", folder / "take", folder / "link"});
-  run({"export", folder / "take", folder / "exported/here"});
-  run({"track", folder / "take", "--out", folder / "link/track.jsonl"});
-  run({"render", folder / "take", "--spp", "1", "--out", folder / "rendered/here"});
-  std::ofstream(folder / "other.toml")
-      << test::content_of(folder / "set.toml") << "\n[output]\ndirectory = \"by/the/set\"\n";
-  run({"render", folder / "take", "--spp", "1", "--set", folder / "other.toml"});
-  run({"takes", "mark", folder / "take"});
-  run({"takes", "copy", folder / "take", "--to", folder / "copies/here"});
-  run({"calibrate", "lens", "--set", folder / "set.toml", "--focal-length", "35", "--f-number", "2",
-       "--focus", "2", "--sensor-width", "36", "--out", folder / "tables.toml"});
-  run({"farm", folder / "take", "--spp", "1", "--out", folder / "night", "--job",
-       folder / "night.farm", "--openjd", folder / "night.json"});
-  run({"farm", "task", folder / "night.farm", "0"});
-  run({"farm", "finish", folder / "night.farm"});
+  const fs::path take = folder / "takes/a", set = folder / "sets/set.toml";
+  run({"import", folder / "footage/frames.json", folder / "new/a/take"});
+  run({"import", folder / "footage/frames.json", link_to("import") / "take"});
+  run({"export", take, link_to("export")});
+  run({"export", take, folder / "exported/here"});
+  run({"track", take, "--out", link_to("track") / "track.jsonl"});
+  run({"render", take, "--spp", "1", "--frames", "1", "--out", folder / "rendered/here"});
+  run({"render", take, "--spp", "1", "--frames", "1", "--set", folder / "sets/other.toml"});
+  run({"render", folder / "takes", "--all", "--spp", "1", "--frames", "1", "--out",
+       link_to("night")});
+  run({"render", folder / "takes", "--all", "--spp", "1", "--frames", "2"});
+  run({"takes", "mark", take});
+  run({"takes", "copy", take, "--to", folder / "copies/here"});
+  run({"calibrate", "lens", "--set", set, "--focal-length", "35", "--f-number", "2", "--focus", "2",
+       "--sensor-width", "36", "--out", link_to("tables") / "lens.toml"});
+  run({"farm", take, "--spp", "1", "--frames", "1", "--out", folder / "jobs/night", "--job",
+       folder / "jobs/night.farm", "--openjd", folder / "night.json"});
+  run({"farm", "task", folder / "jobs/night.farm", "0"});
+  run({"farm", "finish", folder / "jobs/night.farm"});
   for (const char* made :
-       {"new/a/take/session.toml", "real/take/session.toml", "real/camera.usda",
-        "exported/here/camera.usda", "real/track.jsonl", "rendered/here/0000.png",
-        "by/the/set/0000.png", "copies/here/take/session.toml", "tables.toml", "night/0000.png"})
+       {"home/.cache/previzd", "new/a/take/session.toml", "behind/import/take/session.toml",
+        "behind/export/camera.usda", "exported/here/camera.usda", "behind/track/track.jsonl",
+        "rendered/here/0001.png", "by/the/set/0001.png", "behind/night/b/0001.png",
+        "other_disk/b/out/0002.png", "copies/here/a/session.toml", "behind/tables/lens.toml",
+        "jobs/night/0001.png"})
     EXPECT_TRUE(fs::exists(folder / made)) << made;
   fs::remove_all(folder);
 }
