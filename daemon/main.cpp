@@ -4,6 +4,7 @@
 // be understood; 75 the service wants to be started again, because another version was installed,
 // or the driver of the graphics card was loaded; 128 + N stopped by signal N (what was finished is
 // on disk, and a render goes on there when it is called again).
+#include <pwd.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -204,8 +205,10 @@ void confine(std::vector<std::filesystem::path> written) {
     written.push_back(cache.parent_path());
     written.push_back(cache);
   }
+  if (const passwd* const user = ::getpwuid(::getuid()))  // where Mesa's is, whatever HOME says
+    written.push_back(std::filesystem::path(user->pw_dir) / ".cache");
   for (const char* name : {"MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH"})
-    if (const char* const folder = std::getenv(name))
+    if (const char* const folder = std::getenv(name); folder && *folder == '/')
       written.push_back(output::existing_part(folder));
   const auto try_to = [](const char* otherwise, const std::function<void()>& call) {
     try {

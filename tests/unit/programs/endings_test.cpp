@@ -103,7 +103,7 @@ TEST_F(Ending, ConfinedCommandsWriteWhereTheyWereAskedTo) {
   for (const char* made : {"home", "takes", "other_disk", "sets", "footage", "links"})
     fs::create_directories(folder / made);
   const test::EnvironmentVariable home("HOME", folder / "home");
-  const test::EnvironmentVariable cache("XDG_CACHE_HOME", ""), mesa("MESA_SHADER_CACHE_DIR", "");
+  const test::EnvironmentVariable cache("XDG_CACHE_HOME", folder / "home/.cache");
   for (const char* take : {"takes/a", "other_disk/b"})
     fs::copy(directory_ / "session", folder / take, fs::copy_options::recursive);
   fs::create_directory_symlink("../other_disk/b", folder / "takes/b");
