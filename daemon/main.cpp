@@ -258,6 +258,9 @@ int do_line(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  // Its other lines would come between ours. libcamera's logSetLevel("*", ...) changes nothing in
+  // 0.0.3 (Debian 12), which looks for a category of that name.
+  ::setenv("LIBCAMERA_LOG_LEVELS", "*:ERROR", /*overwrite=*/0);
   const SafeOutput out(std::cout), errors(std::cerr);
   return finished_output("previzd", do_line(argc, argv));
 }

@@ -18,7 +18,7 @@ namespace {
 
 constexpr const char* denied_error = "org.previz.Error.Denied";
 constexpr std::size_t most_waiting = 1024, most_waiting_of_one = 16;
-constexpr std::uint64_t longest_answer_us = 3'000'000;
+constexpr std::uint64_t longest_answer_us = 20'000'000;  // polkit may have to be started
 
 // Asks only this computer: a directory of users may be far away, and the rig's loop waits for none.
 std::map<std::uint32_t, std::string> users_of_this_computer() try {
@@ -97,8 +97,7 @@ class Callers::Waiting {
     if (sd_bus_message_is_method_error(answer, nullptr) != 0 ||
         sd_bus_message_read(answer, "u", &user) < 0)
       return deny("the bus does not say who you are");
-    const auto known = callers_.names_.find(user);
-    who_ = known != callers_.names_.end() ? known->second : "uid " + std::to_string(user);
+    who_ = callers_.name_of(user);
     if (user == 0 || user == ::geteuid()) return allow();
     const auto others = std::ranges::count_if(
         callers_.waiting_, [&](const Waiting& waiting) { return waiting.who_ == who_; });
@@ -113,8 +112,9 @@ class Callers::Waiting {
 
   int know_verdict(sd_bus_message* answer) {
     int is_allowed = 0, may_be_asked = 0;
-    if (sd_bus_message_is_method_error(answer, nullptr) != 0)
-      return deny("polkit does not respond, so that only root may; apt-get install polkitd");
+    if (const sd_bus_error* const error = sd_bus_message_get_error(answer))
+      return deny("polkit does not respond, so that only root may; apt-get install polkitd (" +
+                  std::string(error->message ? error->message : error->name) + ")");
     if (sd_bus_message_enter_container(answer, 'r', "bba{ss}") < 0 ||
         sd_bus_message_read(answer, "bb", &is_allowed, &may_be_asked) < 0 || is_allowed == 0)
       return deny(
@@ -147,9 +147,13 @@ class Callers::Waiting {
   sd_bus_slot* slot_ = nullptr;
 };
 
-Callers::Callers(sd_bus* bus, Denied denied)
-    : bus_(bus), denied_(std::move(denied)), names_(users_of_this_computer()) {}
+Callers::Callers(sd_bus* bus, Denied denied) : bus_(bus), denied_(std::move(denied)) {}
 Callers::~Callers() = default;
+
+std::string Callers::name_of(std::uint32_t user) {
+  if (!names_.contains(user)) names_ = users_of_this_computer();
+  return names_.contains(user) ? names_[user] : "uid " + std::to_string(user);
+}
 
 int Callers::admit(sd_bus_message* call, const std::string& verb, Act act) {
   if (waiting_.size() >= most_waiting) return refuse(call);

@@ -28,7 +28,7 @@ class Callers {
   Callers(const Callers&) = delete;
   Callers& operator=(const Callers&) = delete;
 
-  // Calls `act` with the caller's name, "anna", or "uid 1000" if /etc/passwd had none, once it is
+  // Calls `act` with the caller's name, "anna", or "uid 1000" if /etc/passwd has none, once it is
   // known that it may do `verb`: root and this process's own user may, others if polkit says so.
   // Whoever may not gets the error org.previz.Error.Denied, and whoever calls while 16 calls of his
   // wait for polkit, or 1024 of all, LimitsExceeded. Does not wait. Returns what a handler of
@@ -38,9 +38,11 @@ class Callers {
  private:
   class Waiting;
 
+  std::string name_of(std::uint32_t user);
+
   sd_bus* const bus_;
   const Denied denied_;
-  const std::map<std::uint32_t, std::string> names_;  // of users
+  std::map<std::uint32_t, std::string> names_;  // of users, since somebody was unknown
   std::list<Waiting> waiting_;
 };
 

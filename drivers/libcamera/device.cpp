@@ -9,7 +9,6 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <map>
 #include <memory>
@@ -33,8 +32,6 @@ class ManagerUse {
   ManagerUse() {
     const std::lock_guard lock(mutex());
     if (users()++ > 0) return;
-    // Its other lines would come between those of a command; whoever asks for them has them.
-    if (!std::getenv("LIBCAMERA_LOG_LEVELS")) lc::logSetLevel("*", "ERROR");
     manager() = std::make_unique<lc::CameraManager>();
     manager()->start();
   }

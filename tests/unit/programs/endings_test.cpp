@@ -181,6 +181,12 @@ TEST_F(Ending, WordsOfOthersAreShownAndNotObeyed) {
   }
 }
 
+TEST_F(Ending, NoLinesOfLibcameraComeBetweenThoseOfACommand) {
+  const test::Ended ended = test::run_program({"daemon/previzd", "devices"});
+  EXPECT_THAT(ended.said, AllOf(HasSubstr("cameras"), Not(HasSubstr("libcamera v")),
+                                Not(HasSubstr("IPAManager"))));
+}
+
 TEST_F(Ending, ActionsAreATable) {
   const test::Ended ended = test::run_program({"daemon/control/previzctl", "actions"});
   EXPECT_THAT(ended.said, AllOf(HasSubstr("record"), Not(HasSubstr("\\x"))));
