@@ -2,6 +2,7 @@
 #include "daemon/control/bus.hpp"
 
 #include <grp.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <systemd/sd-bus.h>
 #include <systemd/sd-event.h>
@@ -227,7 +228,9 @@ class Polkit {
   }
   ~Polkit() {
     thread_ = {};
-    sd_bus_flush_close_unref(bus_);
+    sd_bus_flush(bus_);
+    ::shutdown(sd_bus_get_fd(bus_), SHUT_RDWR);  // callers that were forked meanwhile have it too
+    sd_bus_close_unref(bus_);
   }
   Polkit(const Polkit&) = delete;
   Polkit& operator=(const Polkit&) = delete;
