@@ -3,6 +3,7 @@
 
 #include <grp.h>
 #include <sys/socket.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <systemd/sd-bus.h>
 #include <systemd/sd-event.h>
@@ -188,7 +189,7 @@ TEST_F(RigOnTheBus, EveryActionIsAMethodAndEveryChangeASignal) {
 }
 
 // The policy that the package ships, for groups that there are on any machine instead of previz and
-// previz-view, and for a polkit of root's.
+// previz-view, and for a polkit of nobody's.
 class PolicyFile {
  protected:
   PolicyFile() {
@@ -196,8 +197,9 @@ class PolicyFile {
     replace(text, "group=\"previz\"", std::string("group=\"") + crew + '"');
     replace(text, "group=\"previz-view\"", std::string("group=\"") + viewers + '"');
     replace(text, "</busconfig>",
-            "<policy user=\"root\"><allow own=\"org.freedesktop.PolicyKit1\"/><allow "
-            "send_destination=\"org.freedesktop.PolicyKit1\"/></policy></busconfig>");
+            "<policy user=\"nobody\"><allow own=\"org.freedesktop.PolicyKit1\"/></policy><policy "
+            "user=\"root\"><allow send_destination=\"org.freedesktop.PolicyKit1\"/></policy>"
+            "</busconfig>");
     std::ofstream(policy_) << text;
   }
   static void replace(std::string& text, const std::string& what, const std::string& with) {
@@ -217,7 +219,11 @@ class Polkit {
         SD_BUS_METHOD("CheckAuthorization", "(sa{sv})sa{ss}us", "(bba{ss})", answer,
                       SD_BUS_VTABLE_UNPRIVILEGED),
         SD_BUS_VTABLE_END};
+    // Of this thread alone, whose user the bus asks the kernel for.
+    constexpr uid_t root = 0, nobody = 65534, same = static_cast<uid_t>(-1);
+    ::syscall(SYS_setresuid, same, nobody, same);
     sd_bus_open_system(&bus_);
+    ::syscall(SYS_setresuid, same, root, same);
     sd_bus_add_object_vtable(bus_, nullptr, "/org/freedesktop/PolicyKit1/Authority",
                              "org.freedesktop.PolicyKit1.Authority", methods, this);
     sd_bus_request_name(bus_, "org.freedesktop.PolicyKit1", 0);
