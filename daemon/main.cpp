@@ -199,7 +199,7 @@ void confine(std::vector<std::filesystem::path> written) {
                               std::string(device) + " yet"});
   for (const char* folder : {"/dev", "/proc", "/tmp", "/var/tmp"}) written.emplace_back(folder);
   written.push_back(std::filesystem::temp_directory_path(none));
-  // Of compiled shaders, ours and those of the drivers.
+  // Compiled shaders are kept there, ours and those of the drivers.
   if (const auto cache = render::cache_folder(); !cache.empty()) {
     std::filesystem::create_directories(cache, none);
     written.push_back(cache.parent_path());

@@ -105,7 +105,7 @@ class Watch {
   }
 
  private:
-  // What was seen of a reading the first time.
+  // A reading, as it was seen the first time.
   struct Seen {
     std::uint32_t count = 0;
     std::chrono::milliseconds work{0};  // of its thread, until then

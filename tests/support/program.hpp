@@ -24,7 +24,7 @@ struct Ended {
   bool ran_over = false;  // its time was over, and it was killed
   double seconds = 0;     // that it ran, by the clock
   std::string said;       // on standard output and standard error
-  // Of the process that did its work when a signal was sent to that: /proc/PID/status.
+  // The /proc/PID/status of the process that did its work, when that was sent a signal.
   std::string worker_status;
 };
 

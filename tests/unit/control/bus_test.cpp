@@ -219,7 +219,7 @@ class Polkit {
         SD_BUS_METHOD("CheckAuthorization", "(sa{sv})sa{ss}us", "(bba{ss})", answer,
                       SD_BUS_VTABLE_UNPRIVILEGED),
         SD_BUS_VTABLE_END};
-    // Of this thread alone, whose user the bus asks the kernel for.
+    // The user of this thread alone is another one, and the bus asks the kernel for it.
     constexpr uid_t root = 0, nobody = 65534, same = static_cast<uid_t>(-1);
     ::syscall(SYS_setresuid, same, nobody, same);
     sd_bus_open_system(&bus_);

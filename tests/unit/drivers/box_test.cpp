@@ -24,6 +24,12 @@ namespace previz::box_test {
 namespace fs = std::filesystem;
 using testing::ExitedWithCode;
 
+// Ends the process as a fault of a library does, also where a sanitizer has a handler of its own.
+int crash(int signal) {
+  std::signal(signal, SIG_DFL);
+  return std::raise(signal);
+}
+
 class SupervisedDeathTest : public testing::Test {
  protected:
   SupervisedDeathTest() {
@@ -45,16 +51,14 @@ TEST_F(SupervisedDeathTest, EndsAsItsWorkDoes) {
 }
 
 TEST_F(SupervisedDeathTest, ACrashIsALineAndLeavesNothingHalfDone) {
-  const auto crash = [&] {
+  const auto work = [&] {
     const session::DraftFolder draft(directory_ / "take");
     std::ofstream(draft.path() / "observer.mkv") << "half of it";
     const box::Reading reading("clip.mov");
-    std::signal(SIGSEGV, SIG_DFL);  // a sanitizer has its own
-    std::raise(SIGSEGV);
-    return 0;
+    return crash(SIGSEGV);
   };
   EXPECT_EXIT(
-      run(crash), ExitedWithCode(1),
+      run(work), ExitedWithCode(1),
       "previzd: the command was stopped: Segmentation fault, while it read clip.mov. If it ends so "
       "again, this file is damaged or meets a fault of a library: export it again, or do without "
       "it\n$");
@@ -66,13 +70,11 @@ TEST_F(SupervisedDeathTest, ACrashWhileNothingIsReadBlamesNoFile) {
   supervision_.when_stopped = [](pid_t worker, const std::string& words) {
     return worker > 0 && words.ends_with("is clip.mov") ? 75 : 1;
   };
-  const auto crash = [&] {
+  const auto work = [&] {
     { const box::Reading reading("clip.mov"); }
-    std::signal(SIGABRT, SIG_DFL);
-    std::raise(SIGABRT);
-    return 0;
+    return crash(SIGABRT);
   };
-  EXPECT_EXIT(run(crash), ExitedWithCode(75),
+  EXPECT_EXIT(run(work), ExitedWithCode(75),
               "the command was stopped: Aborted; what it read last is clip.mov\n$");
 }
 
@@ -95,7 +97,7 @@ TEST_F(SupervisedDeathTest, AFileThatTakesAllMemoryEndsTheCommand) {
     std::vector<char> all;
     for (std::size_t size = 1 << 22; size < 1 << 28; size += 1 << 22) {
       all.resize(size, 'x');
-      std::this_thread::sleep_for(std::chrono::milliseconds(150));
+      std::this_thread::sleep_for(std::chrono::milliseconds(150));  // it is looked at every second
     }
     return 0;
   };
@@ -103,12 +105,12 @@ TEST_F(SupervisedDeathTest, AFileThatTakesAllMemoryEndsTheCommand) {
               "one file took more than half of this computer's memory, while it read clip");
 }
 
-// As where a disk stands still.
+// A disk that stands still makes a reading last, without any work.
 TEST_F(SupervisedDeathTest, AReadingThatWaitsIsLeftAlone) {
   supervision_.longest_reading = std::chrono::milliseconds(500);
   const auto wait = [] {
     const box::Reading reading("clip.mov");
-    std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+    std::this_thread::sleep_for(std::chrono::milliseconds(2500));  // it is looked at every second
     return 0;
   };
   EXPECT_EXIT(run(wait), ExitedWithCode(0), "^$");
@@ -116,25 +118,21 @@ TEST_F(SupervisedDeathTest, AReadingThatWaitsIsLeftAlone) {
 
 // It has what it wrote there in common with the one that waits for it.
 TEST_F(SupervisedDeathTest, WhateverTheWorkWritesIntoItsNotesItsEndIsSaid) {
-  const auto crash = [] {
+  const auto work = [] {
     box::ReadingNotes* const all = box::reading_notes;
     for (box::ReadingNotes::Note& note : all->notes) note.file.fill('x');
     all->newest = 4'000'000'000;
-    std::signal(SIGSEGV, SIG_DFL);
-    std::raise(SIGSEGV);
-    return 0;
+    return crash(SIGSEGV);
   };
-  EXPECT_EXIT(run(crash), ExitedWithCode(1), "Segmentation fault; what it read last is xxx");
+  EXPECT_EXIT(run(work), ExitedWithCode(1), "Segmentation fault; what it read last is xxx");
 }
 
 TEST_F(SupervisedDeathTest, OfFilesThatAreReadAtOnceAllAreNamed) {
-  const auto crash = [] {
+  const auto work = [] {
     const box::Reading a("good.mov"), b("bad.exr");
-    std::signal(SIGSEGV, SIG_DFL);
-    std::raise(SIGSEGV);
-    return 0;
+    return crash(SIGSEGV);
   };
-  EXPECT_EXIT(run(crash), ExitedWithCode(1), "while it read one of bad.exr, good.mov\\. If it");
+  EXPECT_EXIT(run(work), ExitedWithCode(1), "while it read one of bad.exr, good.mov\\. If it");
 }
 
 // A render may take as long, and as much, as it likes.

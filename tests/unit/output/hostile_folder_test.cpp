@@ -65,6 +65,7 @@ TEST_P(RecorderAmong, LosesNoFrame) {
     next->sequence = 100 + i;
     next->timestamp_ns += static_cast<std::int64_t>(i) * 40'000'000;
     next->arrival_ns = next->timestamp_ns + 5'000'000;
+    // A camera gives its frames at its rate.
     std::this_thread::sleep_until(begin + i * std::chrono::milliseconds(40));
     recorder.offer(next);
   }
