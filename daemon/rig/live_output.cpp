@@ -31,6 +31,7 @@ void count_picture(const Shot& shot, pipeline::Metrics& metrics, report::Reports
   const render::Counters& counters = shot.counters;
   if (counters.rebuilt_trees > 0)
     metrics.count("trees of deforming meshes rebuilt", counters.rebuilt_trees);
+  if (counters.below_zero > 0) metrics.count("pixels without light left", counters.below_zero);
   if (counters.dropped_not_finite + counters.dropped_negative + counters.stopped_in_layers +
           counters.unfinished ==
       0)
