@@ -25,6 +25,12 @@ std::string framed(const std::string& before, const std::string& text, const std
   return text.empty() ? "" : before + text + after;
 }
 
+// "1 frame dropped", "2 frames dropped"; "" of none.
+std::string counted(const std::string& number, const std::string& noun,
+                    const std::string& after = "") {
+  return framed("", number, " " + noun + (number == "1" ? "" : "s") + after);
+}
+
 std::string mode_words(const Properties& rig) {
   const std::string mode = known(rig, "Mode");
   const std::string since = known(rig, "LoadingSeconds");
@@ -37,7 +43,7 @@ std::string picture_words(const Properties& rig) {
   return joined({age.starts_with('-')                            ? "none shown yet"
                  : age.empty() && rig.contains("PictureSeconds") ? "shown just now"
                                                                  : framed("shown ", age, " s ago"),
-                 framed("", known(rig, "Samples"), " samples per pixel")});
+                 counted(known(rig, "Samples"), "sample", " per pixel")});
 }
 
 std::string take_words(const Properties& rig) {
@@ -48,8 +54,8 @@ std::string take_words(const Properties& rig) {
       joined({framed("", known(rig, "BehindSeconds"), " s behind the cameras"),
               framed("", known(rig, "BehindMegabytes"), " MB in memory")});
   return joined({name, is("TakeGood") ? "good" : "", framed("", known(rig, "TakeSeconds"), " s"),
-                 framed("", known(rig, "TakeFrames"), " frames"),
-                 framed("", known(rig, "TakeDropped"), " frames dropped"),
+                 counted(known(rig, "TakeFrames"), "frame"),
+                 counted(known(rig, "TakeDropped"), "frame", " dropped"),
                  is("Recording") ? "being recorded"
                  : is("Writing") ? "still being written"
                                  : "",

@@ -184,7 +184,7 @@ TEST(StatusWords, SayWhatMattersAndNothingElse) {
                                                        {"BehindMegabytes", "0"},
                                                        {"Fault", ""},
                                                        {"CameraLost", "no"},
-                                                       {"Samples", "4"},
+                                                       {"Samples", "1"},
                                                        {"Set", "demo"},
                                                        {"Object", "vase"},
                                                        {"Light", ""},
@@ -195,7 +195,7 @@ TEST(StatusWords, SayWhatMattersAndNothingElse) {
                                                        {"LoadingSeconds", "0.0"}});
   EXPECT_EQ(words, (std::vector<std::string>{
                        "mode: live", "set: demo", "drawn by: llvmpipe (CPU)",
-                       "picture: shown 0.4 s ago, 4 samples per pixel",
+                       "picture: shown 0.4 s ago, 1 sample per pixel",
                        "take: 1A_take002, good, 4.8 s, 120 frames, 56 frames dropped",
                        "selected: object vase", "model: 0.3 px (90 % 0.8)",
                        "last message: button red: recording ended"}));

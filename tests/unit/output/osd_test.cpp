@@ -92,8 +92,7 @@ TEST(OsdPainter, NoticesBeyondTheScreenAreCounted) {
   EXPECT_LT(boxes.size(), 100u);
   EXPECT_GT(boxes.size(), 5u);
   page.notices.resize(boxes.size());
-  const OsdText last{std::to_string(100 - boxes.size() + 1) + " more in the log",
-                     OsdTone::warning};
+  const OsdText last{std::to_string(100 - boxes.size() + 1) + " more in the log", OsdTone::warning};
   page.notices.back() = last;
   const std::vector<Overlay> said = painter.paint(page);
   ASSERT_EQ(said.size(), boxes.size());
