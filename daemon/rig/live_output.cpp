@@ -71,10 +71,9 @@ void LiveOutput::record_shown(const Shot& shot) {
 
 void LiveOutput::write_snapshot(const Shot& shot) const {
   try {
-    parts_.kept.reports(
-        {Severity::info, "snapshot", rig::write_snapshot(shot, calibrated_).string()});
+    parts_.inbox.post({rig::write_snapshot(shot, calibrated_).string() + ".exr and .png", true});
   } catch (const std::exception& error) {
-    parts_.kept.reports({Severity::error, "snapshot", reason_of(error)});
+    parts_.inbox.post({reason_of(error), false});
   }
 }
 
