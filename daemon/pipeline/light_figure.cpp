@@ -9,6 +9,8 @@
 #include <glm/vector_relational.hpp>
 #include <utility>
 
+#include "drivers/error.hpp"
+
 namespace previz::pipeline {
 namespace {
 
@@ -29,6 +31,16 @@ struct Tile {
   glm::dvec3 model{0}, picture{0};
   std::size_t pixels = 0;
 };
+
+// "1.1 1.6 1.9"
+std::string factors(const LightFigure& figure) {
+  std::string all;
+  for (glm::length_t c = 0; c < 3; ++c) {
+    const double ratio = figure.ratio[c];
+    add_to_list(all, ratio < 10 ? fmt::format("{:.2g}", ratio) : fmt::format("{:.0f}", ratio), " ");
+  }
+  return all;
+}
 
 }  // namespace
 
@@ -91,14 +103,14 @@ std::string light_remark(const LightFigure& figure) {
     is_off = is_off || (log > light_off_stops * std::log(2.0) && log > 3 * figure.sigma[c]);
   }
   if (!is_off) return {};
-  const auto factor = [](double ratio) {
-    return ratio < 10 ? fmt::format("{:.2g}", ratio) : fmt::format("{:.0f}", ratio);
-  };
   return fmt::format(
-      "the model under this light is {} {} {} times as bright as the picture (red, green, blue), "
-      "and shadows and virtual objects are as far off: previzd calibrate balance measures the "
-      "factors",
-      factor(figure.ratio.r), factor(figure.ratio.g), factor(figure.ratio.b));
+      "the model under this light is {} times as bright as the picture (red, green, blue), and "
+      "shadows and virtual objects are as far off: previzd calibrate balance measures the factors",
+      factors(figure));
+}
+
+std::string light_notice(const LightFigure& figure) {
+  return factors(figure) + " times the picture: calibrate balance";
 }
 
 }  // namespace previz::pipeline

@@ -26,6 +26,9 @@ inline constexpr double light_off_stops = 1.0 / 3;
 
 // Returns what is wrong with the light, in plain words; empty: it fits, as far as one can tell.
 std::string light_remark(const LightFigure& figure);
+// Returns the same for a display, if it is wrong: "1.1 1.6 1.9 times the picture: calibrate
+// balance".
+std::string light_notice(const LightFigure& figure);
 
 // Compares the layer `real` with the plate in pixels that nothing virtual covers and that show the
 // model, where no sample of the plate is black or clipped.

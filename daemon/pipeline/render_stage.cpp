@@ -240,6 +240,18 @@ void RenderStage::finish(Shot& shot) {
   shot.counters.below_zero = render::below_zero(*layers);
 }
 
+void RenderStage::compare_light(Shot shot, LightComparison& comparison) {
+  constexpr double width = 96;
+  constexpr int samples = 8;
+  const double scale = options_.scale;
+  const bool layers = std::exchange(options_.layers, true);  // so that it is not accumulated
+  resize(std::min(scale, width / calibration_.intrinsics.width));
+  if (begin(shot, true) && add_samples(samples))
+    comparison.add(renderer_->layers(), renderer_->plate(), *response_);
+  options_.layers = layers;
+  resize(scale);
+}
+
 void RenderStage::resize(double scale) {
   if (scale == options_.scale) return;
   renderer_->resize(scaled(calibration_, scale));

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/lighting/response.hpp"
+#include "daemon/pipeline/light_figure.hpp"
 #include "daemon/pipeline/relight.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/render/renderer.hpp"
@@ -105,6 +106,10 @@ class RenderStage {
 
   // Returns what renders, to be used by the stage of another set once this one has ended.
   const std::shared_ptr<render::Renderer>& renderer() const { return renderer_; }
+
+  // Renders a tracked and lit shot small, between two live ones, in which it changes nothing, and
+  // compares the model of what is real with its plate.
+  void compare_light(Shot shot, LightComparison& comparison);
 
   // use() and resize() take effect with the next begin(). `scale` is as in the options; only
   // one that is larger than all before it costs new buffers.

@@ -95,14 +95,14 @@ void describe_light(const pipeline::Take& take, const scene::Scene& scene, set::
   try {
     const auto device =
         render::open_device(render::options_for({}, take.set.quality.hardware_rays));
-    const LightJudgement judgement = light_of_take(take, scene, device);
-    if (const auto figure = judgement.figure())
-      out << fmt::format(
-          "\nlight: the model is {:.2f} {:.2f} {:.2f} times as bright as the picture "
-          "(red, green, blue)\n",
-          figure->ratio.r, figure->ratio.g, figure->ratio.b);
-    for (const std::string& doubt : judgement.doubts())
-      findings.remarks.push_back("light: " + doubt);
+    const auto figure = light_of_take(take, scene, device);
+    if (!figure) return;
+    out << fmt::format(
+        "\nlight: the model is {:.2f} {:.2f} {:.2f} times as bright as the picture "
+        "(red, green, blue)\n",
+        figure->ratio.r, figure->ratio.g, figure->ratio.b);
+    if (const std::string remark = pipeline::light_remark(*figure); !remark.empty())
+      findings.remarks.push_back("light: " + remark);
   } catch (const Error& error) {
     findings.remarks.push_back(std::string("the light was not compared with the pictures: ") +
                                error.what());

@@ -11,9 +11,7 @@ namespace previz::post {
 namespace {
 
 constexpr std::size_t most_compared = 12;  // frames
-constexpr std::size_t frames_rendered = 3;
-constexpr int rendered_samples = 8;
-constexpr double rendered_width = 96;
+constexpr std::size_t frames_compared = 3;
 // Noise alone takes a few dark pixels below 0.
 constexpr double worth_a_word = 1e-3;  // of a frame's pixels
 
@@ -37,7 +35,7 @@ void LightJudgement::add(const pipeline::Shot& shot) {
 
 std::vector<std::string> LightJudgement::doubts() const {
   std::vector<std::string> doubts;
-  if (const auto found = figure())
+  if (const auto found = comparison_.figure())
     if (std::string remark = pipeline::light_remark(*found); !remark.empty())
       doubts.push_back(std::move(remark));
   if (frames_below_zero_ > 0)
@@ -49,39 +47,28 @@ std::vector<std::string> LightJudgement::doubts() const {
   return doubts;
 }
 
-LightJudgement light_of_take(const pipeline::Take& take, const scene::Scene& scene,
-                             const std::shared_ptr<render::Device>& device,
-                             const std::stop_token& stop) {
+std::optional<pipeline::LightFigure> light_of_take(const pipeline::Take& take,
+                                                   const scene::Scene& scene,
+                                                   const std::shared_ptr<render::Device>& device) {
   set::Set set = take.set;
   set.estimation.estimator = set::Estimator::paired;
-  set.quality.denoise = false;
-  set.quality.samples = rendered_samples;
-  set.quality.adaptive = false;
-  set.quality.error = set.quality.seconds = 0;
-  pipeline::RenderStageOptions options;
-  options.layers = true;
-  options.scale = std::min(1.0, rendered_width / take.observer.intrinsics.width);
-  options.cancelled = [&] { return stop.stop_requested(); };
-  pipeline::RenderStage render(device, set, take.observer, scene, options);
-  LightJudgement judgement(take, options.scale);
+  pipeline::RenderStage render(device, set, take.observer, scene, {});
+  pipeline::LightComparison comparison;
   const std::size_t frames = take.observer_stream->records().size();
   std::size_t part = 0;
   pipeline::TakeShots shots(
       take,
-      {.wanted = [&](std::uint64_t frame) { return frame >= part * frames / frames_rendered; },
+      {.wanted = [&](std::uint64_t frame) { return frame >= part * frames / frames_compared; },
        .from_start = false,
-       .scene = &scene,
-       .stop = stop});
-  while (part < frames_rendered) {
+       .scene = &scene});
+  while (part < frames_compared) {
     std::optional<pipeline::Shot> shot = shots.next();
     if (!shot) break;
     if (!shot->track.pose || !shot->light) continue;
-    while (part < frames_rendered && shot->index >= part * frames / frames_rendered) ++part;
-    render(*shot);
-    shot->counters.below_zero = 0;  // by the noise of so few samples
-    if (shot->whole) judgement.add(*shot);
+    while (part < frames_compared && shot->index >= part * frames / frames_compared) ++part;
+    render.compare_light(*std::move(shot), comparison);
   }
-  return judgement;
+  return comparison.figure();
 }
 
 }  // namespace previz::post

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -26,7 +25,6 @@ class LightJudgement {
   // Takes a frame with its layers. Only the first dozen are compared with their plates.
   void add(const pipeline::Shot& shot);
 
-  std::optional<pipeline::LightFigure> figure() const { return comparison_.figure(); }
   // Returns what does not hold, in sentences of their own; empty: all is well.
   std::vector<std::string> doubts() const;
 
@@ -40,10 +38,10 @@ class LightJudgement {
   std::uint64_t most_below_zero_ = 0;    // pixels of a frame
 };
 
-// Renders three frames that are spread over the take, small, and judges its light by them; frames
-// without a pose or light are left out.
-LightJudgement light_of_take(const pipeline::Take& take, const scene::Scene& scene,
-                             const std::shared_ptr<render::Device>& device,
-                             const std::stop_token& stop = {});
+// Renders three frames that are spread over the take, small; frames without a pose or light are
+// left out.
+std::optional<pipeline::LightFigure> light_of_take(const pipeline::Take& take,
+                                                   const scene::Scene& scene,
+                                                   const std::shared_ptr<render::Device>& device);
 
 }  // namespace previz::post

@@ -438,6 +438,10 @@ Layers Renderer::layers() const {
   return layers;
 }
 
+const Plate& Renderer::plate() const {
+  return impl_->codes();
+}
+
 ToPresent Renderer::Impl::to_present(bool denoise) {
   if (!denoiser) denoiser.emplace(*device);
   shown_by();

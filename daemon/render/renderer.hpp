@@ -114,6 +114,8 @@ class Renderer {
   void separate_parts();
   // Returns the layers of the samples so far.
   Layers layers() const;
+  // Returns the current frame's plate at the size of its layers; valid until the next begin().
+  const Plate& plate() const;
   // Returns the composite of the samples so far through exposure and response, as the display shows
   // it: the plate's own bits where nothing virtual touches it. If the frame accumulates, the
   // picture is the mean with those before; layers are always those of the frame alone. With

@@ -18,6 +18,8 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds mode_delay{100};  // how late a change of mode may be noticed
 // A snapshot is of the first picture with virtual objects that comes within this time.
 constexpr std::chrono::seconds plates_patience{1};
+constexpr std::chrono::seconds light_interval{10};
+constexpr const char* light_fit = "light of the set";
 constexpr int most_round = 64;
 constexpr double round_s = 1;
 constexpr int most_samples = 1 << 24;  // above this the sums are no longer exact enough (P4)
@@ -200,14 +202,39 @@ std::optional<Shot> LiveRender::wait_for_frame(const Look& look) {
     if (!shot) return std::nullopt;
     start(look, *std::move(shot));
   }
-  const bool can_overlap = !wants_snapshot(look) && look.view == render::View::composite;
+  const bool is_light_due = !look.of_take && Clock::now() >= light_due_;
+  const bool can_overlap =
+      !wants_snapshot(look) && look.view == render::View::composite && !is_light_due;
   if (can_overlap && !under_way_.front().picture.is_here())
     if (std::optional<Shot> next =
             take_frame(look, /*is_to_be_rendered=*/true, std::chrono::milliseconds(0))) {
       metrics_.count("begun before the last picture was there");
       start(look, *std::move(next));
     }
-  return complete();
+  Shot shot = complete();
+  if (is_light_due && under_way_.empty() && shot.whole && shot.untouched.empty())
+    compare_light(shot);
+  return shot;
+}
+
+// Between two pictures, at a hundredth of the time at most.
+void LiveRender::compare_light(const Shot& shot) {
+  const auto begin = Clock::now();
+  pipeline::LightComparison comparison;
+  counting_failure(false, [&] { stage_->compare_light(shot, comparison); });
+  const auto took = Clock::now() - begin;
+  light_due_ = begin + std::max<Clock::duration>(light_interval, 100 * took);
+  metrics_.busy("light against picture", std::chrono::duration<double>(took).count());
+  const auto figure = comparison.figure();
+  if (!figure) return;
+  const std::string remark = pipeline::light_remark(*figure);
+  if (remark.empty()) return channels_.reports.settle(light_fit);
+  channels_.reports(
+      report::once({.severity = report::Severity::warning,
+                    .source = light_fit,
+                    .text = remark,
+                    .notice = report::Notice{report::Severity::warning, light_fit,
+                                             pipeline::light_notice(*figure), true}}));
 }
 
 bool LiveRender::wants_snapshot(const Look& look) const {

@@ -16,6 +16,7 @@
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/shot.hpp"
+#include "daemon/report/reports.hpp"
 #include "daemon/rig/controls.hpp"
 #include "daemon/rig/inbox.hpp"
 #include "daemon/rig/pass_meter.hpp"
@@ -34,6 +35,7 @@ class LiveRender {
     pipeline::Newest<pipeline::RecordedLook>& recorded_look;
     // Output: what each pass takes, while the overlay shows it.
     pipeline::Newest<std::optional<PassTimes>>& pass_times;
+    report::Reports& reports;  // of a light that does not fit the picture
   };
 
   // Returns where the pictures of this device are wanted; empty: they come down.
@@ -95,6 +97,7 @@ class LiveRender {
   };
   void start(const Look& look, pipeline::Shot shot);
   pipeline::Shot complete();
+  void compare_light(const pipeline::Shot& shot);
   bool wants_snapshot(const Look& look) const;
   render::DeviceTimes count_work();
   void measure(render::DeviceTimes times, bool is_round);
@@ -123,10 +126,12 @@ class LiveRender {
   bool is_first_ = true;  // no picture came of the stage yet; the first one compiles its pipelines
   // The last shots with pose and light, of the rig and of the take in review: their frames only.
   std::optional<pipeline::Shot> good_, good_of_take_;
-  session::SceneState recorded_;           // the scene that good_of_take_ was recorded with
-  pipeline::LightPtr found_in_;            // the light that the found lamps were published of
-  std::optional<pipeline::Shot> refined_;  // result of the last round, with layers
-  std::deque<UnderWay> under_way_;         // pictures that were started, at most two
+  session::SceneState recorded_;  // the scene that good_of_take_ was recorded with
+  pipeline::LightPtr found_in_;   // the light that the found lamps were published of
+  // When the light is compared with the picture again.
+  std::chrono::steady_clock::time_point light_due_;
+  std::optional<pipeline::Shot> refined_;            // result of the last round, with layers
+  std::deque<UnderWay> under_way_;                   // pictures that were started, at most two
   std::chrono::steady_clock::time_point completed_;  // when the last one was there
   bool refining_ = false;
   pipeline::Edits refined_edits_;

@@ -247,12 +247,14 @@ TEST_F(RenderSession, TheSetsOwnLightLightsEveryFrame) {
   EXPECT_NEAR(card.r / card.b, 3, 1e-4);
 }
 
+constexpr const char* dazzling =
+    "[lighting]\nfrom = \"set\"\n[[light]]\ntype = \"directional\"\n"
+    "direction = [0.6, 0, -0.8]\nemission = [300, 200, 100]\ngain_real = 1\n";
+
 // The floor under a lamp of 300, 200 and 100 W/m^2 reflects hundreds of times what the plate of a
 // camera whose white is 1 can show. The card's shadow would take more light than there is.
 TEST_F(RenderSession, ALightThatDoesNotFitThePictureIsSaid) {
-  write_take(true,
-             "[lighting]\nfrom = \"set\"\n[[light]]\ntype = \"directional\"\n"
-             "direction = [0.6, 0, -0.8]\nemission = [300, 200, 100]\ngain_real = 1\n");
+  write_take(true, dazzling);
   render::Layers layers;
   RenderOptions options = of_frames(1, 2);
   options.on_frame = [&](const pipeline::Shot& shot) { layers = *shot.layers; };
@@ -445,6 +447,14 @@ TEST_F(RenderSession, LiveAccountsForEveryFrame) {
 }
 
 // `previzd run --spp N`.
+TEST_F(RenderSession, LiveSaysThatTheLightDoesNotFitThePicture) {
+  write_take(true, dazzling);
+  run_until(live_options(), "the light is compared with the picture",
+            [&] { return !reports_.troubles().empty(); });
+  EXPECT_NE(out_.str().find("light of the set: the model under this light is "), std::string::npos)
+      << out_.str();
+}
+
 TEST_F(RenderSession, LiveTakesTheSamplesItIsAskedFor) {
   rig::LiveOptions options = live_options();
   options.samples = 3;  // the set says 2
