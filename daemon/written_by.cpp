@@ -89,7 +89,12 @@ void add_calibrate(const calibrate::Commands& commands, Places& places) {
             commands.vignetting, commands.lens, commands.from, commands.balance, commands.tags);
   places.add(commands.observer.residual_plot);
   places.add(commands.light.residual_plot);
-  if (commands.tags.write) places.add(commands.tags.set_file);
+  const auto add_set = [&](const auto& options) {
+    if (options.write) places.add(options.set_file);
+  };
+  add_set(commands.light);
+  add_set(commands.balance);
+  add_set(commands.tags);
 }
 
 void add_takes(const TakesCommands& commands, Places& places) {

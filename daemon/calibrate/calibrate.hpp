@@ -25,6 +25,9 @@ struct LightOptions : LensOptions {
   // The set file whose tags the light camera sees; the camera's pose is found from them. Without
   // `board` the lens is the set's, or else the session's.
   std::optional<std::filesystem::path> tags_set;
+  bool rotation = false;                          // of lighting.environment in place of all that
+  std::optional<std::filesystem::path> set_file;  // with it; absent: the session's own
+  bool write = false;                             // change that set file
 };
 
 enum class CameraRole { observer, light };
@@ -94,6 +97,9 @@ struct BalanceOptions {
 // cannot be read or, unless forced, the views that are missing.
 void calibrate_observer(const LensOptions& options, std::ostream& out);
 void calibrate_light(const LightOptions& options, std::ostream& out);
+// Finds how the set's environment is turned (rotation_fit.hpp). Throws previz::Error, too, where
+// the pictures do not tell.
+void calibrate_rotation(const LightOptions& options, std::ostream& out);
 void calibrate_response(const ResponseOptions& options, std::ostream& out);
 void calibrate_dark(const DarkOptions& options, std::ostream& out);
 void calibrate_vignetting(const VignettingOptions& options, std::ostream& out);

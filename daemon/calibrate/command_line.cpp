@@ -31,6 +31,13 @@ void add_light(CLI::App& calibrate, LightOptions& options) {
   add_lens_options(command, options);
   command.add_option("--tags", options.tags_set,
                      "Set file with the tags in view, to find its pose");
+  command.add_flag("--rotation", options.rotation,
+                   "Instead, how the set's environment file is turned, from shadows and shading in "
+                   "a session");
+  command.add_option("--set", options.set_file,
+                     "With --rotation: set file, instead of the session's");
+  command.add_flag("--write", options.write,
+                   "With --rotation: write it to the set file; keeps the old file beside it");
 }
 
 void add_response(CLI::App& calibrate, ResponseOptions& options) {
@@ -176,7 +183,9 @@ void add_calibrate(CLI::App& app, Commands& commands) {
 int do_calibrate(const CLI::App& app, const Commands& commands, std::ostream& out) {
   const CLI::App& command = *app.get_subcommand("calibrate");
   if (command.got_subcommand("observer")) calibrate_observer(commands.observer, out);
-  if (command.got_subcommand("light")) calibrate_light(commands.light, out);
+  if (command.got_subcommand("light"))
+    commands.light.rotation ? calibrate_rotation(commands.light, out)
+                            : calibrate_light(commands.light, out);
   if (command.got_subcommand("response")) calibrate_response(commands.response, out);
   if (command.got_subcommand("dark")) calibrate_dark(commands.dark, out);
   if (command.got_subcommand("vignetting")) calibrate_vignetting(commands.vignetting, out);

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "drivers/error.hpp"
+#include "drivers/median.hpp"
 
 namespace previz::pipeline {
 namespace {
@@ -19,12 +20,6 @@ constexpr double least_share_of_tile = 0.05;  // of its pixels
 constexpr std::size_t least_tiles = 3;
 constexpr double median_over_mean = 1.2533;  // of standard errors (Gaussian): sqrt(pi / 2)
 constexpr double sigma_over_mad = 1.4826;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 // What the pixels of a tile have together, so that the noise of single ones evens out.
 struct Tile {

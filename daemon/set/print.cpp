@@ -90,6 +90,12 @@ std::string balance_toml(const glm::dvec3& balance) {
   return table_toml(std::move(draft), "lighting");
 }
 
+std::string environment_rotation_toml(double rotation_rad) {
+  Draft draft;
+  draft.set.lighting.environment_rotation_rad = rotation_rad;
+  return table_toml(std::move(draft), "lighting");
+}
+
 std::string overlay_toml(const Set& own, const Set& wanted) {
   Draft before, after;
   before.set = own;

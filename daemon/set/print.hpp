@@ -19,6 +19,7 @@ std::string light_pose_toml(const glm::dmat4& world_from_camera);      // [light
 std::string response_toml(const ObserverCalibration& calibration);     // [observer.response]
 std::string response_toml(const LightCameraCalibration& calibration);  // [light_camera.response]
 std::string balance_toml(const glm::dvec3& balance);                   // [lighting]
+std::string environment_rotation_toml(double rotation_rad);            // [lighting]
 // Returns the keys of [quality], [estimator] and [lighting] in which `wanted` is not as `own`, and
 // the [[quality.preview]] tables of `wanted`: an overlay that makes the one of the other.
 std::string overlay_toml(const Set& own, const Set& wanted);

@@ -7,6 +7,7 @@
 #include "daemon/calibrate/sensor/paper.hpp"
 #include "daemon/lighting/luminance.hpp"
 #include "drivers/error.hpp"
+#include "drivers/median.hpp"
 
 namespace previz::calibrate {
 namespace {
@@ -18,13 +19,6 @@ constexpr double sigma_over_mad = 1.4826;
 // care are rarely off by more than a tenth. Without it, the surface with the most even light would
 // decide alone.
 constexpr double albedo_sigma = 0.1;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  if (values.size() % 2) return *middle;
-  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
-}
 
 struct Location {
   double middle = 0, sigma = 0;

@@ -1,8 +1,10 @@
 // The balance between the cameras: its statistics, and on ground truth sets, whose two cameras see
 // by one scale and whose surfaces have known albedos.
 #include "daemon/calibrate/calibrate.hpp"
+#include "daemon/calibrate/lens/report.hpp"
 #include "daemon/calibrate/sensor/balance_fit.hpp"
 #include "daemon/calibrate/sensor/paper.hpp"
+#include "daemon/calibrate/sensor/rotation_fit.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/real_world.hpp"
 #include "daemon/set/load.hpp"
@@ -209,6 +211,67 @@ TEST_F(TruthBalance, ThePaperOfTagsIsAGreyCard) {
     EXPECT_EQ(surface.reference, seen.surfaces[surface.surface].material == paper_name);
   const Balance by_red = fit_balance(seen, {"red"});
   EXPECT_GT(std::abs(std::log(by_red.scale.g / 2)), 0.5) << "a named reference goes before paper";
+}
+
+// An environment that is turned, by the shadows of the set's cubes, whose colours are guessed, at a
+// third of its brightness. Twice 0.5 degrees are what a fit can state; samples leave as much again.
+TEST_F(TruthBalance, ATurnedEnvironmentIsFoundByItsShadows) {
+  const truth::TruthSet set =
+      truth::load_truth_set(fs::path(PREVIZ_SOURCE_DIR) / "tests/truth/data/glass");
+  truth::TakeOptions options;
+  options.lighting = {"environment_gain = 0.3", "environment_rotation_deg = 70"};
+  const fs::path session = directory_ / "turned";
+  truth::write_take(set, options, session);
+  const fs::path set_file = session / "changed.toml";
+  std::ofstream(set_file) << truth::set_file_text(set, options)
+                          << "[[surface]]\nmaterial = \"red\"\nalbedo = [0.3, 0.3, 0.3]\n";
+  const pipeline::Take take = pipeline::open_take(session, set_file);
+  const scene::Scene scene = scene::load_scene(take.set);
+  const auto device = render::open_device();
+  const RotationFit fit = fit_rotation([&](double rotation_rad, int samples) {
+    pipeline::Take turned = take;
+    turned.set.lighting.environment_rotation_rad += rotation_rad;
+    return shading_off(
+        probe_surfaces(turned, scene, device, {.frames = 1, .width = 64, .samples = samples / 4}));
+  });
+  std::printf("turned by %.2f +- %.2f degrees, off by %.3f, unturned %.3f, second %.2f\n",
+              fit.rotation_rad / degree, fit.sigma_rad / degree, fit.off, fit.off_unturned,
+              fit.second);
+  EXPECT_NEAR(fit.rotation_rad / degree, -70, 2 + 3 * fit.sigma_rad / degree);
+  EXPECT_LT(fit.sigma_rad / degree, 2);
+  EXPECT_TRUE(fit.is_certain());
+}
+
+// A flat table under an even sky looks the same however that is turned.
+TEST(RotationFit, IsNotCertainWhereNothingTellsThemApart) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0, 1e-3);
+  const RotationFit fit = fit_rotation([&](double, int) {
+    return ShadingOff{0.01 * std::exp(noise(random)), 100};
+  });
+  EXPECT_FALSE(fit.is_certain());
+}
+
+// Squares differ by the light alone: neither colours nor a thing that a frame alone shows count.
+TEST(ShadingOff, IsOfTheLightAndNotOfColours) {
+  const auto seen = [](double shadow, double card) {
+    SurfacePixels pixels;
+    pixels.surfaces = {{"table", glm::dvec3(0.5)}, {"wall", glm::dvec3(0.2)}};
+    for (std::uint32_t frame = 0; frame < 2; ++frame)
+      for (int y = 0; y < 48; ++y)
+        for (int x = 0; x < 64; ++x) {
+          SurfacePixel pixel{.surface = std::uint32_t(y < 24), .frame = frame};
+          pixel.px = {10 * x, 10 * y};
+          pixel.rendered = glm::dvec3(0.3);
+          pixel.plate = glm::dvec3(x < 20 ? shadow : 1) * (y < 24 ? 3.0 : 0.5);
+          if (frame == 1 && x > 40) pixel.plate *= card;
+          pixels.pixels.push_back(pixel);
+        }
+    return shading_off(pixels).mean_square;
+  };
+  EXPECT_LT(seen(1, 1), 2e-4);
+  EXPECT_GT(seen(0.8, 1), 20 * seen(1, 1));
+  EXPECT_LT(seen(1, 0.1), 0.5 * seen(0.8, 0.1)) << "a card in one frame hides the other's shadow";
 }
 
 }  // namespace previz::calibrate::balance_test

@@ -1,0 +1,62 @@
+#include <fmt/ostream.h>
+
+#include <cmath>
+
+#include "daemon/calibrate/calibrate.hpp"
+#include "daemon/calibrate/lens/report.hpp"
+#include "daemon/calibrate/sensor/rotation_fit.hpp"
+#include "daemon/calibrate/sensor/surface_pixels.hpp"
+#include "daemon/pipeline/take.hpp"
+#include "daemon/scene/load.hpp"
+#include "daemon/set/file_edit.hpp"
+#include "daemon/set/print.hpp"
+#include "drivers/error.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+constexpr int frames = 3, width = 80;
+
+ShadingAt shading_of(const pipeline::Take& take) {
+  const scene::Scene scene = scene::load_scene(take.set);
+  const auto device = render::open_device(render::options_for({}, take.set.quality.hardware_rays));
+  return [=](double rotation_rad, int samples) {
+    pipeline::Take turned = take;
+    turned.set.lighting.environment_rotation_rad += rotation_rad;
+    return shading_off(probe_surfaces(turned, scene, device,
+                                      {.frames = frames, .width = width, .samples = samples}));
+  };
+}
+
+}  // namespace
+
+void calibrate_rotation(const LightOptions& options, std::ostream& out) {
+  if (options.write && !options.set_file)
+    throw Error("--write needs --set: it changes that set file");
+  const pipeline::Take take = pipeline::open_take(options.footage, options.set_file);
+  if (!take.set.lighting.environment)
+    throw Error(
+        options.footage.string() +
+        ": its set has no lighting.environment that could be turned; a light camera's place "
+        "is its [light_camera.pose], which --tags SET finds");
+  const RotationFit fit = fit_rotation(shading_of(take));
+  const double rotation = std::remainder(
+      take.set.lighting.environment_rotation_rad + fit.rotation_rad, 2 * std::numbers::pi);
+  fmt::print(
+      out,
+      "shading and shadows are off by {:.1f} % with the environment as it is, and by {:.1f} % "
+      "turned by {:+.1f} +- {:.1f} degrees\n",
+      100 * fit.off_unturned, 100 * fit.off, fit.rotation_rad / degree, fit.sigma_rad / degree);
+  if (!fit.is_certain())
+    throw Error(
+        "the pictures do not tell how the environment is turned: no shadow and no shading of the "
+        "model fits better there than elsewhere. Put something that casts a shadow, and its model, "
+        "into the set, or turn lighting.environment_rotation_deg until shadows agree");
+  const std::string table = set::environment_rotation_toml(rotation);
+  if (options.write)
+    write_back(*options.set_file,
+               set::with_table(set::read_set_file(*options.set_file), "lighting", table), out);
+  write_tables(table, options.table_file, out);
+}
+
+}  // namespace previz::calibrate
