@@ -17,6 +17,7 @@ layout(scalar) readonly buffer Highlights { uint highlights[]; };
 layout(scalar) readonly buffer Caustics { vec4 caustics[]; };    // what the signals are without
 // DITHER_SIDE^2 thresholds between 0 and 1, of blue noise (daemon/render/blue_noise.hpp).
 layout(scalar) readonly buffer Thresholds { float thresholds[]; };
+layout(scalar) buffer Control { GpuControl control; };
 layout(scalar) writeonly buffer Picture { uint picture[]; };     // samples, as the plate's
 
 // Returns the code below or above `signal`, so that the mean over the pattern's pixels is the signal
@@ -55,6 +56,7 @@ uvec3 codes_of(uint pixel) {
                                        show.white * reals[index].rgb);
     radiance = without_noise(radiance, compose(measured_at(index), estimate), highlights[index]);
   }
+  if (any(lessThan(radiance, vec3(0.0)))) atomicAdd(control.below_zero, 1u);
   const vec3 exposed = show.exposure * radiance;
   if (show.is_dithered == 0u)
     return uvec3(code_of(exposed.r, show.most, true), code_of(exposed.g, show.most, true), code_of(exposed.b, show.most, true));

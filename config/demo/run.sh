@@ -9,7 +9,7 @@ out=out/demo
 
 config/install-deps.sh
 cmake --preset release --log-level=WARNING
-cmake --build --preset release --parallel "$(nproc)" --target previzd
+cmake --build --preset release --parallel "$(nproc)" --target previzd previzctl manual
 build/release/daemon/previzd render config/demo/session --set config/demo/demo.toml \
   --out "$out" "$@"
 
@@ -17,3 +17,7 @@ echo
 echo "The pictures, as a display would show them:  $PWD/$out/0000.png ..."
 echo "All layers, linear 32-bit float (OpenEXR):   $PWD/$out/0000.exr ..."
 echo "The review video:                            $PWD/$out/review.mp4"
+echo
+echo "The manual:                                  man -l $PWD/build/release/systemd/package/manual/man/previzd.8"
+echo "                                             (beside it previzctl.1, previz-set.5, previzd-farm.1)"
+echo "A rig (previzd run --bus) is operated by:    $PWD/build/release/daemon/control/previzctl"

@@ -82,9 +82,10 @@ struct FromOptions {
 struct BalanceOptions {
   std::filesystem::path session;
   std::optional<std::filesystem::path> set_file;  // instead of the session's own
-  std::vector<std::string> references;  // materials whose albedo is known; empty: all count
+  std::vector<std::string> references;  // materials whose albedo is known; empty: fit_balance()
   int frames = 3;
   int samples = 64;
+  bool write = false;  // change the set file's [lighting]
   render::DeviceOptions device;
   std::optional<std::filesystem::path> table_file;
 };

@@ -6,10 +6,14 @@
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/lens/report.hpp"
 #include "daemon/calibrate/sensor/balance_fit.hpp"
+#include "daemon/calibrate/sensor/paper.hpp"
 #include "daemon/calibrate/sensor/surface_pixels.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/load.hpp"
+#include "daemon/scene/real_world.hpp"
+#include "daemon/set/file_edit.hpp"
 #include "daemon/set/print.hpp"
+#include "drivers/error.hpp"
 
 namespace previz::calibrate {
 namespace {
@@ -83,27 +87,42 @@ void print_balance(const SurfacePixels& seen, const Balance& balance, std::ostre
              balance.scale.b, percent(balance.sigma));
 }
 
-}  // namespace
-
-void calibrate_balance(const BalanceOptions& options, std::ostream& out) {
-  pipeline::Take take = pipeline::open_take(options.session, options.set_file);
+SurfacePixels probed(const pipeline::Take& take, const BalanceOptions& options) {
   const scene::Scene scene = scene::load_scene(take.set);
+  const auto device =
+      render::open_device(render::options_for(options.device, take.set.quality.hardware_rays));
+  Paper paper(take.set, take.observer, scene::real_world(scene), device, options.samples);
+  SurfacePixels of_paper;
   ProbeOptions probe;
   probe.frames = options.frames;
   probe.samples = options.samples;
-  const SurfacePixels seen = probe_surfaces(
-      take, scene,
-      render::open_device(render::options_for(options.device, take.set.quality.hardware_rays)),
-      probe);
+  probe.each_shot = [&](pipeline::Shot& shot) { paper.add(shot, of_paper); };
+  SurfacePixels seen = probe_surfaces(take, scene, device, probe);
+  append(of_paper, seen);
+  return seen;
+}
+
+}  // namespace
+
+void calibrate_balance(const BalanceOptions& options, std::ostream& out) {
+  if (options.write && !options.set_file)
+    throw Error("--write needs --set: it changes that set file");
+  const pipeline::Take take = pipeline::open_take(options.session, options.set_file);
+  const SurfacePixels seen = probed(take, options);
   const Balance balance = fit_balance(seen, options.references);
   print_balance(seen, balance, out);
   print_exposure(balance, !take.set.lighting.environment, out);
   const std::string uncertain = doubt(balance);
   if (!uncertain.empty()) fmt::print(out, "{}\n", uncertain);
+  const std::string table = set::balance_toml(take.set.lighting.balance * balance.scale);
+  if (options.write)
+    write_back(*options.set_file,
+               set::with_table(set::read_set_file(*options.set_file), "lighting", table), out);
   std::string tables = uncertain.empty() ? "" : as_comment(uncertain);
-  tables += set::balance_toml(take.set.lighting.balance * balance.scale);
+  tables += table;
   for (const SurfaceRatio& surface : balance.surfaces)
-    tables += fmt::format("\n{}", suggestion(surface, seen.surfaces[surface.surface], balance));
+    if (seen.surfaces[surface.surface].material != paper_name)
+      tables += fmt::format("\n{}", suggestion(surface, seen.surfaces[surface.surface], balance));
   write_tables(tables, options.table_file, out);
 }
 

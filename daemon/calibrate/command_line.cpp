@@ -113,9 +113,13 @@ void add_balance(CLI::App& calibrate, BalanceOptions& options) {
   command.add_option("session", options.session, "Session folder")->required();
   command.add_option("--set", options.set_file, "Set file, instead of the session's own");
   command
-      .add_option("--reference", options.references,
-                  "Materials of real objects of known colour (default: all weigh the same)")
+      .add_option(
+          "--reference", options.references,
+          "Materials of real objects of known colour, or \"paper\", the printed tags' white "
+          "(default: paper, or all materials alike where no tag is large enough)")
       ->delimiter(',');
+  command.add_flag("--write", options.write,
+                   "Write the balance to the set file; keeps the old file beside it");
   command.add_option("--frames", options.frames, "Pictures to compare")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();

@@ -103,6 +103,7 @@ int method(sd_bus_message* call, void* served, sd_bus_error* error) {
 struct Property {
   const char* name;
   const char* type;
+  bool is_signalled;
   int (*append)(sd_bus_message*, const Status&);
   bool (*same)(const Status&, const Status&);
 };
@@ -125,8 +126,8 @@ int append_value(sd_bus_message* message, const Status& status) {
 }
 
 template <auto Member>
-constexpr Property property(const char* name, const char* type) {
-  return {name, type,
+constexpr Property property(const char* name, const char* type, bool is_signalled = true) {
+  return {name, type, is_signalled,
           [](sd_bus_message* message, const Status& status) {
             return append_value<Member>(message, status);
           },
@@ -138,6 +139,8 @@ constexpr Property properties[] = {
     property<&Status::recording>("Recording", "b"),
     property<&Status::writing>("Writing", "b"),
     property<&Status::take>("Take", "s"),
+    property<&Status::take_good>("TakeGood", "b"),
+    property<&Status::take_s>("TakeSeconds", "d", false),
     property<&Status::take_frames>("TakeFrames", "t"),
     property<&Status::take_dropped>("TakeDropped", "t"),
     property<&Status::behind_s>("BehindSeconds", "d"),
@@ -151,6 +154,8 @@ constexpr Property properties[] = {
     property<&Status::device>("Device", "s"),
     property<&Status::model>("Model", "s"),
     property<&Status::message>("Message", "s"),
+    property<&Status::picture_s>("PictureSeconds", "d", false),
+    property<&Status::loading_s>("LoadingSeconds", "d", false),
 };
 
 int answer_with(sd_bus_message* call, const Answer& answer) {
@@ -164,14 +169,17 @@ int invalid(sd_bus_message* call, const std::string& what) {
                                     on_the_bus(what).c_str());
 }
 
-// Lets the rig do something, once it is known that the caller may. An exception must not pass
-// through the question's answer either.
+// Lets the rig do something, once it is known that the caller may, and sends its answer when there
+// is one. An exception must not pass through the question's answer either.
 int operate(sd_bus_message* call, Served& served, const std::string& verb,
-            std::function<Answer(const std::string& who)> act) {
+            std::function<void(const std::string& who, Verbs::Reply)> act) {
   return served.callers->admit(
       call, verb, [act = std::move(act)](sd_bus_message* asked, const std::string& who) {
         try {
-          return answer_with(asked, act(who));
+          const std::shared_ptr<sd_bus_message> kept(sd_bus_message_ref(asked),
+                                                     sd_bus_message_unref);
+          act(who, [kept](const Answer& answer) { answer_with(kept.get(), answer); });
+          return 1;
         } catch (const std::exception& thrown) {
           return sd_bus_reply_method_errorf(asked, failed_error, "%s",
                                             on_the_bus(thrown.what()).c_str());
@@ -180,8 +188,9 @@ int operate(sd_bus_message* call, Served& served, const std::string& verb,
 }
 
 int perform(sd_bus_message* call, Served& served, const set::Action& action) {
-  return operate(call, served, action.name,
-                 [&](const std::string& who) { return served.verbs.perform(action, who); });
+  return operate(call, served, action.name, [&](const std::string& who, Verbs::Reply reply) {
+    served.verbs.perform(action, who, std::move(reply));
+  });
 }
 
 int on_action(sd_bus_message* call, Served& served) {
@@ -205,9 +214,10 @@ int on_set_mode(sd_bus_message* call, Served& served) {
   if (const int result = sd_bus_message_read(call, "s", &wanted); result < 0) return result;
   for (const auto& [name, mode] : set::names(set::Mode{}))
     if (std::strcmp(name, wanted) == 0)
-      return operate(call, served, name, [&served, mode = mode](const std::string& who) {
-        return served.verbs.go(mode, who);
-      });
+      return operate(call, served, name,
+                     [&served, mode = mode](const std::string& who, const Verbs::Reply& reply) {
+                       reply(served.verbs.go(mode, who));
+                     });
   return invalid(
       call, std::string("unknown mode \"") + wanted + "\"; allowed: standby, live, refine, review");
 }
@@ -215,9 +225,10 @@ int on_set_mode(sd_bus_message* call, Served& served) {
 int on_record(sd_bus_message* call, Served& served) {
   int on = 0;
   if (const int result = sd_bus_message_read(call, "b", &on); result < 0) return result;
-  return operate(call, served, "record", [&served, on](const std::string& who) {
-    return served.verbs.record(on != 0, who);
-  });
+  return operate(call, served, "record",
+                 [&served, on](const std::string& who, const Verbs::Reply& reply) {
+                   reply(served.verbs.record(on != 0, who));
+                 });
 }
 
 int on_metrics(sd_bus_message* call, Served& served) {
@@ -281,7 +292,11 @@ struct Bus::Impl {
     fill_table();
     try {
       check(sd_bus_open_system(&bus), "the system bus cannot be reached");
-      served.callers.emplace(bus, served.verbs.denied);
+      // Who ends a loop and begins another one stays on the bus.
+      check(sd_bus_set_close_on_exit(bus, 0), "it cannot be kept");
+      served.callers.emplace(bus, [this](const std::string& who, const std::string& verb) {
+        if (served.verbs.denied) served.verbs.denied(who, verb);
+      });
       check(sd_bus_add_object_vtable(bus, nullptr, object_path, interface_name, table.data(),
                                      &served),
             "the interface cannot be registered");
@@ -339,7 +354,9 @@ struct Bus::Impl {
     }
     for (const Property& property : properties)
       table.push_back(SD_BUS_PROPERTY(property.name, property.type, on_get, 0,
-                                      SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE));
+                                      property.is_signalled
+                                          ? std::uint64_t{SD_BUS_VTABLE_PROPERTY_EMITS_CHANGE}
+                                          : std::uint64_t{0}));
     table.push_back(SD_BUS_VTABLE_END);
   }
 };
@@ -351,11 +368,24 @@ bool Bus::is_open() const {
   return sd_bus_is_open(impl_->bus) > 0;
 }
 
+void Bus::serve(sd_event* loop, Verbs verbs) {
+  leave();
+  impl_->served.verbs = std::move(verbs);
+  check(sd_bus_attach_event(impl_->bus, loop, SD_EVENT_PRIORITY_NORMAL),
+        "cannot join the event loop");
+  changed();
+}
+
+void Bus::leave() {
+  sd_bus_detach_event(impl_->bus);
+}
+
 void Bus::changed() {
   const Status now = impl_->served.verbs.status();
   std::vector<char*> names;
   for (const Property& property : properties)
-    if (!property.same(impl_->published, now)) names.push_back(const_cast<char*>(property.name));
+    if (property.is_signalled && !property.same(impl_->published, now))
+      names.push_back(const_cast<char*>(property.name));
   impl_->published = now;
   if (names.empty()) return;
   names.push_back(nullptr);

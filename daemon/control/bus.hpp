@@ -19,10 +19,12 @@ inline constexpr const char* interface_name = "org.previz.Rig1";
 
 // The properties on the bus; each has a PropertiesChanged signal.
 struct Status {
-  std::string mode;  // "standby", "live", "refine", "review"
+  std::string mode;  // "standby", "live", "refine", "review", or "loading" until the set runs
   bool recording = false;
-  bool writing = false;  // the take is not whole on the disk yet, perhaps after recording ended
-  std::string take;      // name of the running or the last take; empty: none yet
+  bool writing = false;    // the take is not whole on the disk yet, perhaps after recording ended
+  std::string take;        // name of the running or the last take; empty: none yet
+  bool take_good = false;  // it was marked good
+  double take_s = 0;       // its length so far
   std::uint64_t take_frames = 0;  // of the observer, written to the disk
   std::uint64_t take_dropped = 0;
   double behind_s = 0;          // of the recording behind the cameras, in tenths of a second
@@ -34,6 +36,9 @@ struct Status {
   std::string device;              // that draws: "NVIDIA RTX 4000", "llvmpipe (CPU)"; empty: none
   std::string model;               // how far it is from the pictures, in words; empty: not measured
   std::string message;             // the last announcement
+  // These are as they are when they are asked for, and are not signalled.
+  double picture_s = -1;  // since the last picture was shown; below 0: none was
+  double loading_s = 0;   // for how long a set has been loading (mode "loading")
 };
 
 struct Answer {
@@ -43,7 +48,9 @@ struct Answer {
 
 // `who` is the caller: a user of this computer (Callers).
 struct Verbs {
-  std::function<Answer(const set::Action&, const std::string& who)> perform;
+  // The reply may come later, on the loop's thread.
+  using Reply = std::function<void(const Answer&)>;
+  std::function<void(const set::Action&, const std::string& who, Reply)> perform;
   std::function<Answer(set::Mode, const std::string& who)> go;  // enters it; its action toggles
   std::function<Answer(bool, const std::string& who)>
       record;  // starts or stops; the action toggles
@@ -67,6 +74,11 @@ class Bus {
   ~Bus();
   Bus(const Bus&) = delete;
   Bus& operator=(const Bus&) = delete;
+
+  // Lets another loop serve the bus, and other verbs answer, from now on. Nobody serves it after
+  // leave(). A bus is served by one thread at a time.
+  void serve(sd_event* loop, Verbs verbs);
+  void leave();
 
   void changed();        // signals the properties that have changed
   bool is_open() const;  // false once the bus has gone

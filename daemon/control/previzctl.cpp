@@ -3,16 +3,21 @@
 #include <systemd/sd-bus.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstdio>
 #include <cstring>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "daemon/control/bus.hpp"
 #include "daemon/control/request.hpp"
+#include "daemon/control/status_words.hpp"
 #include "drivers/error.hpp"
 #include "drivers/printable.hpp"
 #include "drivers/standard_output.hpp"
@@ -39,7 +44,9 @@ class ErrorText {
     if (result >= 0) return;
     if (sd_bus_error_has_name(&error_, SD_BUS_ERROR_SERVICE_UNKNOWN) != 0 ||
         sd_bus_error_has_name(&error_, SD_BUS_ERROR_NAME_HAS_NO_OWNER) != 0)
-      throw Error("previzd does not respond: it is not running, or is still loading a set");
+      throw Error("previzd is not running, or not with --bus");
+    if (sd_bus_error_has_name(&error_, SD_BUS_ERROR_NO_REPLY) != 0 || result == -ETIMEDOUT)
+      throw Error("previzd is running but does not respond; the journal may say why");
     if (sd_bus_error_has_name(&error_, SD_BUS_ERROR_ACCESS_DENIED) != 0)
       throw Error(
           "only root and members of the groups previz and previz-view may call the rig: "
@@ -110,20 +117,31 @@ std::string value_text(sd_bus_message* message) {
   return text;
 }
 
-// Prints the properties of an a{sv}, one a line.
-void print_properties(sd_bus_message* message) {
+using Properties = std::map<std::string, std::string>;
+
+// Reads the properties of an a{sv}.
+Properties read_properties(sd_bus_message* message) {
+  Properties properties;
   sd_bus_message_enter_container(message, 'a', "{sv}");
   while (sd_bus_message_enter_container(message, 'e', "sv") > 0) {
     const char* name = nullptr;
     sd_bus_message_read(message, "s", &name);
-    std::cout << name << ": " << value_text(message) << "\n";
+    const std::string key = name;
+    properties[key] = value_text(message);
     sd_bus_message_exit_container(message);
   }
   sd_bus_message_exit_container(message);
-  std::cout << std::flush;
+  return properties;
 }
 
-void print_status() {
+std::vector<std::string> lines_of(const Properties& properties, bool is_raw) {
+  if (!is_raw) return control::status_words(properties);
+  std::vector<std::string> lines;
+  for (const auto& [name, text] : properties) lines.push_back(name + ": " + text);
+  return lines;
+}
+
+Properties print_status(bool is_raw) {
   const BusPtr bus = open_bus();
   ErrorText error;
   sd_bus_message* reply = nullptr;
@@ -131,23 +149,40 @@ void print_status() {
                                  "org.freedesktop.DBus.Properties", "GetAll", error.out(), &reply,
                                  "s", control::interface_name));
   const MessagePtr owned(reply);
-  print_properties(reply);
+  const Properties properties = read_properties(reply);
+  for (const std::string& line : lines_of(properties, is_raw)) std::cout << line << "\n";
+  std::cout << std::flush;
+  return properties;
 }
 
-int on_changed(sd_bus_message* signal, void*, sd_bus_error*) {
+// What watch() knows so far.
+struct Watched {
+  Properties properties;
+  bool is_raw;
+};
+
+int on_changed(sd_bus_message* signal, void* data, sd_bus_error*) {
+  auto& watched = *static_cast<Watched*>(data);
   sd_bus_message_skip(signal, "s");
-  print_properties(signal);
+  const std::vector<std::string> before = lines_of(watched.properties, watched.is_raw);
+  for (auto& [name, text] : read_properties(signal)) watched.properties[name] = text;
+  for (const std::string& line : lines_of(watched.properties, watched.is_raw))
+    if (std::ranges::find(before, line) == before.end()) std::cout << line << "\n";
+  std::cout << std::flush;
   return 0;
 }
 
 // Prints every change until it is interrupted.
-void watch() {
-  print_status();
+void watch(bool is_raw) {
+  Watched watched{print_status(is_raw), is_raw};
+  // What is not signalled grows old.
+  for (const char* name : {"PictureSeconds", "LoadingSeconds", "TakeSeconds"})
+    watched.properties.erase(name);
   const BusPtr bus = open_bus();
   ErrorText error;
   error.check(sd_bus_match_signal(bus.get(), nullptr, control::bus_name, control::object_path,
                                   "org.freedesktop.DBus.Properties", "PropertiesChanged",
-                                  on_changed, nullptr));
+                                  on_changed, &watched));
   for (;;) {
     error.check(sd_bus_process(bus.get(), nullptr));
     error.check(sd_bus_wait(bus.get(), UINT64_MAX));
@@ -169,8 +204,8 @@ int do_line(int argc, char** argv) {
   try {
     control::add_requests(app, asked);
     app.parse(argc, argv);
-    if (app.got_subcommand("status")) return print_status(), 0;
-    if (app.got_subcommand("watch")) return watch(), 0;
+    if (app.got_subcommand("status")) return print_status(asked.raw), 0;
+    if (app.got_subcommand("watch")) return watch(asked.raw), 0;
     if (app.got_subcommand("actions")) return print_actions(asked.names_only), 0;
     std::string said;
     if (app.got_subcommand("metrics"))

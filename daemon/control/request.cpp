@@ -7,8 +7,10 @@ namespace previz::control {
 void add_requests(CLI::App& app, Request& asked) {
   app.set_version_flag("--version", "previzctl " PREVIZ_VERSION, "Print the version");
   app.require_subcommand(1);
-  app.add_subcommand("status", "What the rig is doing");
-  app.add_subcommand("watch", "Status, then every change as it happens");
+  const std::string raw = "As D-Bus has it, for scripts: a property a line";
+  app.add_subcommand("status", "What the rig is doing")->add_flag("--raw", asked.raw, raw);
+  app.add_subcommand("watch", "Status, then every change as it happens")
+      ->add_flag("--raw", asked.raw, raw);
   app.add_subcommand("metrics", "Frame rates, drops and latency, as JSON");
   app.add_subcommand("mode", "Switch to a mode")
       ->add_option("mode", asked.mode)

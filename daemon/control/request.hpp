@@ -16,6 +16,7 @@ struct Request {
   std::string action;  // a name in daemon/set/actions.hpp
   std::string set;     // "reload", "next", "previous"
   bool names_only = false;
+  bool raw = false;  // status by the names and values of the bus
 };
 
 // Adds all subcommands and options to `app`, which writes what it parses into `asked`; `asked` must

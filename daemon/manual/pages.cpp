@@ -57,7 +57,7 @@ std::string actions_text() {
 }
 
 const Chapter service_chapter{"THE SERVICE", R"(
-previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. When the set file is saved, it is reloaded, or at the latest on `systemctl reload previzd`. If it has a mistake, the old one keeps running, and the journal and `previzctl status` report what is wrong. Changes made by buttons stay in effect.
+previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. When the set file is saved, it is reloaded, or at the latest on `systemctl reload previzd`. If it has a mistake, the old one keeps running, and the journal and `previzctl status` report what is wrong. Changes made by buttons stay in effect, and the last take stays the one that `mark_good` marks; it can be reviewed as long as the text of the set is the one that it was recorded with. While a set loads, `previzctl status` says since when, and everything else is refused with these words.
 `previzctl action keep` writes what buttons have changed into the set file. As installed, the service may not write anywhere in /etc: keep the set file in /var/lib/previzd, or let the service write (`systemctl edit previzd`, ReadWritePaths=/etc/previzd) to a folder owned by previz.
 `journalctl -u previzd` shows what it reports, each line with its priority: `-p err` shows only the errors. Each loss of a device is logged, from the second on with its number ("the 3rd time in this run"). What repeats with every frame is logged only the 1st, 10th, 100th and 1000th time.
 Members of the group previz may operate the rig with previzctl; members of previz-view see its state and its figures. polkit decides who operates it, by the action org.previz.Rig1.operate, so that a rule in /etc/polkit-1/rules.d can let others do some of it, or these not: its detail "verb" is what is to be done, an action of `previzctl actions`, a mode, or record. The journal names who did it, as in "bus, anna: recording".
@@ -230,7 +230,7 @@ camera.chan: Written by `previzd export`: frame, position, rotation and vertical
 
 const Chapter previzctl_status{"EXIT STATUS", R"(
 0: Done.
-1: The rig refused, or does not respond; one line on standard error says why.
+1: The rig refused, is loading a set, is not running or does not respond; one line on standard error says which and why.
 2: The command line cannot be understood.
 )"};
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "daemon/calibrate/known_camera.hpp"
+#include "daemon/calibrate/lens/report.hpp"
 #include "daemon/calibrate/lens/source.hpp"
 #include "daemon/model/colours.hpp"
 #include "daemon/model/fit.hpp"
@@ -431,10 +432,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   if (options.overlay && !scans.empty()) out << "scans are not drawn over the pictures\n";
   if (!options.tags_only) warn_of_others(set, file, out);
   if (edited) {
-    const auto old = set::keep_beside(*options.set_file);
-    session::replace_file(*options.set_file, *edited);
-    fmt::print(out, "written to {}; previous version: {}\n", options.set_file->string(),
-               old.string());
+    calibrate::write_back(*options.set_file, *edited, out);
   } else if (options.write) {
     fmt::print(out, "{}: lists this model already and stays as it is\n",
                options.set_file->string());

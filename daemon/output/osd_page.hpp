@@ -22,8 +22,8 @@ struct OsdText {
   friend bool operator==(const OsdText&, const OsdText&) = default;
 };
 
-// The boxes of each corner stand beside each other; notices are stacked at the bottom centre, and
-// the lines of the column below each other at the left, under the upper corners.
+// The boxes of each corner stand beside each other; under the upper corners, notices are
+// stacked at the right and the lines of the column at the left, so that the middle stays free.
 struct OsdPage {
   std::vector<OsdText> top_left, top_right, bottom_left, bottom_right, notices;
   std::vector<OsdText> column = {};

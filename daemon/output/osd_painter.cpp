@@ -68,7 +68,9 @@ OsdPainter::OsdPainter(int screen_width, int screen_height, double text_height,
       padding_(font_.cap_height() * 2 / 3),
       gap_(font_.cap_height() / 3),
       margin_(font_.cap_height()),
-      box_height_(font_.ascent() + font_.descent() + gap_) {}
+      box_height_(font_.ascent() + font_.descent() + gap_),
+      row_width_(width_ - 2 * margin_),
+      side_width_(std::min(row_width_, std::max(row_width_ / 3, 5 * box_height_))) {}
 
 std::vector<Overlay> OsdPainter::paint(const OsdPage& page) const {
   const Rows top = rows_of(page.top_left, page.top_right);
@@ -87,11 +89,11 @@ std::vector<Overlay> OsdPainter::paint(const OsdPage& page) const {
     y += box_height_ + gap_;
   };
   for (const auto& row : top) put(row);
-  const Rows said = notices(page.notices, room);
-  for (const auto& row : column(page.column, room - said.size())) put(row);
-  y = height_ - margin_ + gap_ -
-      static_cast<int>(said.size() + bottom.size()) * (box_height_ + gap_);
-  for (const auto& row : said) put(row);
+  const int below_top = y;
+  for (const auto& row : notices(page.notices, room)) put(row);
+  y = below_top;
+  for (const auto& row : column(page.column, page.notices.empty(), room)) put(row);
+  y = height_ - margin_ + gap_ - static_cast<int>(bottom.size()) * (box_height_ + gap_);
   for (const auto& row : bottom) put(row);
   return overlays;
 }
@@ -100,12 +102,11 @@ int OsdPainter::width_of(const OsdText& words) const {
   return font_.width(words.text) + 2 * padding_;
 }
 
-bool OsdPainter::fits(const std::string& text) const {
-  return font_.width(text) + 2 * padding_ <= width_ - 2 * margin_;
-}
-
-// Breaks text into lines that fit, between words, and within a word that is wider than the screen.
-std::vector<OsdText> OsdPainter::broken(const OsdText& words) const {
+// Breaks text into lines of at most that width, between words, and within a word that is wider.
+std::vector<OsdText> OsdPainter::broken(const OsdText& words, int most_width) const {
+  const auto fits = [&](const std::string& text) {
+    return font_.width(text) + 2 * padding_ <= most_width;
+  };
   std::vector<std::string> lines;
   for (std::string word : words_in(words.text)) {
     if (!lines.empty() && fits(lines.back() + " " + word)) {
@@ -134,7 +135,7 @@ OsdPainter::Rows OsdPainter::rows_of(const std::vector<OsdText>& left,
   Rows rows;
   int x = margin_;
   for (const OsdText& words : left)
-    for (const OsdText& line : broken(words)) {
+    for (const OsdText& line : broken(words, row_width_)) {
       const int width = width_of(line);
       if (rows.empty() || (x > margin_ && x + width > width_ - margin_)) {
         rows.emplace_back();
@@ -165,13 +166,13 @@ OsdPainter::Rows OsdPainter::rows_of(const std::vector<OsdText>& left,
   return rows;
 }
 
-// Breaks texts into at most so many lines. The last of them says how many more there are, with
-// these words after the number.
-std::vector<OsdText> OsdPainter::stacked(const std::vector<OsdText>& texts, std::size_t most,
-                                         const OsdText& hidden) const {
+// Breaks texts into at most so many lines of at most that width. The last of them says how many
+// more there are, with these words after the number.
+std::vector<OsdText> OsdPainter::stacked(const std::vector<OsdText>& texts, int most_width,
+                                         std::size_t most, const OsdText& hidden) const {
   std::vector<OsdText> lines;
   for (const OsdText& text : texts)
-    for (OsdText& line : broken(text)) lines.push_back(std::move(line));
+    for (OsdText& line : broken(text, most_width)) lines.push_back(std::move(line));
   if (lines.size() <= most) return lines;
   const std::size_t number = lines.size() - most + 1;
   lines.resize(most);
@@ -180,18 +181,21 @@ std::vector<OsdText> OsdPainter::stacked(const std::vector<OsdText>& texts, std:
 }
 
 OsdPainter::Rows OsdPainter::notices(const std::vector<OsdText>& notices, std::size_t most) const {
-  const OsdText hidden{" more lines in the log", OsdTone::warning};
+  const OsdText hidden{" more in the log", OsdTone::warning};
   Rows rows;
-  for (const OsdText& line : stacked(notices, most, hidden)) {
+  for (const OsdText& line : stacked(notices, side_width_, most, hidden)) {
     const int width = width_of(line);
-    rows.push_back({{(width_ - width) / 2, 0, line, width}});
+    rows.push_back({{width_ - margin_ - width, 0, line, width}});
   }
   return rows;
 }
 
-OsdPainter::Rows OsdPainter::column(const std::vector<OsdText>& texts, std::size_t most) const {
+OsdPainter::Rows OsdPainter::column(const std::vector<OsdText>& texts, bool is_alone,
+                                    std::size_t most) const {
+  const int most_width = is_alone ? row_width_ : row_width_ - side_width_ - gap_;
   Rows rows;
-  for (const OsdText& line : stacked(texts, most, {" more lines"}))
+  if (most_width < side_width_) return rows;
+  for (const OsdText& line : stacked(texts, most_width, most, {" more lines"}))
     rows.push_back({{margin_, 0, line, width_of(line)}});
   return rows;
 }

@@ -18,9 +18,10 @@ class OsdPainter {
              const std::filesystem::path& font = default_font());
 
   // Returns boxes within the screen that do not overlap. Boxes that do not fit beside each other go
-  // to further rows; text that is too long for a row is broken. If rows run out, the column has
-  // those that the notices leave; the last line of each says how many are hidden, and the permanent
-  // texts lose their lower rows.
+  // to further rows; text that is too long for a row is broken. Notices take the right third of the
+  // screen, or more where the words are large for that; the column is then left out. If rows run
+  // out, the last line of each says how many are hidden, and the permanent texts lose their lower
+  // rows.
   std::vector<Overlay> paint(const OsdPage& page) const;
 
  private:
@@ -32,18 +33,18 @@ class OsdPainter {
   using Rows = std::vector<std::vector<Box>>;
 
   int width_of(const OsdText& words) const;
-  bool fits(const std::string& text) const;  // true: fits in one row
-  std::vector<OsdText> broken(const OsdText& words) const;
+  std::vector<OsdText> broken(const OsdText& words, int most_width) const;
   Rows rows_of(const std::vector<OsdText>& left, const std::vector<OsdText>& right) const;
-  std::vector<OsdText> stacked(const std::vector<OsdText>& texts, std::size_t most,
+  std::vector<OsdText> stacked(const std::vector<OsdText>& texts, int most_width, std::size_t most,
                                const OsdText& hidden) const;
   Rows notices(const std::vector<OsdText>& notices, std::size_t most) const;
-  Rows column(const std::vector<OsdText>& texts, std::size_t most) const;
+  Rows column(const std::vector<OsdText>& texts, bool is_alone, std::size_t most) const;
   Overlay draw(const Box& box) const;
 
   const int width_, height_;
   const Font font_;
   const int padding_, gap_, margin_, box_height_;  // pixels
+  const int row_width_, side_width_;  // likewise; a notice is at most as wide as a side
 };
 
 }  // namespace previz::output

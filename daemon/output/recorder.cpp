@@ -51,6 +51,9 @@ Recorder::Recorder(RecorderOptions options)
     watches_.push_back(std::make_unique<FolderWatch>(
         FolderWatchOptions{folders_.all()[i], slate, options_.free_bytes, warn, on_news}));
   }
+  status_.directory = options_.last_take;
+  status_.finished = options_.last_take.filename().string();
+  status_.good = options_.is_last_good;
   thread_ = std::jthread([this] { run(); });
 }
 
@@ -221,6 +224,9 @@ RecorderStatus Recorder::status() const {
   const std::lock_guard lock(mutex_);
   RecorderStatus status = status_;
   status.writing = status_.recording || writes_ || !queue_.empty();
+  const bool is_whole =
+      named_ == starts_ && status.finished == status.directory.filename().string();
+  status.ending = status.writing && !status.recording && !is_whole;
   status.backlog = queue_.backlog();
   if (handling_since_)
     status.disk_silent_s = std::chrono::duration<double>(Clock::now() - *handling_since_).count();
@@ -364,7 +370,12 @@ void Recorder::mark_last_good() {
                   std::string("the take cannot be marked good: ") + reason_of(error));
     }
   }
-  note(Severity::info, last.filename().string() + " is marked good");
+  {
+    const std::lock_guard lock(mutex_);
+    status_.good = true;
+  }
+  note(Severity::info, last.filename().string() + " is marked good", "recording",
+       /*is_shown=*/true);
 }
 
 void Recorder::write(const Captured& captured) {
@@ -473,7 +484,9 @@ void Recorder::tell_of_begun_take() {
   watches_[take_->folder]->keep_wish(directory);
   keep_numbers(folders());
   const std::lock_guard lock(mutex_);
+  named_ = begun_;
   status_.directory = std::move(directory);
+  status_.good = false;
   status_.number = take_->writer->number();
 }
 

@@ -47,11 +47,15 @@ struct RecorderOptions {
   bool measures_disk = false;         // whether the disk's speed is measured before the first take
   // A take that ends waits so long for files of the set that are still being copied.
   std::chrono::milliseconds asset_patience{20'000};
+  std::filesystem::path last_take;  // of an earlier recorder, in any folder; empty: none
+  bool is_last_good = false;
 };
 
 struct RecorderStatus {
   bool recording = false;
   bool writing = false;  // the take is not whole on the disk yet, perhaps after recording ended
+  bool ending = false;   // recording has ended, and its take is not whole on the disk yet
+  bool good = false;     // the take of `directory` was marked good
   std::filesystem::path directory;  // the running take's or the last one's; empty: none yet
   int number = 0;
   std::uint64_t frames = 0;          // observer frames of the take on disk
@@ -193,6 +197,7 @@ class Recorder {
   RecorderStatus status_;
   std::uint64_t starts_ = 0;  // calls of start() that began a take
   std::uint64_t begun_ = 0;   // those of them that the writer thread has got to
+  std::uint64_t named_ = 0;   // those of them whose take is known to status_
   std::optional<std::uint64_t> free_bytes_;
   std::optional<Clock::time_point> handling_since_;  // by the writer thread
   bool writes_ = false;  // the writer thread has a take, or an entry in hand

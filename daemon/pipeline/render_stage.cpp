@@ -6,6 +6,7 @@
 
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/pipeline/refinement.hpp"
+#include "daemon/render/composite.hpp"
 #include "daemon/render/error_estimate.hpp"
 #include "daemon/scene/placement.hpp"
 #include "drivers/error.hpp"
@@ -166,6 +167,7 @@ void RenderStage::show_among(Shot& shot, const std::vector<render::KeptFramePtr>
   stands_elsewhere_ = true;
   shot.picture = std::make_shared<const Plate>(
       renderer_->show_among(chain, set_.quality.denoise, layers.get()));
+  if (layers) shot.counters.below_zero = render::below_zero(*layers);
   shot.layers = std::move(layers);
   shot.whole = true;
   shot.render_s += seconds_from(start);
@@ -233,7 +235,9 @@ void RenderStage::finish(Shot& shot) {
     picture = renderer_->show(set_.quality.denoise, layers.get());
   if (!composite) picture = picture_of(view_, *layers, *response_, exposure_of(shot));
   shot.picture = std::make_shared<const Plate>(std::move(picture));
-  if (options_.layers) shot.layers = layers;
+  if (!options_.layers) return;
+  shot.layers = layers;
+  shot.counters.below_zero = render::below_zero(*layers);
 }
 
 void RenderStage::resize(double scale) {

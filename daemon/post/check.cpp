@@ -1,5 +1,7 @@
 #include "daemon/post/check.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <optional>
 #include <ostream>
@@ -12,11 +14,13 @@
 #include "daemon/pipeline/take.hpp"
 #include "daemon/post/check_model.hpp"
 #include "daemon/post/check_tracking.hpp"
+#include "daemon/post/light_judgement.hpp"
 #include "daemon/render/check.hpp"
 #include "daemon/scene/check.hpp"
 #include "daemon/set/check.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/tracking/check.hpp"
+#include "drivers/error.hpp"
 #include "drivers/session/session.hpp"
 
 namespace previz::post {
@@ -85,6 +89,26 @@ void describe(const set::CheckedSet& checked, const scene::Scene& scene, std::os
   render::describe_computer(out);
 }
 
+// Says how bright the model comes out beside the pictures, or why nobody knows.
+void describe_light(const pipeline::Take& take, const scene::Scene& scene, set::Findings& findings,
+                    std::ostream& out) {
+  try {
+    const auto device =
+        render::open_device(render::options_for({}, take.set.quality.hardware_rays));
+    const LightJudgement judgement = light_of_take(take, scene, device);
+    if (const auto figure = judgement.figure())
+      out << fmt::format(
+          "\nlight: the model is {:.2f} {:.2f} {:.2f} times as bright as the picture "
+          "(red, green, blue)\n",
+          figure->ratio.r, figure->ratio.g, figure->ratio.b);
+    for (const std::string& doubt : judgement.doubts())
+      findings.remarks.push_back("light: " + doubt);
+  } catch (const Error& error) {
+    findings.remarks.push_back(std::string("the light was not compared with the pictures: ") +
+                               error.what());
+  }
+}
+
 }  // namespace
 
 int check_set(const fs::path& set_or_session, std::ostream& out) {
@@ -110,6 +134,7 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
     describe_fit(figure, take->set, out);
     remark_on_fit(figure, take->set, findings);
     remark_on_tracking(*take, findings);
+    describe_light(*take, *scene, findings, out);
   }
   if (!findings.remarks.empty()) out << "\nworth checking\n";
   for (const std::string& remark : findings.remarks) out << "  " << remark << '\n';

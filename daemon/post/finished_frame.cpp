@@ -86,6 +86,7 @@ std::string to_json(const FinishedFrame& frame) {
   json["dropped_negative"] = frame.counters.dropped_negative;
   json["stopped_in_layers"] = frame.counters.stopped_in_layers;
   if (frame.counters.unfinished > 0) json["unfinished"] = frame.counters.unfinished;
+  if (frame.counters.below_zero > 0) json["below_zero"] = frame.counters.below_zero;
   if (frame.counters.rebuilt_trees > 0) json["rebuilt_trees"] = frame.counters.rebuilt_trees;
   if (frame.counters.measured + frame.counters.unmeasured > 0) {
     json["measured"] = frame.counters.measured;
@@ -128,6 +129,7 @@ FinishedFrame from_json(const std::string& line) {
   frame.counters.dropped_negative = number_at<std::uint64_t>(json, "dropped_negative");
   frame.counters.stopped_in_layers = number_or(json, "stopped_in_layers", std::uint64_t{0});
   frame.counters.unfinished = number_or(json, "unfinished", std::uint64_t{0});
+  frame.counters.below_zero = number_or(json, "below_zero", std::uint64_t{0});
   frame.counters.rebuilt_trees = number_or(json, "rebuilt_trees", std::uint64_t{0});
   frame.counters.measured = number_or(json, "measured", std::uint64_t{0});
   frame.counters.unmeasured = number_or(json, "unmeasured", std::uint64_t{0});

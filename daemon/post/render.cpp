@@ -20,6 +20,7 @@
 #include "daemon/pipeline/take.hpp"
 #include "daemon/pipeline/take_shots.hpp"
 #include "daemon/post/frames_to_render.hpp"
+#include "daemon/post/light_judgement.hpp"
 #include "daemon/post/render_directory.hpp"
 #include "daemon/post/render_plan.hpp"
 #include "daemon/post/sample_ranges.hpp"
@@ -134,6 +135,7 @@ struct Job {
   const SumsFolders* sums;  // null: the samples are rendered here
   RenderReport& report;
   tracking::PoseJudgement& judgement;
+  LightJudgement& light;
 };
 
 MadeOn made_on(const render::Device& device) {
@@ -227,6 +229,7 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
     if (const std::string dropped = dropped_text(shot.counters); !dropped.empty())
       progress.note("frame " + std::to_string(shot.index) + ": dropped " + dropped);
     progress.frame_done(done_text(shot), now_s());
+    job.light.add(shot);
     if (options.on_frame) options.on_frame(shot);
   });
   stages.wait();
@@ -285,7 +288,8 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
   if (options.on_begin) options.on_begin();
   output::Progress progress(out, options.terminal, to_do.size(), now_s());
   tracking::PoseJudgement judgement(take.set.tracking, take.observer);
-  const Job job{options, take, scene, device, directory, metrics, sums, report, judgement};
+  LightJudgement light(take, options.scale);
+  const Job job{options, take, scene, device, directory, metrics, sums, report, judgement, light};
   while (!to_do.empty() && !options.stop.stop_requested()) {
     const std::set<std::uint64_t> left = render_frames(job, to_do, progress);
     to_do.clear();
@@ -303,6 +307,7 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
   if (options.stop.stop_requested()) return;
   for (const std::string& doubt : judgement.doubts(options.stop))
     progress.note("tracking: " + doubt);
+  for (const std::string& doubt : light.doubts()) progress.note("light: " + doubt);
 }
 
 void report_opened(const RenderDirectory& directory, const RenderReport& report,

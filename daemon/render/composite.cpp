@@ -69,7 +69,10 @@ double gain(const CompositeRule& rule, double camera, double real, double plate_
 
 }  // namespace
 
-double compose(const CompositeRule& rule, const MeasuredChannel& camera, const Estimate& e) {
+namespace {
+
+double compose_by_rule(const CompositeRule& rule, const MeasuredChannel& camera,
+                       const Estimate& e) {
   const double seen = camera.radiance;
   const double through = 1 - e.mask;
   const double plain =
@@ -79,6 +82,25 @@ double compose(const CompositeRule& rule, const MeasuredChannel& camera, const E
   const double whole = through * behind +
                        (e.change + (gain(rule, behind, e.real, camera.variance) - 1) * e.uncovered);
   return std::min(whole, std::max(seen, plain));
+}
+
+}  // namespace
+
+double compose(const CompositeRule& rule, const MeasuredChannel& camera, const Estimate& e) {
+  return std::max(compose_by_rule(rule, camera, e), 0.0);
+}
+
+std::uint64_t below_zero(const Layers& layers) {
+  std::uint64_t pixels = 0;
+  for (std::size_t i = 0; i < layers.mask.size(); ++i) {
+    if (layers.mask[i] > 0) continue;
+    for (glm::length_t c = 0; c < 3; ++c)
+      if (layers.composite[i][c] == 0 && layers.diff[i][c] < 0) {
+        ++pixels;
+        break;
+      }
+  }
+  return pixels;
 }
 
 double gain_of(const CompositeRule& rule, const MeasuredChannel& camera, const Estimate& e) {

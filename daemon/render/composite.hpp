@@ -2,6 +2,7 @@
 // "The composite").
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -53,8 +54,14 @@ struct Estimate {
 
 // Returns the composite of one channel. A clipped channel stands for the model's mean(Lr) where
 // that is brighter, so that a shadow first takes what the sensor could not show; the result is then
-// no brighter than the plate or than the composite with the plate as it is.
+// no brighter than the plate or than the composite with the plate as it is. A shadow leaves at
+// least no light: where the model's real world is brighter than the picture, the rule alone would
+// give less, and below_zero() counts it.
 double compose(const CompositeRule& rule, const MeasuredChannel& camera, const Estimate& estimate);
+
+// Returns the number of pixels that nothing virtual covers and in which a shadow left no light in
+// some channel.
+std::uint64_t below_zero(const Layers& layers);
 
 // Returns the factor that a small error of the change has in the composite: the rule's gain where
 // nothing covers the pixel, and 1 where it is covered.

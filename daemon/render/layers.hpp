@@ -33,6 +33,9 @@ struct Counters {
   std::uint64_t dropped_negative = 0;
   std::uint64_t stopped_in_layers = 0;  // rays through too many transparent surfaces
   std::uint64_t unfinished = 0;         // paths that were cut off with their batch; always 0
+  // Pixels of the shown picture in which a shadow would have taken more light than the plate has:
+  // the model's real world is brighter there than the picture.
+  std::uint64_t below_zero = 0;
   // With real_radiance = "camera": real surfaces whose radiance came from the plate, and real
   // surfaces that had to be traced.
   std::uint64_t measured = 0;

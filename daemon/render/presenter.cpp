@@ -1,6 +1,7 @@
 #include "daemon/render/presenter.hpp"
 
 #include <algorithm>
+#include <glm/common.hpp>
 #include <utility>
 
 #include "daemon/render/blue_noise.hpp"
@@ -154,7 +155,7 @@ void Presenter::read(const Denoiser::Band& band, Layers& layers) const {
   const std::size_t last = static_cast<std::size_t>(band.last) * width;
   const auto composites = download<glm::vec4>(device_, composites_, last - top);
   for (std::size_t i = first; i < last; ++i) {
-    layers.composite[i] = glm::vec3(composites[i - top]);
+    layers.composite[i] = glm::max(glm::vec3(composites[i - top]), 0.0f);
     layers.mask[i] = composites[i - top].w;
   }
 }
@@ -226,6 +227,7 @@ void Presenter::present_later(const ToPresent& what, Denoiser& denoiser, const D
         {"highlights", &highlights_},
         {"uncovered", &denoiser.denoised_uncovered()},
         {"reals", &denoiser.denoised_real()},
+        {"control", &what.control},
         {"signals", what.denoise ? &denoiser.denoised_signal() : &denoiser.signal()},
         {"picture", &picture_}};
     device_.record([&](const vk::raii::CommandBuffer& commands) {

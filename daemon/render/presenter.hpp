@@ -22,10 +22,11 @@ namespace previz::render {
 struct ToPresent {
   std::vector<Wavefront::Sums> tiles;  // cover all rows
   int width, height;
-  const Buffer& plate;  // codes of the response's bits as shaders/lib/plate.glsl reads them
-  bool has_plate;       // if not, the composite is over black
-  bool is_clipped;      // some code of the plate may be from response.clipping().from on
-  double exposure;      // signal over radiance, above 0
+  const Buffer& control;  // GpuControl, which counts
+  const Buffer& plate;    // codes of the response's bits as shaders/lib/plate.glsl reads them
+  bool has_plate;         // if not, the composite is over black
+  bool is_clipped;        // some code of the plate may be from response.clipping().from on
+  double exposure;        // signal over radiance, above 0
   CompositeRule rule;
   std::int64_t samples;  // the largest number that a pixel has
   bool denoise;

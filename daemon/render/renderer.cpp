@@ -442,8 +442,18 @@ ToPresent Renderer::Impl::to_present(bool denoise) {
   if (!denoiser) denoiser.emplace(*device);
   shown_by();
   const PinholeIntrinsics& lens = calibration.intrinsics;
-  return {wavefront->sums(), lens.width, lens.height, plate.codes(), has_plate(),  is_clipped,
-          frame.exposure,    rule(),     sampled(),   denoise,       frame.dithers};
+  return {wavefront->sums(),
+          lens.width,
+          lens.height,
+          wavefront->control_buffer(),
+          plate.codes(),
+          has_plate(),
+          is_clipped,
+          frame.exposure,
+          rule(),
+          sampled(),
+          denoise,
+          frame.dithers};
 }
 
 Plate Renderer::show(bool denoise, Layers* layers) {

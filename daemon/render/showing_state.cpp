@@ -14,6 +14,7 @@ Counters with(Counters counters, const gpu::GpuControl& control) {
   counters.unfinished = control.unfinished;
   counters.measured = wide(control.measured_high, control.measured_low);
   counters.unmeasured = wide(control.unmeasured_high, control.unmeasured_low);
+  counters.below_zero = control.below_zero;
   return counters;
 }
 

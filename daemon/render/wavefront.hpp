@@ -69,7 +69,8 @@ class Wavefront {
   // Puts kept sums in the place of the picture's, of which they must have the size; with the
   // features that they were kept with. The next samples are to be preceded by a clear().
   void put_back(const PixelSums& kept);
-  gpu::GpuControl control();  // counters since the last clear
+  gpu::GpuControl control();                                 // counters since the last clear
+  const Buffer& control_buffer() const { return control_; }  // what is shown is counted there, too
   // The same as they are now, by a copy that comes down.
   void count_into(gpu::GpuControl& counted, Downloads& down) const;
 

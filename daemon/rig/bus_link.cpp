@@ -7,11 +7,52 @@
 
 namespace previz::rig {
 
-BusLink::BusLink(EventLoop& loop, control::Verbs verbs, pipeline::StageKeeper::Parts kept)
-    : loop_(loop),
-      verbs_(std::move(verbs)),
-      keeper_("bus", std::move(kept), &pipeline::Patience::stage),
-      timer_(loop_.every(std::chrono::milliseconds(500), [this] { look(); })) {
+BusLink::BusLink(pipeline::StageKeeper::Parts kept)
+    : keeper_("bus", std::move(kept), &pipeline::Patience::stage) {}
+
+BusLink::~BusLink() {
+  leave();
+}
+
+void BusLink::serve(EventLoop& loop, control::Verbs verbs) {
+  leave();
+  verbs_ = std::move(verbs);
+  join(loop);
+}
+
+// Without a thread or a loop for it, nobody answers for a while.
+void BusLink::serve_alone(control::Verbs verbs) try {
+  leave();
+  verbs_ = std::move(verbs);
+  alone_ = std::jthread([this](const std::stop_token& stop) {
+    try {
+      EventLoop loop;
+      const auto end = loop.every(std::chrono::milliseconds(20), [&] {
+        if (stop.stop_requested()) loop.exit();
+      });
+      join(loop);
+      loop.run();
+      timer_.reset();
+      if (bus_) bus_->leave();
+    } catch (const std::exception&) {
+      return;
+    }
+  });
+} catch (const std::exception&) {
+}
+
+void BusLink::leave() {
+  alone_ = {};
+  timer_.reset();
+  if (bus_) bus_->leave();
+}
+
+void BusLink::join(EventLoop& loop) {
+  loop_ = &loop;
+  keeper_.attempt([this] {
+    if (bus_ && bus_->is_open()) bus_->serve(loop_->handle(), verbs_);
+  });
+  timer_ = loop.every(std::chrono::milliseconds(500), [this] { look(); });
   look();
 }
 
@@ -29,7 +70,7 @@ void BusLink::connect() {
     bus_.reset();
     throw Error("D-Bus: lost the bus");
   }
-  bus_.emplace(loop_.handle(), verbs_);
+  bus_.emplace(loop_->handle(), verbs_);
 }
 
 }  // namespace previz::rig

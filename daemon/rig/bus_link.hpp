@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <optional>
+#include <thread>
 
 #include "daemon/control/bus.hpp"
 #include "daemon/pipeline/stage_keeper.hpp"
@@ -10,25 +11,33 @@
 
 namespace previz::rig {
 
-// A rig without a bus goes on; that it is not on the bus is reported, and it tries again. All of
-// this belongs to the loop's thread.
+// A rig without a bus goes on; that it is not on the bus is reported, and it tries again. What the
+// verbs refer to lives until other verbs are given.
 class BusLink {
  public:
-  // The loop and what the verbs refer to outlive the link.
-  BusLink(EventLoop& loop, control::Verbs verbs, pipeline::StageKeeper::Parts kept);
+  explicit BusLink(pipeline::StageKeeper::Parts kept);
+  ~BusLink();
 
-  // Signals the properties that have changed.
+  // Serves the bus on the caller's loop, which lives until the next call of these two.
+  void serve(EventLoop& loop, control::Verbs verbs);
+  // Serves it on a thread of its own, which alone calls the verbs.
+  void serve_alone(control::Verbs verbs);
+
+  // Signals the properties that have changed; call it on the loop's thread.
   void changed();
 
  private:
+  void leave();
+  void join(EventLoop& loop);
   void look();
   void connect();
 
-  EventLoop& loop_;
-  const control::Verbs verbs_;
+  EventLoop* loop_ = nullptr;
+  control::Verbs verbs_;
   pipeline::StageKeeper keeper_;
   std::optional<control::Bus> bus_;
   std::unique_ptr<EventLoop::Watch> timer_;
+  std::jthread alone_;  // last: it uses all of the above
 };
 
 }  // namespace previz::rig

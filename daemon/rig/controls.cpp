@@ -158,6 +158,9 @@ Outcome Controls::happened(Event event) {
 
 Outcome Controls::change(Event event) {
   const State before = look_.state;
+  const bool asks_for_review = event == Event::wish_review || event == Event::toggle_review;
+  if (asks_for_review && before.mode != Mode::review && !before.recording)
+    if (auto refused = no_review()) return *refused;
   const Step taken = step(before, event);
   if (taken.refused) return {taken.refused, true, {}};
   look_.state = taken.state;
@@ -173,6 +176,20 @@ Outcome Controls::change(Event event) {
     outcome.said = set::name_of(taken.state.mode);
   }
   return outcome;
+}
+
+// Returns why the last take cannot be played, where there is one.
+std::optional<Outcome> Controls::no_review() const {
+  if (take_.is_ending)
+    return Outcome{
+        fmt::format("{} is still being written: {:.1f} s", take_.name, take_.behind_s), true, {}};
+  if (look_.state.has_take && !take_.is_of_this_set)
+    return Outcome{take_.name +
+                       " was recorded with another text of the set; previzd render shows "
+                       "it as it was, or restore that text",
+                   true,
+                   {}};
+  return std::nullopt;
 }
 
 Outcome Controls::apply(const set::ToMode& effect) {
@@ -194,9 +211,12 @@ Outcome Controls::apply(const set::Record&) {
 }
 
 Outcome Controls::apply(const set::MarkGood&) {
-  if (!look_.state.recording && !look_.state.has_take)
-    return {"no take recorded yet; nothing to mark", true, {}};
-  return {"take marked good", false, Request::mark_good};
+  if (look_.state.recording)
+    return {"the running take is marked good when it is finished", false, Request::mark_good};
+  if (take_.is_ending)
+    return {take_.name + " is marked good when it is written", false, Request::mark_good};
+  if (!look_.state.has_take) return {"no take recorded yet; nothing to mark", true, {}};
+  return {"marking " + take_.name + " good", false, Request::mark_good};
 }
 
 Outcome Controls::apply(const set::Acknowledge&) {
@@ -208,8 +228,12 @@ Outcome Controls::apply(const set::Snapshot&) {
 }
 
 Outcome Controls::snapshot(std::uint64_t Look::*of) {
+  if (look_.state.mode == Mode::standby)
+    return {"standby shows no picture; nothing to save", true, {}};
+  if (!look_.state.has_good)
+    return {"no frame with a pose and light yet; nothing to save", true, {}};
   ++(look_.*of);
-  return {"snapshot", false, {}};
+  return {"saving a snapshot", false, Request::snapshot};
 }
 
 Outcome Controls::apply(const set::ReloadSet&) {
@@ -308,11 +332,11 @@ Outcome Controls::apply(const set::MarkCorner&) {
   if (!aim_) return {"not marked: the picture was not live; aim and mark again", true, {}};
   if (!aim_->ray) return {"not marked: no tag in the picture shows where the camera is", true, {}};
   std::string before;
-  if (!marking.take.empty() && marking.take != take_) {
+  if (!marking.take.empty() && marking.take != take_.name) {
     before = "marks so far are in " + marking.take + "; mark its boxes again; ";
     marking.begin();
   }
-  marking.take = take_;
+  marking.take = take_.name;
   Outcome outcome{"", false, {}, marking.mark(*aim_)};
   outcome.said = before + outcome.mark->point + ": " + Marking::words_of(*marking.last());
   if (const std::string box = marking.words_of_box(); !box.empty()) outcome.said += "; " + box;
@@ -321,7 +345,7 @@ Outcome Controls::apply(const set::MarkCorner&) {
 
 Outcome Controls::apply(const set::Unmark&) {
   Marking& marking = look_.marking;
-  if (marking.last() && (!look_.state.recording || marking.take != take_))
+  if (marking.last() && (!look_.state.recording || marking.take != take_.name))
     return {"the take with these marks has ended", true, {}};
   std::optional<session::MarkEvent> withdrawn = marking.withdraw();
   if (!withdrawn) return {"no corner is marked", true, {}};

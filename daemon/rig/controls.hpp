@@ -48,6 +48,7 @@ enum class Request {
   start_take,
   stop_take,
   mark_good,
+  snapshot,
   acknowledge,
   reload_set,
   keep_edits,
@@ -60,6 +61,14 @@ struct Outcome {
   bool refused = false;
   std::optional<Request> request;
   std::optional<session::MarkEvent> mark = {};  // for the running take
+};
+
+// What is known of the take that is recorded, or was last.
+struct LastTake {
+  std::string name;            // empty: none yet
+  bool is_ending = false;      // recording has ended, and it is not whole on the disk yet
+  double behind_s = 0;         // of it that is not on the disk
+  bool is_of_this_set = true;  // it was recorded with the text of the running set
 };
 
 // samples_up and samples_down step through these numbers (P6).
@@ -86,8 +95,7 @@ class Controls {
   // Takes what the cross of the shown picture is on; nothing: no picture was shown yet.
   void use_aim(const std::optional<Aim>& aim) { aim_ = aim; }
 
-  // Takes the name of the take that is recorded, or was last.
-  void use_take(std::string take) { take_ = std::move(take); }
+  void use_take(LastTake take) { take_ = std::move(take); }
 
   // Forgets the marks, because another take begins.
   void begin_marks() { look_.marking.begin(); }
@@ -153,6 +161,7 @@ class Controls {
   std::string variant_shown(const std::string& object) const;
   std::vector<std::string> lights() const;
   std::optional<Outcome> no_lamp() const;
+  std::optional<Outcome> no_review() const;
   pipeline::LightEdit& light_edit();
 
   const set::Control control_;
@@ -170,7 +179,7 @@ class Controls {
   std::map<std::string, Looks> looks_;
   pipeline::RecordedLook recorded_;
   std::optional<Aim> aim_;
-  std::string take_;
+  LastTake take_;
   std::vector<std::string> set_lights_;
   std::vector<pipeline::FoundLamp> found_;
   const bool is_animated_;

@@ -1,5 +1,5 @@
-// Carries events from the stages' threads to the rig's main thread, in order, behind one
-// descriptor.
+// Carries events and what became of snapshots from the stages' threads to the rig's main thread, in
+// order, behind one descriptor.
 #pragma once
 
 #include <sys/eventfd.h>
@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstring>
 #include <mutex>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -30,6 +31,20 @@ class Inbox {
     const std::lock_guard lock(mutex_);
     events_.push_back({event});
     eventfd_write(descriptor_.get(), 1);
+  }
+  // What became of a snapshot: its files, or why there are none.
+  struct Snapshot {
+    std::string said;
+    bool is_saved = false;
+  };
+  void post(Snapshot snapshot) {
+    const std::lock_guard lock(mutex_);
+    snapshots_.push_back(std::move(snapshot));
+    eventfd_write(descriptor_.get(), 1);
+  }
+  std::vector<Snapshot> take_snapshots() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(snapshots_, {});
   }
   // Call this when the pipeline has ended, with the observer's stream or by a stage's error.
   void finish(bool by_error) {
@@ -65,6 +80,7 @@ class Inbox {
  private:
   mutable std::mutex mutex_;
   std::vector<pipeline::Pushed<Event>> events_;
+  std::vector<Snapshot> snapshots_;
   bool finished_ = false, by_error_ = false;
   OwnedDescriptor descriptor_;
 };

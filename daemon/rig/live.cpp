@@ -64,6 +64,8 @@ control::Status status_of(const Rig& rig, const set::Set& set, const render::Dev
           look.state.recording,
           recorder.writing,
           recorder.directory.filename().string(),
+          recorder.good,
+          recorder.seconds,
           recorder.frames,
           recorder.lost.frames,
           0.1 * std::floor(10 * recorder.backlog.seconds),
@@ -76,7 +78,9 @@ control::Status status_of(const Rig& rig, const set::Set& set, const render::Dev
           rig.controls().selected_light(),
           render::drawing_device(device),
           fit ? words_of(*fit) : "",
-          reports.announced()};
+          reports.announced(),
+          rig.picture_age_s().value_or(-1),
+          0};
 }
 
 control::Verbs verbs_of(Rig& rig, const set::Set& set, const render::Device& device,
@@ -94,9 +98,13 @@ control::Verbs verbs_of(Rig& rig, const set::Set& set, const render::Device& dev
   control::Verbs verbs;
   const auto over_bus = [](const std::string& who) { return "bus, " + who; };
   verbs.perform = [&rig, answer, ends_a_take, not_here, over_bus](const set::Action& action,
-                                                                  const std::string& who) {
-    if (std::holds_alternative<set::Record>(action.effect) && ends_a_take(false)) return not_here();
-    return answer(rig.perform(action, over_bus(who)));
+                                                                  const std::string& who,
+                                                                  control::Verbs::Reply reply) {
+    if (std::holds_alternative<set::Record>(action.effect) && ends_a_take(false))
+      return reply(not_here());
+    rig.perform(action, over_bus(who), [reply = std::move(reply), answer](const Outcome& outcome) {
+      reply(answer(outcome));
+    });
   };
   verbs.go = [&rig, answer, over_bus](Mode mode, const std::string& who) {
     return answer(rig.wish(wish_for(mode), over_bus(who)));
@@ -110,6 +118,30 @@ control::Verbs verbs_of(Rig& rig, const set::Set& set, const render::Device& dev
   };
   verbs.status = [&] { return status_of(rig, set, device, reports); };
   verbs.metrics = metrics;
+  return verbs;
+}
+
+// While a set loads: `last` is what was known before.
+control::Verbs loading_verbs(control::Status last) {
+  last.mode = "loading";
+  last.recording = last.writing = last.camera_lost = false;
+  const auto age_s = [begin = std::chrono::steady_clock::now()] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  const auto refusal = [age_s] {
+    return control::Answer{
+        "a set is loading (since " + std::to_string(std::lround(age_s())) + " s); try again", true};
+  };
+  control::Verbs verbs;
+  verbs.perform = [refusal](const set::Action&, const std::string&,
+                            const control::Verbs::Reply& reply) { reply(refusal()); };
+  verbs.go = [refusal](Mode, const std::string&) { return refusal(); };
+  verbs.record = [refusal](bool, const std::string&) { return refusal(); };
+  verbs.status = [last, age_s]() mutable {
+    last.loading_s = age_s();
+    return last;
+  };
+  verbs.metrics = [refusal]() -> std::string { throw Error(refusal().said); };
   return verbs;
 }
 
@@ -152,6 +184,7 @@ class LiveRun {
         pulse_(pulse),
         end_from_outside_(options.stop, [this] { end_.request_stop(); }),
         service_(liveness, reports, end_.get_token()),
+        bus_(begin_bus()),
         sets_(
             options.set_file, [this](set::Set& set) { override_set(set, options_); }, reports,
             options.with),
@@ -170,6 +203,14 @@ class LiveRun {
   }
 
  private:
+  // Whoever asks is answered from the beginning, while the first set loads.
+  std::unique_ptr<BusLink> begin_bus() const {
+    if (!options_.bus) return nullptr;
+    auto bus = std::make_unique<BusLink>(kept_);
+    bus->serve_alone(loading_verbs({}));
+    return bus;
+  }
+
   pipeline::MetricsSnapshot snapshot() {
     const std::chrono::duration<double> since = std::chrono::steady_clock::now() - start_;
     return metrics_.snapshot(since.count());
@@ -201,7 +242,7 @@ class LiveRun {
       rig = std::make_unique<Rig>(
           Rig::Parts{loop, sets_, kept_, service_, pulse_, device_, renderer_, show, wants,
                      [this](RigFacts facts) { screen_->show(std::move(facts)); }, options_.buttons,
-                     options_.around_cameras, options_.loop, end_.get_token()});
+                     options_.around_cameras, options_.loop, last_take_, end_.get_token()});
     } catch (const std::exception& error) {
       if (!sets_.go_back(error.what())) throw;
       return false;
@@ -220,14 +261,12 @@ class LiveRun {
 
   void run_rig(EventLoop& loop, Rig& rig, const set::Set& set) {
     std::optional<RecordingWatch> watch;
-    std::optional<BusLink> bus;
-    if (options_.bus) {
+    if (bus_) {
       watch.emplace(loop.handle(), reports_, [this] { end_if_replaced(); });
-      bus.emplace(loop,
-                  verbs_of(rig, set, *device_, reports_, [this] { return to_json(snapshot()); }),
-                  kept_);
+      bus_->serve(loop,
+                  verbs_of(rig, set, *device_, reports_, [this] { return to_json(snapshot()); }));
       rig.on_change([&] {
-        bus->changed();
+        bus_->changed();
         watch->look(rig);
       });
     }
@@ -235,6 +274,10 @@ class LiveRun {
         loop.on_signal(SIGHUP, [&] { rig.perform(*set::find_action("reload_set"), "SIGHUP"); });
     const auto drivers = loop.every(std::chrono::seconds(1), [&] { end_if_barred(rig); });
     rig.run();
+    if (bus_ && sets_.has_next() && !end_.stop_requested())
+      bus_->serve_alone(loading_verbs(status_of(rig, set, *device_, reports_)));
+    else
+      bus_.reset();
     sets_.leave(rig.controls().look().edits);
     if (sets_.has_next() && rig.controls().look().take_edits != pipeline::Edits{})
       reports_({report::Severity::warning, "review",
@@ -287,10 +330,12 @@ class LiveRun {
                                            .liveness = liveness_,
                                            .patience = options_.patience,
                                            .rehearse = options_.rehearse};
+  std::unique_ptr<BusLink> bus_;  // null: not wanted, or the rig ends
   SetKeeper sets_;
   const std::shared_ptr<render::Device> device_;
   std::shared_ptr<render::Renderer> renderer_;  // goes from set to set
   CrewScreen screen_;
+  KeptTake last_take_;
   bool is_last_ = false;  // no set follows the one that has run
 };
 

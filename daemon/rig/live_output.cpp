@@ -31,6 +31,7 @@ void count_picture(const Shot& shot, pipeline::Metrics& metrics, report::Reports
   const render::Counters& counters = shot.counters;
   if (counters.rebuilt_trees > 0)
     metrics.count("trees of deforming meshes rebuilt", counters.rebuilt_trees);
+  if (counters.below_zero > 0) metrics.count("pixels without light left", counters.below_zero);
   if (counters.dropped_not_finite + counters.dropped_negative + counters.stopped_in_layers +
           counters.unfinished ==
       0)
@@ -70,10 +71,9 @@ void LiveOutput::record_shown(const Shot& shot) {
 
 void LiveOutput::write_snapshot(const Shot& shot) const {
   try {
-    parts_.kept.reports(
-        {Severity::info, "snapshot", rig::write_snapshot(shot, calibrated_).string()});
+    parts_.inbox.post({rig::write_snapshot(shot, calibrated_).string() + ".exr and .png", true});
   } catch (const std::exception& error) {
-    parts_.kept.reports({Severity::error, "snapshot", reason_of(error)});
+    parts_.inbox.post({reason_of(error), false});
   }
 }
 

@@ -12,6 +12,7 @@
 #include "daemon/pipeline/stage_keeper.hpp"
 #include "daemon/report/reports.hpp"
 #include "daemon/rig/controls.hpp"
+#include "daemon/rig/inbox.hpp"
 
 namespace previz::rig {
 
@@ -25,6 +26,7 @@ class LiveOutput {
     const set::Set& set;
     output::Recorder& recorder;
     const pipeline::Newest<Look>& look;
+    Inbox& inbox;
     std::function<void(pipeline::Shot)> show;  // on the display's thread
     pipeline::StageKeeper::Parts kept;
   };

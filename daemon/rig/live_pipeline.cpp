@@ -71,12 +71,13 @@ LivePipeline::Impl::Impl(Parts the_parts, std::stop_token stop)
             pipeline::light_calibration(parts.set, parts.cameras.recorded.info), calibration),
       tracking({parts.set, parts.cameras, parts.recorder, parts.look, light, parts.kept},
                calibration),
-      render(parts.set, parts.look, parts.inbox, parts.kept.metrics, parts.kept.reports,
+      render(parts.set, parts.look, parts.inbox, parts.kept.metrics,
              {tracked, reviewed, snapshots, found, governed, recorded_look, pass_times},
              parts.wants, stop_source.get_token()),
       graphics({parts.set, parts.scene, parts.device, parts.renderer, render, rendered, parts.kept},
                calibration, stop_source.get_token()),
-      output({parts.set, parts.recorder, parts.look, parts.show, parts.kept}, calibration) {
+      output({parts.set, parts.recorder, parts.look, parts.inbox, parts.show, parts.kept},
+             calibration) {
   light.await_bracket(parts.cameras.light_exposures);
   stages.emplace(parts.kept.metrics, stop_source.get_token(),
                  [this] { stop_source.request_stop(); });

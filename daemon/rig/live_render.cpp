@@ -16,6 +16,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds mode_delay{100};  // how late a change of mode may be noticed
+// A snapshot is of the first picture with virtual objects that comes within this time.
+constexpr std::chrono::seconds plates_patience{1};
 constexpr int most_round = 64;
 constexpr double round_s = 1;
 constexpr int most_samples = 1 << 24;  // above this the sums are no longer exact enough (P4)
@@ -27,13 +29,12 @@ double seconds_since(Clock::time_point begin) {
 }  // namespace
 
 LiveRender::LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, Inbox& inbox,
-                       pipeline::Metrics& metrics, report::Reports& reports, Channels channels,
-                       Wants wants, std::stop_token stop)
+                       pipeline::Metrics& metrics, Channels channels, Wants wants,
+                       std::stop_token stop)
     : set_(set),
       look_(look),
       inbox_(inbox),
       metrics_(metrics),
-      reports_(reports),
       channels_(channels),
       wants_(std::move(wants)),
       stop_(std::move(stop)),
@@ -369,6 +370,12 @@ Shot LiveRender::complete() {
     is_first_ = false;
   }
   if (under_way.snapshot) {
+    const Clock::time_point since = snapshot_since_.value_or(under_way.begin);
+    if (!shot.untouched.empty() && Clock::now() - since < plates_patience) {
+      snapshot_since_ = since;
+      return shot;
+    }
+    snapshot_since_.reset();
     ++(under_way.of_live ? snapshots_ : refined_snapshots_);
     save(shot);
   }
@@ -407,11 +414,11 @@ void LiveRender::save_refined(const Look& look) {
 // The picture goes on while a disk hangs, and no more snapshots wait for it than the queue has room
 // for.
 void LiveRender::save(const Shot& shot) {
+  if (!shot.untouched.empty()) return inbox_.post({"nothing is saved: " + shot.untouched, false});
   if (channels_.snapshots.offer(shot)) return;
   if (stop_.stop_requested()) return metrics_.dropped("snapshot", "stopped");
   metrics_.dropped("snapshot", "queue full");
-  const std::string what = "is skipped, because earlier ones are not on the disk yet";
-  reports_({report::Severity::error, "snapshot", what, {}, report::passing("snapshot", what)});
+  inbox_.post({"is skipped, because earlier ones are not on the disk yet", false});
 }
 
 }  // namespace previz::rig

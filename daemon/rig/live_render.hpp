@@ -16,7 +16,6 @@
 #include "daemon/pipeline/metrics.hpp"
 #include "daemon/pipeline/render_stage.hpp"
 #include "daemon/pipeline/shot.hpp"
-#include "daemon/report/reports.hpp"
 #include "daemon/rig/controls.hpp"
 #include "daemon/rig/inbox.hpp"
 #include "daemon/rig/pass_meter.hpp"
@@ -42,8 +41,7 @@ class LiveRender {
 
   // The stage that renders must ask interrupted() whether it is cancelled.
   LiveRender(const set::Set& set, const pipeline::Newest<Look>& look, Inbox& inbox,
-             pipeline::Metrics& metrics, report::Reports& reports, Channels channels, Wants wants,
-             std::stop_token stop);
+             pipeline::Metrics& metrics, Channels channels, Wants wants, std::stop_token stop);
 
   void use(pipeline::RenderStage& stage);
   // Forgets a stage that has failed, and the refinement that it was at; there is none until use().
@@ -115,7 +113,6 @@ class LiveRender {
   const pipeline::Newest<Look>& look_;
   Inbox& inbox_;
   pipeline::Metrics& metrics_;
-  report::Reports& reports_;
   Channels channels_;
   const Wants wants_;
   const std::stop_token stop_;
@@ -135,6 +132,7 @@ class LiveRender {
   pipeline::Edits refined_edits_;
   double sample_s_ = 0;  // time of the last refinement's sample; 0: not known
   pipeline::Intake<pipeline::Shot> intake_, review_intake_;
+  std::optional<std::chrono::steady_clock::time_point> snapshot_since_;    // plates came instead
   std::uint64_t snapshots_ = 0, refined_snapshots_ = 0, refinements_ = 0;  // the Look's, done
 };
 

@@ -34,6 +34,8 @@ constexpr std::chrono::milliseconds pipeline_patience{2000};
 constexpr double longest_disk_silence_s = 90;
 // A disk of takes that does not answer for longer is reported.
 constexpr double longest_folder_silence_s = 2;
+// Whoever asks for a snapshot waits at most so long for the next picture; D-Bus itself waits 25 s.
+constexpr std::chrono::seconds snapshot_patience{20};
 
 output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& cameras,
                                    Reports& reports) {
@@ -61,7 +63,8 @@ output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& camer
 }
 
 output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras& cameras,
-                                         const pipeline::StageKeeper::Parts& kept) {
+                                         const pipeline::StageKeeper::Parts& kept,
+                                         const KeptTake& last) {
   const set::Recording& recording = loaded.set.recording;
   output::RecorderOptions options;
   options.take = take_template(loaded, cameras, kept.reports);
@@ -75,6 +78,8 @@ output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras&
                           std::to_string(options.queue_bytes / 1'000'000) + " MB are used"}));
   options.reserve_bytes = static_cast<std::uint64_t>(recording.reserve_mb * 1e6);
   options.measures_disk = true;
+  options.last_take = last.directory;
+  options.is_last_good = last.is_good;
   options.note = [&reports = kept.reports](const report::Report& report) { reports(report); };
   options.left_out = [&metrics = kept.metrics](const std::string& cause, std::uint64_t pictures) {
     metrics.dropped("recorder", cause, pictures);
@@ -121,7 +126,7 @@ Rig::Rig(Parts parts)
       cameras_(open_cameras_of(loaded_, parts_, watch_usb(parts_.kept.reports))),
       controls_(loaded_.set, parts_.sets.edits(), loaded_.scene),
       look_(controls_.look()),
-      recorder_(recorder_options(loaded_, cameras_, parts_.kept)),
+      recorder_(recorder_options(loaded_, cameras_, parts_.kept, parts_.last_take)),
       recorder_watch_(parts_.kept.metrics, "recorder", [this] { return waiting_in(recorder_); }),
       folders_watch_(parts_.kept.metrics, "folders of takes",
                      [this] { return waiting_for_folders(recorder_); }),
@@ -146,6 +151,7 @@ Rig::Rig(Parts parts)
   desk_.emplace(
       loaded_.set.buttons, open_button_devices(loaded_.set, cameras_, parts_.more_buttons),
       ButtonDesk::Parts{parts_.loop, parts_.kept.reports, parts_.kept.metrics}, asks_of_buttons());
+  if (!parts_.last_take.directory.empty()) controls_.happened(Event::take_finished);
   free_bytes_ = recorder_.free_bytes();
   look_at_folders();
   show_facts();
@@ -186,8 +192,19 @@ void Rig::run() {
   parts_.service.ready("set \"" + loaded_.set.name + "\"");
   parts_.loop.run();
   if (ends()) parts_.service.stopping();
+  for (; !snapshots_.empty(); snapshots_.pop_front())
+    answer_snapshot({"nothing is saved: no picture came before the rig left this set", true, {}});
   close_take();
+  keep_take();
   if (ends()) pipeline_.wait();
+}
+
+void Rig::keep_take() {
+  const output::RecorderStatus recorder = recorder_.status();
+  if (recorder.finished_takes > 0)
+    parts_.last_take = {recorder.directory, loaded_.text, recorder.good};
+  else if (recorder.number == 0)
+    parts_.last_take.is_good = recorder.good;
 }
 
 // Another rig follows this one where a set was read, unless a stop came with it.
@@ -221,8 +238,17 @@ void Rig::know_picture() {
   controls_.use_found(pipeline_.found_lamps());
   controls_.use_recorded(pipeline_.recorded_look());
   controls_.use_aim(*aim_.get());
-  controls_.use_take(recorder_.status().directory.filename().string());
+  know_take();
   controls_.use_governed(pipeline_.governed().samples);
+}
+
+// What has ended meanwhile is announced first.
+void Rig::know_take() {
+  look_at_recorder();
+  const output::RecorderStatus recorder = recorder_.status();
+  controls_.use_take({recorder.directory.filename().string(), recorder.ending,
+                      recorder.backlog.seconds,
+                      recorder.number > 0 || parts_.last_take.set_text == loaded_.text});
 }
 
 int Rig::samples() const {
@@ -236,7 +262,16 @@ Outcome Rig::perform(const set::Action& action, const std::string& by) {
   return apply(controls_.perform(action), by);
 }
 
+void Rig::perform(const set::Action& action, const std::string& by, Answered answered) {
+  const Outcome outcome = perform(action, by);
+  if (outcome.request == Request::snapshot)
+    snapshots_.back().answered = std::move(answered);
+  else
+    answered(outcome);
+}
+
 Outcome Rig::wish(Event event, const std::string& by) {
+  know_take();
   return apply(controls_.happened(event), by);
 }
 
@@ -303,6 +338,9 @@ std::optional<std::string> Rig::carry_out(Request request, const std::string& by
     case Request::mark_good:
       recorder_.mark_good();
       break;
+    case Request::snapshot:
+      snapshots_.push_back({std::chrono::steady_clock::now(), {}});
+      break;
     case Request::acknowledge:
       parts_.kept.reports.settle(cut_off);
       parts_.kept.reports.settle(salvage);
@@ -345,7 +383,30 @@ void Rig::look_at_set() {
   if (why_not && !reading_for_.empty()) apply({*why_not, true, {}}, reading_for_);
 }
 
+void Rig::take_snapshots() {
+  for (const Inbox::Snapshot& snapshot : inbox_.take_snapshots()) {
+    apply({snapshot.said, false, {}}, "snapshot",
+          snapshot.is_saved ? Severity::info : Severity::error);
+    answer_snapshot({snapshot.said, !snapshot.is_saved, {}});
+    if (!snapshots_.empty()) snapshots_.pop_front();
+  }
+}
+
+// The picture may still come when nobody waits for it any more.
+void Rig::look_at_snapshots() {
+  if (snapshots_.empty() ||
+      std::chrono::steady_clock::now() - snapshots_.front().asked < snapshot_patience)
+    return;
+  answer_snapshot({"no picture has come for 20 s; the next one is saved", true, {}});
+}
+
+void Rig::answer_snapshot(const Outcome& outcome) {
+  if (snapshots_.empty()) return;
+  if (const Answered answered = std::exchange(snapshots_.front().answered, {})) answered(outcome);
+}
+
 void Rig::take_inbox() {
+  take_snapshots();
   for (const Event event : inbox_.take()) {
     const State before = controls_.look().state;
     const Outcome outcome = controls_.happened(event);
@@ -373,6 +434,7 @@ void Rig::tick() {
   look_at_recorder();
   look_at_set();
   look_at_review();
+  look_at_snapshots();
   announce_faults();
   if (++ticks_ % ticks_a_second == 0) {
     desk_->count();
@@ -435,6 +497,7 @@ void Rig::look_at_recorder() {
            Severity::error);
   announce(finished_takes_, status.finished_takes, Event::take_finished,
            "take " + status.finished + " is finished", Severity::info);
+  if (std::exchange(is_good_, status.good) != status.good && changed_) changed_();
   announce_salvaged(status.salvaged);
   if (status.interrupted && !std::exchange(has_resumed_, true)) resume(*status.interrupted);
 }
@@ -468,6 +531,7 @@ void Rig::look_at_guides() {
 }
 
 void Rig::show_picture(pipeline::Shot shot) {
+  shown_at_ = std::chrono::steady_clock::now();
   if (!std::exchange(are_lamps_judged_, true))
     for (const std::string& what : scene::remarks_on_bright_lamps(
              loaded_.scene, loaded_.set,
@@ -476,6 +540,12 @@ void Rig::show_picture(pipeline::Shot shot) {
   if (!shot.frozen) aim_.set(aim_of(shot, lens_));
   GuidesOf guides = guides_.look_at(shot);
   parts_.show(std::move(shot), *look_.get(), std::move(guides));
+}
+
+std::optional<double> Rig::picture_age_s() const {
+  const std::chrono::steady_clock::time_point shown = shown_at_;
+  if (shown == std::chrono::steady_clock::time_point()) return std::nullopt;
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - shown).count();
 }
 
 void Rig::show_facts() {

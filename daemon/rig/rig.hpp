@@ -2,8 +2,11 @@
 // recorder, and carries out what buttons and bus ask for. It runs on the main thread's event loop.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <deque>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -30,6 +33,13 @@
 
 namespace previz::rig {
 
+// The take that was recorded last, by this rig or one before it.
+struct KeptTake {
+  std::filesystem::path directory;  // empty: none yet
+  std::string set_text;             // that it was recorded with
+  bool is_good = false;
+};
+
 class Rig {
  public:
   struct Parts {  // outlive the rig
@@ -47,6 +57,7 @@ class Rig {
     std::function<std::vector<std::unique_ptr<Buttons>>()> more_buttons;  // may be empty
     std::function<void(Cameras&)> around_cameras;  // as LiveOptions'; may be empty
     bool loop_cameras = false;
+    KeptTake& last_take;  // of the rig before; run() leaves the last one in it
     std::stop_token stop;
   };
 
@@ -64,11 +75,16 @@ class Rig {
   // Call both on the loop's thread. `by` names who asks, for the log and the take: "button red".
   Outcome perform(const set::Action& action, const std::string& by);
   Outcome wish(Event event, const std::string& by);
+  // As perform(); what became of a snapshot is answered once it is known, on the loop's thread.
+  using Answered = std::function<void(const Outcome&)>;
+  void perform(const set::Action& action, const std::string& by, Answered answered);
 
   const Controls& controls() const { return controls_; }
   // Returns the samples per pixel that the preview has now.
   int samples() const;
   output::RecorderStatus recorder_status() const { return recorder_.status(); }
+  // Returns how long ago the last picture was shown; nothing before the first.
+  std::optional<double> picture_age_s() const;
   // Returns how far the model is from the pictures; nothing while the guides are off.
   std::optional<fit::Figure> model_fit() const { return guides_.figure(); }
   // Called after controls, recorder or Reports::announced() have changed.
@@ -77,7 +93,12 @@ class Rig {
  private:
   ButtonDesk::Asks asks_of_buttons();
   void know_picture();
+  void know_take();
+  void keep_take();
   void take_inbox();
+  void take_snapshots();
+  void look_at_snapshots();
+  void answer_snapshot(const Outcome& outcome);
   void tick();
   void leave_if_stopped();
   bool ends() const;
@@ -112,15 +133,22 @@ class Rig {
   pipeline::Metrics::Watch recorder_watch_, folders_watch_, inbox_watch_;
   std::optional<ButtonDesk> desk_;  // always there once the rig is made
   std::uint64_t finished_takes_ = 0, failures_ = 0;
+  bool is_good_ = false;      // the last take was marked good
   std::size_t salvaged_ = 0;  // takes of RecorderStatus::salvaged that were announced
   bool has_resumed_ = false;
   int ticks_ = 0;
   std::optional<std::chrono::steady_clock::time_point> stopped_;  // when the stop was noticed
   bool is_take_closed_ = false;
+  std::atomic<std::chrono::steady_clock::time_point> shown_at_{};
   bool are_lamps_judged_ = false;  // by the exposure of the first picture that was shown
   std::string reading_for_;  // who wants the set that is being read; empty: its file has changed
   std::string announced_;    // the last announcement that the bus knows of
   std::string fit_said_;     // the last figure that the bus knows of, in words
+  struct AwaitedSnapshot {
+    std::chrono::steady_clock::time_point asked;
+    Answered answered;  // empty: nobody waits for an answer
+  };
+  std::deque<AwaitedSnapshot> snapshots_;
   std::unique_ptr<Review> review_;  // at most one, even if it takes long to end
   std::function<void()> changed_;
   std::optional<std::uint64_t> free_bytes_;

@@ -101,6 +101,12 @@ bool FileEdit::has(const std::string& tables, std::size_t index, const std::stri
   return table(tables, index).values.contains(key);
 }
 
+std::vector<std::string> FileEdit::keys(const std::string& tables, std::size_t index) const {
+  std::vector<std::string> names;
+  for (const auto& [key, span] : table(tables, index).values) names.push_back(key);
+  return names;
+}
+
 void FileEdit::put(const std::string& tables, std::size_t index, const std::string& key,
                    const std::string& value) {
   const Table& where = table(tables, index);
@@ -125,6 +131,18 @@ std::string FileEdit::text() const {
   result += appended_;
   parsed(result);
   return result;
+}
+
+std::string with_table(const std::string& text, const std::string& name, const std::string& table) {
+  FileEdit file(text);
+  if (file.count(name) == 0) {
+    file.append(table);
+    return file.text();
+  }
+  const FileEdit given(table);
+  for (const std::string& key : given.keys(name, 0))
+    file.put(name, 0, key, *given.written(name, 0, key));
+  return file.text();
 }
 
 std::filesystem::path keep_beside(const std::filesystem::path& file) {

@@ -27,6 +27,8 @@ class FileEdit {
   // Returns a key's value as the file writes it; nothing if the table lacks the key.
   std::optional<std::string> written(const std::string& tables, std::size_t index,
                                      const std::string& key) const;
+  // Returns the table's keys.
+  std::vector<std::string> keys(const std::string& tables, std::size_t index) const;
   // Gives a key this value, written as TOML. A new key comes after the table's last one.
   void put(const std::string& tables, std::size_t index, const std::string& key,
            const std::string& value);
@@ -56,6 +58,10 @@ class FileEdit {
   };
   std::vector<Replacement> replacements_;
 };
+
+// Returns a set file's text with the keys of `table`, the text of a [name] with its header; keys
+// that the file's own table has beside them stay. Throws previz::Error as FileEdit does.
+std::string with_table(const std::string& text, const std::string& name, const std::string& table);
 
 // Returns the text of a set file. Throws previz::Error that names it where it cannot be read, and
 // where it is no file: a pipe can be read only once, and one that nobody writes to, never.

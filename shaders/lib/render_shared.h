@@ -170,6 +170,7 @@ struct GpuControl {
   uint unfinished;  // paths that a batch left in the queue
   uint measured_low, measured_high;      // vertices whose radiance the plate gave
   uint unmeasured_low, unmeasured_high;  // real vertices for which it could not
+  uint below_zero;  // pixels of shown pictures in which the composite's rule gave less than no light
 };
 
 struct GpuInstance {
@@ -481,7 +482,7 @@ static_assert(sizeof(GpuShow) == 72);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 160);
-static_assert(sizeof(GpuControl) == 96);
+static_assert(sizeof(GpuControl) == 100);
 static_assert(sizeof(GpuInstance) == 124);
 static_assert(sizeof(GpuTexture) == 32);
 static_assert(sizeof(GpuLight) == 160);

@@ -67,7 +67,8 @@ struct Estimate {
   vec3 real;       // mean(Lr)
 };
 
-// Returns the composite. A clipped channel of the plate stands for the model's radiance where that
+// Returns the composite, which is below 0 where the model's real world is so much brighter than the
+// picture that a shadow takes more light than is there: no light is shown there. A clipped channel of the plate stands for the model's radiance where that
 // is brighter, but what comes out is then no brighter than the plate or the plain composite: light
 // that the sensor could not show is used up by shadows and never added.
 vec3 compose(Measured camera, Estimate e) {

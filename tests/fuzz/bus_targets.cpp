@@ -76,7 +76,8 @@ class Conversation {
 
   control::Verbs verbs() {
     control::Verbs verbs;
-    verbs.perform = [this](const set::Action&, const std::string&) { return said(); };
+    verbs.perform = [this](const set::Action&, const std::string&,
+                           const control::Verbs::Reply& reply) { reply(said()); };
     verbs.go = [this](set::Mode, const std::string&) { return said(); };
     verbs.record = [this](bool, const std::string&) { return said(); };
     verbs.status = [this] {

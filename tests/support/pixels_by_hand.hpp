@@ -45,7 +45,9 @@ inline Plate present(std::span<const gpu::GpuPixel> pixels, const Plate& plate,
   const bool has_plate = !plate.samples.empty();
   const bool is_clipped =
       has_plate && *std::ranges::max_element(plate.samples) >= response.clipping().from;
-  render::ToPresent what{{},         plate.width, plate.height, codes,   has_plate,
+  render::Buffer control;
+  render::upload_storage(*shared_device(), control, std::vector{gpu::GpuControl{}});
+  render::ToPresent what{{},         plate.width, plate.height, control, codes,  has_plate,
                          is_clipped, exposure,    {},           samples, denoise};
   for (std::size_t i = 0; i < rows.size(); ++i)
     what.tiles.push_back({buffers[i], rows[i].first, rows[i].second});

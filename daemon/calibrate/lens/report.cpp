@@ -6,6 +6,8 @@
 #include <sstream>
 
 #include "daemon/calibrate/lens/residual_plot.hpp"
+#include "daemon/set/file_edit.hpp"
+#include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
@@ -93,6 +95,13 @@ void write_tables(const std::string& tables, const std::optional<std::filesystem
                   std::ostream& out) {
   if (file) session::replace_file(*file, tables);
   fmt::print(out, "\n{}", tables);
+}
+
+void write_back(const std::filesystem::path& set_file, const std::string& text, std::ostream& out) {
+  set::parse_set(text, set_file);
+  const std::filesystem::path old = set::keep_beside(set_file);
+  session::replace_file(set_file, text);
+  fmt::print(out, "written to {}; previous version: {}\n", set_file.string(), old.string());
 }
 
 }  // namespace previz::calibrate

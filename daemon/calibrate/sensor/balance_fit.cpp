@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "daemon/calibrate/sensor/paper.hpp"
 #include "daemon/lighting/luminance.hpp"
 #include "drivers/error.hpp"
 
@@ -133,7 +134,12 @@ std::string listed(const SurfacePixels& seen, const std::vector<SurfaceRatio>& s
 
 void mark_references(const SurfacePixels& seen, const std::vector<std::string>& references,
                      std::vector<SurfaceRatio>& surfaces) {
-  for (SurfaceRatio& surface : surfaces) surface.reference = references.empty();
+  const auto is_paper = [&](const SurfaceRatio& surface) {
+    return seen.surfaces[surface.surface].material == paper_name;
+  };
+  const bool has_paper = std::ranges::any_of(surfaces, is_paper);
+  for (SurfaceRatio& surface : surfaces)
+    surface.reference = references.empty() && (!has_paper || is_paper(surface));
   for (const std::string& name : references) {
     const auto found = std::ranges::find_if(surfaces, [&](const SurfaceRatio& surface) {
       return seen.surfaces[surface.surface].material == name;

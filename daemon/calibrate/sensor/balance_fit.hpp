@@ -28,12 +28,13 @@ struct Balance {
 
 // A surface's ratio is the median over tiles of the median over the tile's pixels of log(plate /
 // rendered). Its deviation is that of a median (1.2533 times the mean's) over tiles, from their
-// median absolute deviation. The balance is the weighted median over the reference surfaces (over
-// all, if `references` is empty, as if as many albedos were too low as too high), so that one wrong
-// albedo among three does no harm. A surface's weight is one over its variance and that of an
-// albedo, so that one that is hardly known moves nothing. The balance's deviation is computed in
-// the same way, and is never below that of one surface alone. Throws previz::Error if no surface
-// can be used or a reference is not among those seen, naming those that are.
+// median absolute deviation. The balance is the weighted median over the reference surfaces (if
+// `references` is empty, the tags' paper alone, whose colour is known, and where none is seen, over
+// all, as if as many albedos were too low as too high), so that one wrong albedo among three does
+// no harm. A surface's weight is one over its variance and that of an albedo, so that one that is
+// hardly known moves nothing. The balance's deviation is computed in the same way, and is never
+// below that of one surface alone. Throws previz::Error if no surface can be used or a reference is
+// not among those seen, naming those that are.
 Balance fit_balance(const SurfacePixels& seen, const std::vector<std::string>& references);
 
 // Returns how far the exposures that the two cameras state are from what is seen, in stops of

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "daemon/lighting/response.hpp"
 #include "daemon/pipeline/preview_size.hpp"
 #include "daemon/pipeline/take_shots.hpp"
+#include "daemon/scene/real_world.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::calibrate {
@@ -22,29 +22,6 @@ bool is_diffuse(const scene::Material& m) {
   return m.metallic == 0 && m.transmission == 0 && m.emission == glm::vec3(0) && !coated &&
          m.metallic_roughness_texture == scene::no_texture &&
          m.alpha_mode == scene::AlphaMode::opaque;
-}
-
-// Leaves out what is not real. Deformations and animations name their instances by their places.
-scene::Scene real_world(scene::Scene scene) {
-  std::vector<scene::Instance> kept;
-  std::vector<std::optional<std::uint32_t>> place(scene.instances.size());
-  for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    if ((scene.instances[i].presence & scene::world_real) == 0) continue;
-    place[i] = static_cast<std::uint32_t>(kept.size());
-    kept.push_back(std::move(scene.instances[i]));
-  }
-  scene.instances = std::move(kept);
-  std::erase_if(scene.deformations, [&](const scene::Deformation& deformation) {
-    return !place[deformation.instance];
-  });
-  for (scene::Deformation& deformation : scene.deformations)
-    deformation.instance = *place[deformation.instance];
-  for (scene::Animation& animation : scene.animations) {
-    std::erase_if(animation.instances, [&](const auto& use) { return !place[use.what]; });
-    for (auto& use : animation.instances) use.what = *place[use.what];
-  }
-  scene.variants.clear();  // they are of virtual objects
-  return scene;
 }
 
 // Makes every surface of the real world glow with its number; surfaces that are not diffuse are
@@ -123,7 +100,7 @@ class Probe {
         small_(pipeline::scaled(take.observer, scale_)),
         worlds_(device, paired(take.set), small_),
         identity_(device, paired(take.set), small_) {
-    const scene::Scene real = real_world(scene);
+    const scene::Scene real = scene::real_world(scene);
     worlds_.set_scene(real);
     identity_.set_scene(glowing(real, found_.surfaces));
     identity_.set_environment(darkness(), set::LightSampling::bsdf);
@@ -148,6 +125,7 @@ class Probe {
       if (!shot.light) continue;
       worlds_.set_environment(shot.light->lighting.environment, take_.set.lighting.sampling);
       add(shot);
+      if (options_.each_shot) options_.each_shot(shot);
     }
     if (found_.world_from_cameras.empty())
       throw Error(take_.session.directory.string() +
@@ -220,6 +198,18 @@ class Probe {
 };
 
 }  // namespace
+
+void append(const SurfacePixels& more, SurfacePixels& to) {
+  const auto surfaces = std::uint32_t(to.surfaces.size());
+  std::uint32_t tiles = 0;
+  for (const SurfacePixel& pixel : to.pixels) tiles = std::max(tiles, pixel.tile + 1);
+  to.surfaces.insert(to.surfaces.end(), more.surfaces.begin(), more.surfaces.end());
+  for (SurfacePixel pixel : more.pixels) {
+    pixel.surface += surfaces;
+    pixel.tile += tiles;
+    to.pixels.push_back(pixel);
+  }
+}
 
 SurfacePixels probe_surfaces(const pipeline::Take& take, const scene::Scene& scene,
                              const std::shared_ptr<render::Device>& device,

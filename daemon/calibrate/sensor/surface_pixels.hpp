@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
@@ -10,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/pipeline/shot.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/render/renderer.hpp"
 #include "daemon/scene/scene.hpp"
@@ -38,10 +40,14 @@ struct SurfacePixels {
   std::vector<std::string> notes;
 };
 
+// Adds the surfaces and pixels of `more`; tiles of the two are not the same ones.
+void append(const SurfacePixels& more, SurfacePixels& to);
+
 struct ProbeOptions {
-  int frames = 3;    // tracked frames, spread over the take
-  int width = 160;   // of the rendered picture
-  int samples = 64;  // per pixel
+  int frames = 3;                                       // tracked frames, spread over the take
+  int width = 160;                                      // of the rendered picture
+  int samples = 64;                                     // per pixel
+  std::function<void(pipeline::Shot&)> each_shot = {};  // is given each frame that was looked at
 };
 
 // Renders the real world alone (no virtual object) at a fraction of the observer's size. A second

@@ -11,6 +11,7 @@
 #include <future>
 
 #include "daemon/control/callers.hpp"
+#include "daemon/control/status_words.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/private_bus.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -40,12 +41,18 @@ class RigOnTheBus : public testing::Test {
     if (!bus_.running()) GTEST_SKIP() << "dbus-daemon is not installed";
     sd_event_new(&event_);
     Verbs verbs;
-    verbs.perform = [this](const set::Action& action, const std::string& who) {
+    verbs.perform = [this](const set::Action& action, const std::string& who,
+                           const Verbs::Reply& reply) {
       who_ = who;
       fall_if(fallen_ == "perform");
       status_.message = action.name;
       rig_->changed();
-      return Answer{action.name, std::string(action.name) == "standby"};
+      if (answers_later_ && action.name == std::string("snapshot")) {
+        reply_ = reply;
+        return;
+      }
+      if (const Verbs::Reply later = std::exchange(reply_, {})) later({"a.exr"});
+      reply({action.name, std::string(action.name) == "standby"});
     };
     verbs.go = [this](set::Mode mode, const std::string&) {
       status_.mode = mode == set::Mode::refine ? "refine" : "live";
@@ -94,8 +101,10 @@ class RigOnTheBus : public testing::Test {
   static void fall_if(bool falls) {
     if (falls) throw std::runtime_error("lamp fell down");
   }
-  std::string fallen_;  // the verb that throws
-  std::string who_;     // called last
+  std::string fallen_;          // the verb that throws
+  std::string who_;             // called last
+  bool answers_later_ = false;  // a snapshot
+  Verbs::Reply reply_;          // that somebody waits for
   std::vector<std::string> denied_;
   Status status_ = first_status();
   std::unique_ptr<Bus> rig_;
@@ -109,18 +118,99 @@ TEST(MethodName, IsTheActionInCamelCase) {
 }
 
 TEST_F(RigOnTheBus, PrevizctlOperatesIt) {
-  const Said status = previzctl("status");
+  const Said status = previzctl("status --raw");
   EXPECT_EQ(status.status, 0) << status.out;
   for (const char* line :
        {"Mode: live\n", "Recording: no\n", "Writing: yes\n", "Take: 12A_take003\n",
         "TakeFrames: 120\n", "Samples: 16\n", "Set: desk\n"})
     EXPECT_THAT(status.out, HasSubstr(line));
+  EXPECT_EQ(previzctl("status").out,
+            "mode: live\nset: desk\npicture: none shown yet, 16 samples per pixel\n"
+            "take: 12A_take003, 120 frames, still being written\n");
   EXPECT_EQ(previzctl("mode refine").out, "refine\n");
   EXPECT_EQ(previzctl("record on").out, "recording\n");
-  EXPECT_THAT(previzctl("status").out, HasSubstr("Recording: yes\n"));
+  EXPECT_THAT(previzctl("status").out, HasSubstr("mode: refine, recording\n"));
   EXPECT_EQ(previzctl("action move_left").out, "move_left\n");
   EXPECT_EQ(previzctl("set next").out, "next_set\n");
   EXPECT_EQ(previzctl("metrics").out, "{}\n");
+}
+
+// The rig goes on while somebody waits for an answer, and answers him when it has one.
+TEST_F(RigOnTheBus, AnAnswerMayComeLater) {
+  answers_later_ = true;
+  std::future<Said> later = std::async(std::launch::async, previzctl, "action snapshot");
+  EXPECT_TRUE(test::wait_until("it is asked", [&] {
+    return previzctl("status").out.find("last message: snapshot") != std::string::npos;
+  }));
+  EXPECT_EQ(later.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
+  EXPECT_EQ(previzctl("action move_left").out, "move_left\n");
+  EXPECT_EQ(later.get().out, "a.exr\n");
+}
+
+// Its set changes, and with it the loop and the verbs; who calls in between is answered afterwards.
+TEST_F(RigOnTheBus, StaysThereWhenAnotherLoopServesIt) {
+  quit_ = true;
+  loop_.join();
+  std::future<Said> said = std::async(std::launch::async, previzctl, "status");
+  sd_event_exit(event_, 0);
+  while (sd_event_get_state(event_) != SD_EVENT_FINISHED) sd_event_run(event_, 10'000);
+  sd_event_unref(event_);
+  sd_event_new(&event_);
+  Verbs verbs;
+  verbs.status = [] {
+    Status status;
+    status.mode = "loading";
+    status.loading_s = 5;
+    return status;
+  };
+  rig_->serve(event_, verbs);
+  quit_ = false;
+  loop_ = std::thread([this] {
+    while (!quit_) sd_event_run(event_, 10'000);
+  });
+  EXPECT_THAT(said.get().out, HasSubstr("mode: loading a set (since 5.0 s)\n"));
+}
+
+TEST(StatusWords, SayWhatMattersAndNothingElse) {
+  const std::vector<std::string> words = status_words({{"Mode", "live"},
+                                                       {"Recording", "no"},
+                                                       {"Writing", "no"},
+                                                       {"Take", "1A_take002"},
+                                                       {"TakeGood", "yes"},
+                                                       {"TakeSeconds", "4.8"},
+                                                       {"TakeFrames", "120"},
+                                                       {"TakeDropped", "56"},
+                                                       {"BehindSeconds", "0.0"},
+                                                       {"BehindMegabytes", "0"},
+                                                       {"Fault", ""},
+                                                       {"CameraLost", "no"},
+                                                       {"Samples", "1"},
+                                                       {"Set", "demo"},
+                                                       {"Object", "vase"},
+                                                       {"Light", ""},
+                                                       {"Device", "llvmpipe (CPU)"},
+                                                       {"Model", "model 0.3 px (90 % 0.8)"},
+                                                       {"Message", "button red: recording ended"},
+                                                       {"PictureSeconds", "0.4"},
+                                                       {"LoadingSeconds", "0.0"}});
+  EXPECT_EQ(words, (std::vector<std::string>{
+                       "mode: live", "set: demo", "drawn by: llvmpipe (CPU)",
+                       "picture: shown 0.4 s ago, 1 sample per pixel",
+                       "take: 1A_take002, good, 4.8 s, 120 frames, 56 frames dropped",
+                       "selected: object vase", "model: 0.3 px (90 % 0.8)",
+                       "last message: button red: recording ended"}));
+  EXPECT_EQ(status_words({{"Mode", "loading"}, {"LoadingSeconds", "13.2"}}),
+            (std::vector<std::string>{"mode: loading a set (since 13.2 s)", "take: none yet"}));
+  EXPECT_EQ(status_words({{"Take", "1A_take002"},
+                          {"Writing", "yes"},
+                          {"BehindSeconds", "1.6"},
+                          {"BehindMegabytes", "40"},
+                          {"Fault", "disk full"},
+                          {"CameraLost", "yes"}}),
+            (std::vector<std::string>{
+                "film camera: lost, no picture comes",
+                "take: 1A_take002, still being written, 1.6 s behind the cameras, 40 MB in memory",
+                "the last take ended by itself: disk full"}));
 }
 
 TEST_F(RigOnTheBus, WhatIsRefusedOrUnknownIsSaidAndFails) {
@@ -149,12 +239,12 @@ TEST_F(RigOnTheBus, WhatAVerbThrowsIsAnErrorInReplyAndTheRigGoesOn) {
 // The bus disconnects whoever sends anything else.
 TEST_F(RigOnTheBus, WhatIsNotUtf8OrNoCharacterIsSentWithoutIt) {
   status_.set = "d\xc3\xa4sk \xff\xc3";
-  EXPECT_THAT(previzctl("status").out, HasSubstr("Set: d\xc3\xa4sk ??\n"));
+  EXPECT_THAT(previzctl("status").out, HasSubstr("set: d\xc3\xa4sk ??\n"));
   status_.set = "\xed\xa0\x80 \xf4\x90\x80\x80 \xc0\xaf \xf0\x9f\x8e\xac";
-  EXPECT_THAT(previzctl("status").out, HasSubstr("Set: ??? ???? ?? \xf0\x9f\x8e\xac\n"));
+  EXPECT_THAT(previzctl("status").out, HasSubstr("set: ??? ???? ?? \xf0\x9f\x8e\xac\n"));
   // The last of a plane, the first of those in Arabic's block, and characters beside them.
   status_.set = "\xf0\xbf\xbf\xbf \xef\xbf\xbe \xef\xb7\x90 \xef\xbf\xbd \xef\xb7\xb0";
-  EXPECT_THAT(previzctl("status").out, HasSubstr("Set: ???? ??? ??? \xef\xbf\xbd \xef\xb7\xb0\n"));
+  EXPECT_THAT(previzctl("status").out, HasSubstr("set: ???? ??? ??? \xef\xbf\xbd \xef\xb7\xb0\n"));
 }
 
 // Every action of the table has its own method, and a change its signal.
@@ -446,9 +536,7 @@ TEST(BusWithoutARig, IsToldInPlainWords) {
   for (const char* request : {"status", "mode live"}) {
     const Said said = previzctl(request);
     EXPECT_EQ(said.status, 1);
-    EXPECT_EQ(
-        said.out,
-        "previzctl: previzd does not respond: it is not running, or is still loading a set\n");
+    EXPECT_EQ(said.out, "previzctl: previzd is not running, or not with --bus\n");
   }
 }
 

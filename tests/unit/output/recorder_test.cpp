@@ -206,6 +206,37 @@ TEST(Recorder, MarksTheRunningTakeOrTheLast) {
   EXPECT_TRUE(session::open_session(directory / "12A_take002").info.take->good);
 }
 
+TEST(Recorder, MarksTheTakeOfAnEarlierRecorder) {
+  const TemporaryDirectory directory, other;
+  {
+    Recorder recorder(options_in(directory.path()));
+    record_take(recorder);
+  }
+  RecorderOptions options = options_in(other.path());
+  options.last_take = directory / "12A_take001";
+  {
+    Recorder recorder(options);
+    EXPECT_FALSE(recorder.status().ending);
+    recorder.mark_good();
+    EXPECT_TRUE(test::wait_until("it is marked", [&] { return recorder.status().good; }));
+    EXPECT_EQ(recorder.status().directory, options.last_take);
+  }
+  EXPECT_TRUE(session::open_session(options.last_take).info.take->good);
+}
+
+TEST(Recorder, ATakeEndsUntilItIsWhole) {
+  const TemporaryDirectory directory;
+  Recorder recorder(options_in(directory.path()));
+  EXPECT_FALSE(recorder.status().ending);
+  recorder.start();
+  recorder.offer(picture(0));
+  EXPECT_FALSE(recorder.status().ending);
+  recorder.stop();
+  EXPECT_TRUE(recorder.status().ending);  // the tracking of its frame is waited for
+  EXPECT_TRUE(test::wait_until("it is whole", [&] { return !recorder.status().ending; }));
+  EXPECT_EQ(recorder.status().finished, "12A_take001");
+}
+
 FramePtr mosaic(std::uint64_t index, BayerPattern bayer) {
   auto frame = std::make_shared<Frame>(noise_frame("observer", index, PixelFormat::gray8, 32, 24));
   frame->bayer = bayer;

@@ -247,6 +247,25 @@ TEST_F(RenderSession, TheSetsOwnLightLightsEveryFrame) {
   EXPECT_NEAR(card.r / card.b, 3, 1e-4);
 }
 
+// The floor under a lamp of 300, 200 and 100 W/m^2 reflects hundreds of times what the plate of a
+// camera whose white is 1 can show. The card's shadow would take more light than there is.
+TEST_F(RenderSession, ALightThatDoesNotFitThePictureIsSaid) {
+  write_take(true,
+             "[lighting]\nfrom = \"set\"\n[[light]]\ntype = \"directional\"\n"
+             "direction = [0.6, 0, -0.8]\nemission = [300, 200, 100]\ngain_real = 1\n");
+  render::Layers layers;
+  RenderOptions options = of_frames(1, 2);
+  options.on_frame = [&](const pipeline::Shot& shot) { layers = *shot.layers; };
+  render(options);
+  EXPECT_NE(out_.str().find("light: the model under this light is "), std::string::npos)
+      << out_.str();
+  EXPECT_NE(out_.str().find("previzd calibrate balance"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("light: shadows would have taken more light"), std::string::npos)
+      << out_.str();
+  for (const glm::vec3& value : layers.composite)
+    for (int c = 0; c < 3; ++c) ASSERT_GE(value[c], 0);
+}
+
 TEST_F(RenderSession, WithNothingVirtualEveryPictureIsThePlateBitForBit) {
   write_take(false);
   render({});

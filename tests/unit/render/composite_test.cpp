@@ -62,8 +62,8 @@ TEST(Composite, SamplesDoNotDependOnHowTheyAreAskedFor) {
 }
 
 // A plate of one pixel.
-render::PlateRadiance seen_as(double radiance, double error = 0) {
-  return {std::vector<double>(3, radiance), std::vector<double>(3, error), {}};
+render::PlateRadiance seen_as(double radiance, double error = 0, std::size_t pixels = 1) {
+  return {std::vector<double>(3 * pixels, radiance), std::vector<double>(3 * pixels, error), {}};
 }
 
 // A virtual object of radiance 0.5 covers the white half of a black-and-white pixel: the composite
@@ -109,6 +109,27 @@ TEST(Composite, TheSumLightsABlackSurfaceAndTheRatioDoesNot) {
   EXPECT_FLOAT_EQ(composited(0, 0.3, 0, {additive, 0}), 0.3);
   EXPECT_FLOAT_EQ(composited(0, 0.3, 0, {ratio, 0}), 0.0);
   EXPECT_FLOAT_EQ(composited(0, 0.3, 0, {hybrid, 0.01}), 0.3);
+}
+
+// The model is three times as bright as the picture, and a shadow halves its light: more than there
+// is.
+TEST(Composite, IsNeverBelowZeroAndSaysWhereItWouldBe) {
+  EXPECT_EQ(composited(0.2, 0.3, 0.6, {set::Composite::additive, 0}), 0.0);
+  for (const auto kind : all_composites)
+    for (const double real : {0.0, 1e-3, 0.3, 5.0, 1e6})
+      for (const double mixed : {0.0, 1e-4, 0.3, 10.0})
+        EXPECT_GE(composited(0.2, mixed, real, {kind, 0.01}), 0.0) << real << " " << mixed;
+
+  gpu::GpuPixel in_shadow{}, lit{};
+  for (gpu::GpuPixel* pixel : {&in_shadow, &lit}) {
+    pixel->mixed_high = gpu::vec4(0.3f, 0.3f, 0.3f, 0);
+    const float difference = pixel == &lit ? 0.1f : -0.3f;
+    pixel->diff_high = pixel->uncovered_high = gpu::vec4(glm::vec3(difference), 0);
+    pixel->square_high.w = 1;
+  }
+  const std::vector<gpu::GpuPixel> pixels{lit, in_shadow, lit, in_shadow};
+  const render::Layers layers = layers_of(pixels, 1, seen_as(0.2, 0, pixels.size()));
+  EXPECT_EQ(render::below_zero(layers), 2u);
 }
 
 TEST(Composite, AllRulesAreOneWhereTheModelIsRight) {

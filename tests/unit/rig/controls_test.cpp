@@ -419,6 +419,36 @@ TEST(Controls, RecordingAsksForATakeAndForItsEnd) {
   EXPECT_TRUE(desk("mark_good").refused);  // no frame was recorded
 }
 
+TEST(Controls, ATakeThatIsStillWrittenCanBeMarkedAndNotReviewed) {
+  Desk desk;
+  desk.controls.use_take({.name = "12A_take002", .is_ending = true, .behind_s = 1.6});
+  EXPECT_EQ(desk("mark_good").request, Request::mark_good);
+  EXPECT_EQ(desk("mark_good").said, "12A_take002 is marked good when it is written");
+  EXPECT_EQ(desk("review").said, "12A_take002 is still being written: 1.6 s");
+  EXPECT_TRUE(desk.controls.happened(Event::wish_review).refused);
+  desk.controls.happened(Event::take_finished);
+  EXPECT_TRUE(desk("review").refused);
+  desk.controls.use_take({.name = "12A_take002"});
+  EXPECT_EQ(desk("review").said, "review");
+  desk.controls.use_take({.name = "12A_take002", .is_ending = true});
+  EXPECT_EQ(desk("review").said, "live");
+  desk.controls.use_take({.name = "12A_take002", .is_of_this_set = false});
+  EXPECT_THAT(desk("review").said, HasSubstr("recorded with another text of the set"));
+  EXPECT_EQ(desk.controls.look().state.mode, Mode::live);
+  EXPECT_EQ(desk("mark_good").said, "marking 12A_take002 good");
+}
+
+TEST(Controls, ASnapshotOfNoPictureIsRefused) {
+  Desk desk;
+  EXPECT_EQ(desk("snapshot").said, "no frame with a pose and light yet; nothing to save");
+  desk.controls.happened(Event::good_frame);
+  EXPECT_EQ(desk("snapshot").request, Request::snapshot);
+  EXPECT_EQ(desk.controls.look().snapshots, 1u);
+  desk("standby");
+  EXPECT_EQ(desk("snapshot").said, "standby shows no picture; nothing to save");
+  EXPECT_EQ(desk.controls.look().snapshots, 1u);
+}
+
 TEST(Controls, APushEndsARefinementBeforeItsKindIsKnown) {
   Desk desk;
   EXPECT_TRUE(desk("refine").refused);

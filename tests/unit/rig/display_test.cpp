@@ -121,7 +121,7 @@ TEST_F(RigDisplay, ShowsThePictureAndTheWordsOfEveryMode) {
     pages_.until([](const OsdPage& page) { return page == OsdPage{}; });
     press("osd");
     until_mode("LIVE");
-    // It is written by a thread of its own, which tells no page; an end would leave it out.
+    // It is written by a thread of its own; an end would leave it out.
     test::must_come("the snapshot is there",
                     [&] { return std::filesystem::exists(directory_ / "live/snapshot_0001.exr"); });
   });

@@ -101,6 +101,35 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
   EXPECT_GT(metrics_.counts.at("refine rounds"), 0u);
 }
 
+// A set is saved, changed or not, and moves its takes to another folder: the last take stays.
+TEST_F(RigLive, ASetThatIsReadAgainKeepsTheLastTake) {
+  write_set();
+  const auto reload = [this](int times) {
+    press("reload_set");
+    test::must_come(
+        "the set runs again", [&] { return count_said("live on ") > times; },
+        [&] { return log_.text(); });
+    until_more(0);
+  };
+  run_rendering([&] {
+    const Shown first = begin_take();
+    until([&](const Shown& s) { return is_long_after(s, first); });
+    end_take();
+    reload(1);
+    press("review");
+    until_mode(Mode::review);
+    press("live");
+    until_mode(Mode::live);
+    replace_in_set("directory = \"takes\"", "directory = \"others\"");
+    reload(2);
+    press("review");
+    until_said("12A_take001 was recorded with another text of the set");
+    press("mark_good");
+    until_said("12A_take001 is marked good");
+  });
+  EXPECT_TRUE(session::open_session(take_folder()).info.take->good);
+}
+
 // Bit for bit, where the light is the set's and depends on no thread's pace.
 TEST_F(RigLive, ALiveRefinementIsWhatRenderMakesOfItsFrame) {
   write_set("[lighting]\nfrom = \"set\"\n");

@@ -196,7 +196,7 @@ TEST(MarkingControls, MarkOnlyWhereAMarkIsKeptAndMeansSomething) {
   desk.controls.use_aim(Aim{});
   EXPECT_EQ(desk("mark").said, "not marked: no tag in the picture shows where the camera is");
   desk.controls.use_aim(aim(left, corner, 0, 5));
-  desk.controls.use_take("12A_take001");
+  desk.controls.use_take({.name = "12A_take001"});
   const Outcome marked = desk("mark");
   EXPECT_EQ(marked.said, "box 1 corner 1: marked once");
   EXPECT_EQ(marked.mark, (session::MarkEvent{5, "box 1 corner 1", {319.5, 239.5}}));
@@ -228,10 +228,10 @@ TEST(MarkingControls, BeginAgainInATakeThatDoesNotHaveTheMarks) {
   Desk desk;
   desk("marking");
   desk("record");
-  desk.controls.use_take("12A_take001");
+  desk.controls.use_take({.name = "12A_take001"});
   desk.controls.use_aim(aim(left, corner));
   desk("mark");
-  desk.controls.use_take("12A_take002");
+  desk.controls.use_take({.name = "12A_take002"});
   EXPECT_EQ(desk("unmark").said, "the take with these marks has ended");
   EXPECT_EQ(desk("mark").said,
             "marks so far are in 12A_take001; mark its boxes again; box 1 corner 1: marked once");

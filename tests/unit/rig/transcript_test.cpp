@@ -76,8 +76,8 @@ constexpr Line transcript[] = {
     {"standby", "button standby: still recording; end the take first (refused)", "", "still recording; end the take first"},
     {"refine", "button refine: refine", "Mode=refine", "REFINE"},
     {"snapshot", "button snapshot: live", "Mode=live", "LIVE"},  // any button ends a refinement
-    {nullptr, "button snapshot: snapshot"},
-    {"mark_good", "button mark_good: take marked good"},
+    {nullptr, "button snapshot: saving a snapshot"},
+    {"mark_good", "button mark_good: the running take is marked good when it is finished", "", "the running take is marked good"},
     {"acknowledge", "button acknowledge: noted"},
     {"record", "button record: recording ended", "Recording=no"},
     {nullptr, "recorder: take 12A_take001 is finished"},
@@ -183,7 +183,10 @@ class RigTranscript : public test::RigLive {
       const std::lock_guard lock(mutex_);
       // A machine may be so busy that the replayed camera is taken for stalled.
       if (changes["Message"].starts_with("rig: film camera: ")) return;
+      // It is written by a thread of its own.
+      if (changes["Message"].starts_with("snapshot: ")) return;
       if (changes["Message"].empty()) changes.erase("Message");
+      if (is_of_loading(changes)) return;
       remember_take(changes);
       if (changes.empty()) return;
       signals_.push_back(std::move(changes));
@@ -194,12 +197,20 @@ class RigTranscript : public test::RigLive {
     run([this] { follow(); });
   }
 
+  // A set that is read shows it by its mode, until it runs with its own selection.
+  bool is_of_loading(Changes& changes) {
+    const auto mode = changes.find("Mode");
+    if (mode == changes.end()) return false;
+    const bool was_loading = std::exchange(is_loading_, mode->second == "loading");
+    return was_loading || is_loading_;
+  }
+
   // Which signal says what of the take depends on how far the recorder's thread is: it is no part
   // of a line, and compared with the take afterwards.
   void remember_take(Changes& changes) {
     changes.erase("Model");  // it depends on how far the thread is that measures it
-    for (const char* name :
-         {"Take", "TakeFrames", "TakeDropped", "Writing", "BehindSeconds", "BehindMegabytes"})
+    for (const char* name : {"Take", "TakeGood", "TakeFrames", "TakeDropped", "Writing",
+                             "BehindSeconds", "BehindMegabytes"})
       if (const auto found = changes.find(name); found != changes.end()) {
         take_[name].push_back(found->second);
         changes.erase(found);
@@ -249,6 +260,7 @@ class RigTranscript : public test::RigLive {
 
   test::PrivateBus bus_;
   test::Pages pages_;
+  bool is_loading_ = true;
   std::deque<Changes> signals_;
   std::map<std::string, std::vector<std::string>> take_;  // of its properties what was signalled
 };

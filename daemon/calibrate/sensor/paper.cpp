@@ -1,0 +1,235 @@
+#include "daemon/calibrate/sensor/paper.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <glm/geometric.hpp>
+#include <glm/matrix.hpp>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "daemon/lighting/response.hpp"
+#include "daemon/pipeline/preview_size.hpp"
+#include "daemon/tracking/tag_family.hpp"
+#include "drivers/calibration/pinhole.hpp"
+
+namespace previz::calibrate {
+namespace {
+
+constexpr double least_cell_px = 3;
+constexpr std::size_t least_cells = 2;
+constexpr double most_slant = 0.2;  // least cosine of a tag's normal and the way to the camera
+constexpr double above_m = 5e-4;    // the paper above what the tag lies on, which would hide it
+constexpr int rendered_px = 16;     // of a tag's picture, about
+constexpr double least_seen_share = 0.25;  // share of that picture
+constexpr std::size_t most_tags = 4;       // of a shot, the largest first
+
+// A square of the tag's size with its white border.
+scene::Mesh square(const set::Tag& tag, double half_m) {
+  scene::Mesh mesh;
+  mesh.name = paper_name;
+  const glm::dvec3 normal(tag.world_from_tag[2]);
+  for (const glm::dvec2 corner : {glm::dvec2(-1, -1), {1, -1}, {1, 1}, {-1, 1}}) {
+    const glm::dvec4 at(half_m * corner.x, half_m * corner.y, above_m, 1);
+    mesh.positions.emplace_back(tag.world_from_tag * at);
+    mesh.normals.emplace_back(normal);
+  }
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
+ObserverCalibration cropped(ObserverCalibration camera, const glm::ivec2& low,
+                            const glm::ivec2& high) {
+  PinholeIntrinsics& lens = camera.intrinsics;
+  lens.cx -= low.x;
+  lens.cy -= low.y;
+  lens.width = high.x - low.x;
+  lens.height = high.y - low.y;
+  return camera;
+}
+
+// A tag in a picture: its white cells' middles, and the part of the picture that it takes.
+struct SeenTag {
+  std::vector<glm::dvec2> white;
+  glm::ivec2 low{0}, high{0};  // the end is not in it
+  double cell_px = 0;
+};
+
+}  // namespace
+
+struct Paper::Impl {
+  struct Printed {
+    set::Tag tag;
+    tracking::TagCells cells;
+    double cell_m;
+  };
+
+  Impl(const set::Set& set, const ObserverCalibration& the_camera, scene::Scene the_scene,
+       const std::shared_ptr<render::Device>& device, int the_samples)
+      : camera(the_camera),
+        exposure(set.observer.exposure),
+        sampling(set.lighting.sampling),
+        samples(the_samples),
+        renderer(device, set.estimation, the_camera),
+        identity(device, set.estimation, the_camera) {
+    scene::Material paper;
+    paper.name = paper_name;
+    paper.base_color = glm::vec3(static_cast<float>(paper_albedo));
+    paper.specular = 0;
+    const auto material = static_cast<std::uint32_t>(the_scene.materials.size());
+    the_scene.materials.push_back(paper);
+    for (const set::Tag& tag : set.tracking.tags) {
+      tracking::TagCells cells = tracking::tag_cells(set.tracking.family, tag.id);
+      const double cell_m = tag.size_m / cells.border;
+      const auto mesh = static_cast<std::uint32_t>(the_scene.meshes.size());
+      the_scene.meshes.push_back(square(tag, 0.5 * cell_m * cells.total));
+      the_scene.instances.push_back({.name = paper_name, .mesh = mesh, .material = material});
+      printed.push_back({tag, std::move(cells), cell_m});
+    }
+    renderer.set_scene(the_scene);
+    for (std::size_t i = 0; i < the_scene.materials.size(); ++i) {
+      scene::Material& plain = the_scene.materials[i];
+      plain = {};
+      plain.base_color = glm::vec3(0);
+      plain.specular = 0;
+      if (i == material) plain.emission = glm::vec3(1);
+    }
+    the_scene.lights.clear();
+    identity.set_scene(the_scene);
+    lighting::EnvironmentMap dark;
+    dark.size = 1;
+    dark.radiance = {glm::vec3(0)};
+    identity.set_environment(dark, set::LightSampling::bsdf);
+  }
+
+  std::optional<glm::dvec2> pixel(const glm::dvec3& in_camera) const;
+  std::optional<SeenTag> seen(const Printed& tag, const glm::dmat4& world_from_camera) const;
+  std::optional<glm::dvec3> rendered(const SeenTag& tag, const pipeline::Shot& shot);
+
+  const ObserverCalibration camera;
+  const std::optional<double> exposure;
+  const set::LightSampling sampling;
+  const int samples;
+  std::vector<Printed> printed;
+  render::Renderer renderer, identity;
+};
+
+std::optional<glm::dvec2> Paper::Impl::pixel(const glm::dvec3& in_camera) const {
+  if (!(in_camera.z > 0)) return std::nullopt;
+  const glm::dvec2 normalised = glm::dvec2(in_camera) / in_camera.z;
+  const glm::dvec2 at = distort(camera.intrinsics, normalised);
+  return is_unfolded(camera.intrinsics, normalised, at) ? std::optional(at) : std::nullopt;
+}
+
+// Returns nothing where the tag is not wholly in the picture, faces away or is too small.
+std::optional<SeenTag> Paper::Impl::seen(const Printed& tag,
+                                         const glm::dmat4& world_from_camera) const {
+  const glm::dmat4 camera_from_tag = glm::inverse(world_from_camera) * tag.tag.world_from_tag;
+  const auto at = [&](double row, double column) {
+    const double middle = 0.5 * tag.cells.total;
+    const glm::dvec4 in_tag(tag.cell_m * (column - middle), tag.cell_m * (middle - row), 0, 1);
+    return pixel(glm::dvec3(camera_from_tag * in_tag));
+  };
+  const glm::dvec3 to_camera = -glm::normalize(glm::dvec3(camera_from_tag[3]));
+  if (glm::dot(glm::normalize(glm::dvec3(camera_from_tag[2])), to_camera) < most_slant) return {};
+  const double end = tag.cells.total;
+  glm::dvec2 low(HUGE_VAL), high(-HUGE_VAL);
+  for (const auto& [row, column] : {std::pair{0.0, 0.0}, {0.0, end}, {end, 0.0}, {end, end}}) {
+    const auto corner = at(row, column);
+    if (!corner) return {};
+    low = glm::min(low, *corner);
+    high = glm::max(high, *corner);
+  }
+  const PinholeIntrinsics& lens = camera.intrinsics;
+  SeenTag result;
+  result.low = glm::ivec2(glm::floor(low));
+  result.high = glm::ivec2(glm::ceil(high)) + 1;
+  if (result.low.x < 0 || result.low.y < 0 || result.high.x > lens.width ||
+      result.high.y > lens.height)
+    return {};
+  const auto middle = at(end / 2, end / 2), right = at(end / 2, end / 2 + 1),
+             down = at(end / 2 + 1, end / 2);
+  if (!middle || !right || !down) return {};
+  result.cell_px = std::min(glm::distance(*middle, *right), glm::distance(*middle, *down));
+  if (result.cell_px < least_cell_px) return {};
+  for (int row = 0; row < tag.cells.total; ++row)
+    for (int column = 0; column < tag.cells.total; ++column)
+      if (!tag.cells.black(row, column))
+        if (const auto centre = at(row + 0.5, column + 0.5)) result.white.push_back(*centre);
+  return result;
+}
+
+// Returns the mean radiance of the tag's paper under the shot's light, where it is seen.
+std::optional<glm::dvec3> Paper::Impl::rendered(const SeenTag& tag, const pipeline::Shot& shot) {
+  const ObserverCalibration crop = cropped(camera, tag.low, tag.high);
+  const int longest = std::max(crop.intrinsics.width, crop.intrinsics.height);
+  const ObserverCalibration small =
+      pipeline::scaled(crop, std::min(1.0, double(rendered_px) / longest));
+  const render::FrameInput input{.exposure = 1,
+                                 .world_from_camera = shot.track.pose->world_from_camera};
+  const auto layers_of = [&](render::Renderer& which, int count) {
+    which.resize(small);
+    which.begin(input);
+    which.render(count);
+    return which.layers();
+  };
+  constexpr int identity_samples = 16;
+  const render::Layers paper = layers_of(identity, identity_samples);
+  renderer.set_environment(shot.light->lighting.environment, sampling);
+  const render::Layers lit = layers_of(renderer, samples);
+  glm::dvec3 sum(0);
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < lit.real.size(); ++i) {
+    if (paper.real[i].g < 1 - 1e-3f) continue;
+    sum += glm::dvec3(lit.real[i]);
+    ++count;
+  }
+  if (double(count) < least_seen_share * double(lit.real.size())) return std::nullopt;
+  return sum / double(count);
+}
+
+Paper::Paper(const set::Set& set, const ObserverCalibration& camera, scene::Scene scene,
+             const std::shared_ptr<render::Device>& device, int samples)
+    : impl_(std::make_unique<Impl>(set, camera, std::move(scene), device, samples)) {}
+Paper::~Paper() = default;
+
+void Paper::add(pipeline::Shot& shot, SurfacePixels& seen) {
+  const glm::dmat4& pose = shot.track.pose->world_from_camera;
+  std::vector<SeenTag> tags;
+  for (const Impl::Printed& printed : impl_->printed)
+    if (auto tag = impl_->seen(printed, pose)) tags.push_back(*std::move(tag));
+  std::ranges::sort(tags, std::greater(), &SeenTag::cell_px);
+  tags.resize(std::min(tags.size(), most_tags));
+
+  const Plate& plate = *plate_of(shot);
+  const lighting::Response response(impl_->camera.response, plate.bits);
+  const std::uint32_t clipped = response.clipping().from;
+  const double exposure = impl_->exposure.value_or(shot.frame->exposure);
+  auto surface = std::ranges::find(seen.surfaces, paper_name, &KnownSurface::material);
+  if (surface == seen.surfaces.end())
+    surface = seen.surfaces.insert(seen.surfaces.end(), {paper_name, glm::dvec3(paper_albedo)});
+  for (const SeenTag& tag : tags) {
+    std::vector<SurfacePixel> pixels;
+    SurfacePixel pixel{.surface = std::uint32_t(surface - seen.surfaces.begin())};
+    for (const SurfacePixel& other : seen.pixels) pixel.tile = std::max(pixel.tile, other.tile + 1);
+    for (const glm::dvec2& at : tag.white) {
+      const auto i = std::size_t(std::lround(at.y)) * std::size_t(plate.width) +
+                     std::size_t(std::lround(at.x));
+      const std::uint16_t* sample = &plate.samples[3 * i];
+      if (std::any_of(sample, sample + 3,
+                      [&](std::uint16_t code) { return code == 0 || code >= clipped; }))
+        continue;
+      for (int c = 0; c < 3; ++c) pixel.plate[c] = response.inverse()[sample[c]] / exposure;
+      pixel.px = at;
+      pixels.push_back(pixel);
+    }
+    if (pixels.size() < least_cells) continue;
+    const auto radiance = impl_->rendered(tag, shot);
+    if (!radiance) continue;
+    for (SurfacePixel& one : pixels) one.rendered = *radiance;
+    seen.pixels.insert(seen.pixels.end(), pixels.begin(), pixels.end());
+  }
+}
+
+}  // namespace previz::calibrate

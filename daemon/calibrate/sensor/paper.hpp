@@ -1,0 +1,37 @@
+// Samples the white paper of printed tags: a grey card that is in the picture of every set.
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "daemon/calibrate/sensor/surface_pixels.hpp"
+#include "daemon/pipeline/shot.hpp"
+#include "daemon/render/gpu.hpp"
+#include "daemon/set/set.hpp"
+
+namespace previz::calibrate {
+
+// The name of all tags' paper among surfaces, and its albedo: that of office paper, neutral.
+inline constexpr const char* paper_name = "paper";
+inline constexpr double paper_albedo = 0.79;
+
+// Looks at the tags of the stage in single shots. A tag counts where two or more of its white cells
+// are at least three pixels wide and not clipped, where it faces the camera, and where the model
+// does not hide it. Its radiance under the light is rendered by itself, so that a tag that is small
+// in the picture is as good as a large one.
+class Paper {
+ public:
+  // The model of what is real comes in `scene`, which no virtual object is in.
+  Paper(const set::Set& set, const ObserverCalibration& camera, scene::Scene scene,
+        const std::shared_ptr<render::Device>& device, int samples);
+  ~Paper();
+
+  // Adds the white pixels of a tracked and lit shot; each view of a tag is a tile of its own.
+  void add(pipeline::Shot& shot, SurfacePixels& seen);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace previz::calibrate
