@@ -28,6 +28,7 @@
 #include "daemon/report/log.hpp"
 #include "daemon/report/reports.hpp"
 #include "daemon/rig/service.hpp"
+#include "daemon/set/check.hpp"
 #include "daemon/signals.hpp"
 #include "daemon/trade/page.hpp"
 #include "daemon/written_by.hpp"
@@ -82,7 +83,7 @@ int do_import(const exchange::ImportOptions& options) {
 
 int do_render_takes(const post::RenderOptions& options, post::WhichTakes which) {
   const post::TakesReport report = post::render_takes(options, which, std::cout);
-  std::cout << report.rendered.size() << " takes rendered";
+  std::cout << set::plural(report.rendered.size(), "take") << " rendered";
   if (!report.failures.empty()) std::cout << ", " << report.failures.size() << " failed";
   std::cout << (report.interrupted ? "; stopped; run the same command to continue" : "")
             << std::endl;
@@ -91,7 +92,7 @@ int do_render_takes(const post::RenderOptions& options, post::WhichTakes which) 
 
 int do_render_take(const post::RenderOptions& options) {
   const post::RenderReport report = post::render_session(options, std::cout);
-  std::cout << report.directory.string() << ": " << report.frames.size() << " frames"
+  std::cout << report.directory.string() << ": " << set::plural(report.frames.size(), "frame")
             << (report.interrupted ? "; stopped; run the same command to continue" : "")
             << std::endl;
   if (report.failures.empty()) return 0;
@@ -106,6 +107,12 @@ int do_render(post::RenderOptions& options, std::optional<post::WhichTakes> whic
   options.terminal = isatty(STDOUT_FILENO) != 0;
   if (which) return do_render_takes(options, *which);
   return do_render_take(options);
+}
+
+int do_model(model::ModelOptions& options) {
+  options.terminal = isatty(STDOUT_FILENO) != 0;
+  model::make_model(options, std::cout);
+  return 0;
 }
 
 int do_trade(trade::TradeOptions& options, const StopOnSignal& stop) {
@@ -155,7 +162,7 @@ int do_command(const CLI::App& app, CommandLine& said, const StopOnSignal& stop)
   if (app.got_subcommand("calibrate"))
     return calibrate::do_calibrate(app, said.calibrate, std::cout);
   if (app.got_subcommand("merge")) return do_render(said.merge, std::nullopt, stop);
-  if (app.got_subcommand("model")) return model::make_model(said.model, std::cout), 0;
+  if (app.got_subcommand("model")) return do_model(said.model);
   if (app.got_subcommand("devices")) return do_devices(said.learn, said.rules, stop);
   if (app.got_subcommand("export")) return do_export(said.export_take, stop);
   if (app.got_subcommand("farm")) return do_farm(app, said.farm, stop);

@@ -10,6 +10,7 @@
 
 #include "daemon/pipeline/track_stage.hpp"
 #include "daemon/report/report.hpp"
+#include "daemon/set/check.hpp"
 #include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
@@ -76,14 +77,15 @@ void print_tags(const std::vector<TrackedFrame>& frames, const tracking::PoseJud
       if (!carrier.tags.empty()) ++carriers[name];
   }
   for (const auto& [tag, count] : counts) {
-    out << "  tag " << tag << ": seen in " << count.first << " frames, used for the camera in "
-        << count.second;
+    out << "  tag " << tag << ": seen in " << set::plural(std::uint64_t(count.first), "frame")
+        << ", used for the camera in " << count.second;
     if (const std::string why = judgement.why_unusable(tag); count.second == 0 && !why.empty())
       out << ": " << why;
     out << '\n';
   }
   for (const auto& [name, count] : carriers)
-    out << "  carrier \"" << name << "\": found in " << count << " frames\n";
+    out << "  carrier \"" << name << "\": found in " << set::plural(std::uint64_t(count), "frame")
+        << "\n";
 }
 
 // Tags that the set does not have are no mistake of the tracking.

@@ -1,18 +1,26 @@
 #include "daemon/model/colours.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <chrono>
 #include <glm/common.hpp>
 
 #include "daemon/calibrate/sensor/balance_fit.hpp"
-#include "daemon/calibrate/sensor/surface_pixels.hpp"
 #include "daemon/scene/load.hpp"
 
 namespace previz::model {
 namespace {
 
-constexpr int most_rounds = 6;
-// An albedo that changes by less, over itself, is the last.
-constexpr double settled_change = 2e-3;
+// Surfaces light each other by so little that a round leaves about a tenth of what the albedos are
+// off. Rounds end when no albedo changes by more, over itself: the first ones, which only come
+// near, and the last.
+constexpr double nearly_settled = 5e-2, settled = 2e-3;
+constexpr int most_rounds = 6;  // each time
+constexpr int coarse_samples = 4, fine_samples = 64, around_samples = 8;
+// Pictures are so wide, as far as the camera's are: to measure colours, and to see around tags.
+constexpr calibrate::ProbeSize probe_of_colours{160, 16}, probe_around_tags{480, 4};
+constexpr int probed_frames = 3;
 // No paint reflects less or more; the round that guesses such an albedo has a wrong light or model.
 constexpr double least_albedo = 0.005, most_albedo = 0.98;
 
@@ -49,41 +57,114 @@ scene::Scene scene_of(const pipeline::Take& take, const std::vector<NamedMesh>& 
   return scene;
 }
 
+// What the plates have over what is rendered, by material.
+using SeenRatios = std::map<std::string, calibrate::SurfaceRatio>;
+
+SeenRatios ratios_of(const calibrate::SurfacePixels& seen) {
+  SeenRatios ratios;
+  for (const calibrate::SurfaceRatio& ratio : calibrate::fit_balance(seen, {}).surfaces)
+    ratios[seen.surfaces[ratio.surface].material] = ratio;
+  return ratios;
+}
+
+// Multiplies albedos by the ratios, and returns the largest change.
+double correct(scene::Scene& scene, const SeenRatios& ratios,
+               std::map<std::string, Colour>& colours) {
+  double most_change = 0;
+  for (const auto& [name, ratio] : ratios) {
+    const auto material = std::ranges::find(scene.materials, name, &scene::Material::name);
+    const glm::dvec3 before(material->base_color);
+    // The balance is that of the set, and not the one in which these guesses would be right.
+    const auto estimate = calibrate::albedo_of(ratio, {name, before}, calibrate::Balance{});
+    const glm::dvec3 albedo = glm::clamp(estimate.albedo, least_albedo, most_albedo);
+    for (glm::length_t c = 0; c < 3; ++c)
+      most_change = std::max(most_change, std::abs(albedo[c] / before[c] - 1));
+    material->base_color = glm::vec3(albedo);
+    colours[name] = {estimate.albedo, estimate.sigma, ratio.pixels};
+  }
+  return most_change;
+}
+
+// Returns the fine ratios, which were measured when the coarse ones were `then`, as they are now.
+// With the same random numbers, both change alike.
+SeenRatios brought_forward(SeenRatios fine, const SeenRatios& then, const SeenRatios& now) {
+  for (auto& [name, ratio] : fine) {
+    const auto before = then.find(name), after = now.find(name);
+    ratio.ratio = before == then.end() || after == now.end()
+                      ? glm::dvec3(1)
+                      : ratio.ratio * after->second.ratio / before->second.ratio;
+  }
+  return fine;
+}
+
+double now_s() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+double pixels_of(const pipeline::Take& take, std::size_t shots, const calibrate::ProbeSize& size) {
+  const PinholeIntrinsics& lens = take.observer.intrinsics;
+  const double scale = std::min(1.0, double(size.width) / lens.width);
+  return double(shots) * scale * lens.width * scale * lens.height;
+}
+
 }  // namespace
 
-std::map<std::string, Colour> measure_colours(const pipeline::Take& take,
-                                              const std::vector<NamedMesh>& meshes,
-                                              const std::shared_ptr<render::Device>& device) {
-  scene::Scene scene = scene_of(take, meshes, {});
+ColourComparison::ColourComparison(pipeline::Take take, std::shared_ptr<render::Device> device,
+                                   bool has_tags, std::ostream& out, bool terminal)
+    : take_(std::move(take)),
+      device_(std::move(device)),
+      shots_(calibrate::probed_shots(take_, probed_frames)),
+      rounds_work_(pixels_of(take_, shots_.size(), probe_of_colours) *
+                   (probe_of_colours.identity_samples + (2 * most_rounds + 1) * coarse_samples +
+                    fine_samples)),
+      progress_(out, terminal,
+                rounds_work_ + (has_tags ? pixels_of(take_, shots_.size(), probe_around_tags) *
+                                               (probe_around_tags.identity_samples + around_samples)
+                                         : 0),
+                now_s()) {}
+
+void ColourComparison::worked(double pixel_samples) {
+  done_ += pixel_samples;
+  progress_.worked(step_, pixel_samples, now_s());
+}
+
+calibrate::SurfaceProbe ColourComparison::probe(const scene::Scene& scene,
+                                                const calibrate::ProbeSize& size) {
+  return {take_, shots_, scene, device_, size, [this](double samples) { worked(samples); }};
+}
+
+std::map<std::string, Colour> ColourComparison::measure(const std::vector<NamedMesh>& meshes) {
+  scene::Scene scene = scene_of(take_, meshes, {});
+  step_ = "colours: finding which surfaces the pictures show";
+  calibrate::SurfaceProbe surfaces = probe(scene, probe_of_colours);
   std::map<std::string, Colour> colours;
-  for (int round = 0; round < most_rounds; ++round) {
-    const calibrate::SurfacePixels seen = calibrate::probe_surfaces(take, scene, device, {});
-    const calibrate::Balance balance = calibrate::fit_balance(seen, {});
-    double most_change = 0;
-    for (const calibrate::SurfaceRatio& ratio : balance.surfaces) {
-      const calibrate::KnownSurface& known = seen.surfaces[ratio.surface];
-      const auto material =
-          std::ranges::find(scene.materials, known.material, &scene::Material::name);
-      // The balance is that of the set, and not the one in which these guesses would be right.
-      const auto estimate = calibrate::albedo_of(ratio, known, calibrate::Balance{});
-      const glm::dvec3 albedo = glm::clamp(estimate.albedo, least_albedo, most_albedo);
-      for (glm::length_t c = 0; c < 3; ++c)
-        most_change = std::max(most_change, std::abs(albedo[c] / known.albedo[c] - 1));
-      material->base_color = glm::vec3(albedo);
-      colours[known.material] = {estimate.albedo, estimate.sigma, ratio.pixels};
-    }
-    if (most_change < settled_change) break;
-  }
+  const auto ratios = [&](int samples) { return ratios_of(surfaces.compare(scene, samples)); };
+  const auto begin = [&](const char* step) {
+    progress_.step_done(step_, now_s());
+    step_ = step;
+  };
+  begin("colours: first rounds");
+  for (int round = 0; round < most_rounds; ++round)
+    if (correct(scene, ratios(coarse_samples), colours) < nearly_settled) break;
+  begin("colours: fine round");
+  const SeenRatios then = ratios(coarse_samples), fine = ratios(fine_samples);
+  correct(scene, fine, colours);
+  begin("colours: last rounds");
+  for (int round = 0; round < most_rounds; ++round)
+    if (correct(scene, brought_forward(fine, then, ratios(coarse_samples)), colours) < settled)
+      break;
+  worked(rounds_work_ - done_);  // the rounds that were not needed
+  progress_.step_done(step_, now_s());
   return colours;
 }
 
-calibrate::SurfacePixels compare_surfaces(const pipeline::Take& take,
-                                          const std::vector<NamedMesh>& meshes,
-                                          const Colours& colours, int width,
-                                          const std::shared_ptr<render::Device>& device) {
-  calibrate::ProbeOptions options;
-  options.width = width;
-  return calibrate::probe_surfaces(take, scene_of(take, meshes, colours), device, options);
+calibrate::SurfacePixels ColourComparison::look_around(const std::vector<NamedMesh>& meshes,
+                                                       const Colours& colours) {
+  step_ = "colours: looking around tags";
+  const scene::Scene scene = scene_of(take_, meshes, colours);
+  calibrate::SurfacePixels seen = probe(scene, probe_around_tags).compare(scene, around_samples);
+  progress_.step_done(step_, now_s());
+  return seen;
 }
 
 }  // namespace previz::model

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <glm/vec3.hpp>
+#include <iosfwd>
 #include <map>
 #include <memory>
 #include <string>
@@ -10,6 +11,7 @@
 #include "daemon/calibrate/sensor/surface_pixels.hpp"
 #include "daemon/model/glb.hpp"
 #include "daemon/model/scan_mesh.hpp"
+#include "daemon/output/progress.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/render/gpu.hpp"
 
@@ -21,20 +23,37 @@ struct Colour {
   std::size_t pixels = 0;  // that it was measured in
 };
 
-// Returns the colour of every mesh that enough pixels show, by its name. The model is
-// rendered grey by the take's light, with all bounces, and each albedo is multiplied by what the
-// plates have over it, until it changes no more: the same comparison as `previzd calibrate
-// balance`, whose result, lighting.balance, is taken as right. Throws previz::Error if no frame of
-// the take is tracked and lit.
-std::map<std::string, Colour> measure_colours(const pipeline::Take& take,
-                                              const std::vector<NamedMesh>& meshes,
-                                              const std::shared_ptr<render::Device>& device);
+// Compares models with a take that is read once, and shows how far that is.
+class ColourComparison {
+ public:
+  // With `has_tags`, look_around() is part of what there is to do. Throws previz::Error if no frame
+  // of the take is tracked and lit.
+  ColourComparison(pipeline::Take take, std::shared_ptr<render::Device> device, bool has_tags,
+                   std::ostream& out, bool terminal);
 
-// Renders the model in its colours by the take's light, `width` pixels across, and returns what it
-// and the plates have in pixels that show one surface. Throws as measure_colours().
-calibrate::SurfacePixels compare_surfaces(const pipeline::Take& take,
-                                          const std::vector<NamedMesh>& meshes,
-                                          const Colours& colours, int width,
-                                          const std::shared_ptr<render::Device>& device);
+  const pipeline::Take& take() const { return take_; }
+  // Returns the colour of every mesh that enough pixels show, by its name. The model is
+  // rendered grey by the take's light, with all bounces, and each albedo is multiplied by what the
+  // plates have over it, until it changes no more: the same comparison as `previzd calibrate
+  // balance`, whose result, lighting.balance, is taken as right.
+  std::map<std::string, Colour> measure(const std::vector<NamedMesh>& meshes);
+  // Renders the model in its colours by the take's light, large enough to see what is around tags,
+  // and returns what it and the plates have in pixels that show one surface. What is rendered has
+  // noise of its own: it is to be averaged.
+  calibrate::SurfacePixels look_around(const std::vector<NamedMesh>& meshes,
+                                       const Colours& colours);
+
+ private:
+  calibrate::SurfaceProbe probe(const scene::Scene& scene, const calibrate::ProbeSize& size);
+  void worked(double pixel_samples);
+
+  const pipeline::Take take_;
+  const std::shared_ptr<render::Device> device_;
+  const std::vector<calibrate::ProbedShot> shots_;
+  const double rounds_work_;  // at most
+  output::ShareProgress progress_;
+  std::string step_;
+  double done_ = 0;
+};
 
 }  // namespace previz::model

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <functional>
 #include <map>
+#include <memory>
 #include <set>
 #include <vector>
 
@@ -135,24 +136,21 @@ void print_faces(const Fit& fit, std::ostream& out) {
   }
 }
 
-// A take whose light shows the colours of things, and the device that renders by it.
-struct LitTake {
-  pipeline::Take take;
-  std::shared_ptr<render::Device> device;
-};
-
 // Returns nothing if no colours are wanted or nothing shows the light.
-std::optional<LitTake> lit_take(const ModelOptions& options, std::ostream& out) {
+std::unique_ptr<ColourComparison> comparison(const ModelOptions& options, bool has_tags,
+                                             std::ostream& out) {
   if (options.grey) return {};
   if (!calibrate::is_session(options.footage)) {
     out << "colours: all faces are grey, because pictures alone do not show the light; name a "
            "session in their place to measure the colours\n";
     return {};
   }
+  out << "colours: reading the take" << std::endl;
   pipeline::Take take = pipeline::open_take(options.footage, options.set_file);
   const render::DeviceOptions wanted =
       render::options_for(options.device, take.set.quality.hardware_rays);
-  return LitTake{std::move(take), render::open_device(wanted)};
+  return std::make_unique<ColourComparison>(std::move(take), render::open_device(wanted), has_tags,
+                                            out, options.terminal);
 }
 
 void print_colour(const std::string& name, const Colour& colour, std::ostream& out) {
@@ -258,16 +256,12 @@ struct Adjusted {
   const Shape& shape;
 };
 
-// Pictures in which the surroundings of tags are looked at are so wide, as far as the camera's are.
-constexpr int around_tags_px = 480;
-
 // Adds what is shown in place of tags that are hidden.
-void add_under_tags(const LitTake& lit, const TaggedModel& model, std::vector<NamedMesh>& meshes,
-                    std::ostream& out) {
+void add_under_tags(ColourComparison& comparison, const TaggedModel& model,
+                    std::vector<NamedMesh>& meshes, std::ostream& out) {
   if (model.layout.tags.empty()) return;
-  const calibrate::SurfacePixels seen =
-      compare_surfaces(lit.take, meshes, model.colours, around_tags_px, lit.device);
-  for (UnderTag& under : under_tags(model, seen, lit.take.observer.intrinsics)) {
+  const calibrate::SurfacePixels seen = comparison.look_around(meshes, model.colours);
+  for (UnderTag& under : under_tags(model, seen, comparison.take().observer.intrinsics)) {
     if (under.mesh.mesh.positions.empty()) {
       fmt::print(out,
                  "  tag {}: no plate shows enough of what is around it; if tags are hidden, its "
@@ -318,9 +312,9 @@ std::string coloured_model(const ModelOptions& options, const set::Set& set, con
   std::vector<NamedMesh> meshes;
   for (const Solid& solid : solids) meshes.push_back(mesh_of(solid));
   meshes.insert(meshes.end(), scans.begin(), scans.end());
-  const std::optional<LitTake> lit = lit_take(options, out);
+  const auto lit = comparison(options, !at.layout.tags.empty(), out);
   std::map<std::string, Colour> colours;
-  if (lit) colours = measure_colours(lit->take, meshes, lit->device);
+  if (lit) colours = lit->measure(meshes);
   colours.merge(
       tag_colours(set.tracking.family, at.layout, at.views, at.shape, solids, response, colours));
   for (const Solid& tag : tag_solids(set.tracking.family, at.layout, at.parts, at.shape))
@@ -411,6 +405,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   insist_on_scans(options, parts);
   const std::vector<ReadScan> read = read_scans(parts, set.tracking, out);
   const auto edited = options.write ? with_model(*options.set_file, set, options) : std::nullopt;
+  out << options.footage.string() << ": looking for tags and edges" << std::endl;
   const auto source = calibrate::open_source(options.footage, "observer");
   const Views views = find_views(*source, camera, set.tracking, parts);
   const Start start = first_guess(parts, views, set.tracking.tags);

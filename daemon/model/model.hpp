@@ -22,6 +22,7 @@ struct ModelOptions {
   bool write = false;            // add the model to the set file
   bool grey = false;             // do not measure colours
   bool tags_only = false;        // the model is the tags alone, with what is under them
+  bool terminal = false;         // `out` is a terminal: progress is one rewritten line
   render::DeviceOptions device;  // that colours are measured on
 };
 

@@ -140,8 +140,8 @@ Ring ring_around(const Paper& paper, const calibrate::SurfacePixels& seen,
   return ring;
 }
 
-// Returns what the plates have over what is rendered, at a point: the value there of the plane that
-// fits the pixels' ratios best, within what they are.
+// Returns what the plates have over what is rendered, at a point: the value there of the plane
+// whose errors, times these weights, have no mean and no slope, within what the ratios are.
 glm::dvec3 ratio_at(const glm::dvec2& at, const Ring& ring, double unit_m) {
   // How the ratio changes with the place, for each channel: value, along x, along y.
   std::array<glm::dmat3, 3> squares{glm::dmat3(0), glm::dmat3(0), glm::dmat3(0)};
@@ -152,9 +152,9 @@ glm::dvec3 ratio_at(const glm::dvec2& at, const Ring& ring, double unit_m) {
     const double weight = 1 / (squared * squared);
     const glm::dvec3 terms(1, off);
     for (glm::length_t c = 0; c < 3; ++c) {
-      const double rendered = pixel.rendered[c];
-      squares[std::size_t(c)] += weight * rendered * rendered * glm::outerProduct(terms, terms);
-      products[std::size_t(c)] += weight * rendered * pixel.plate[c] * terms;
+      // Weights do not depend on what is rendered: its noise would make the ratio too small.
+      squares[std::size_t(c)] += weight * pixel.rendered[c] * glm::outerProduct(terms, terms);
+      products[std::size_t(c)] += weight * pixel.plate[c] * terms;
     }
   }
   glm::dvec3 ratio;

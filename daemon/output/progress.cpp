@@ -29,18 +29,25 @@ std::string duration_words(double seconds) {
   return buffer;
 }
 
-Progress::Progress(std::ostream& out, bool terminal, std::uint64_t total_frames, double start_s)
-    : out_(out), terminal_(terminal), total_(total_frames), start_s_(start_s) {}
+Progress::Progress(std::ostream& out, bool terminal, std::uint64_t total_frames, double start_s,
+                   std::uint64_t only_rendered)
+    : out_(out),
+      terminal_(terminal),
+      total_(total_frames),
+      only_rendered_(only_rendered),
+      start_s_(start_s) {}
 
 void Progress::clear_line() {
   if (line_shown_) out_ << erase_line;
   line_shown_ = false;
 }
 
-std::string Progress::rate_and_rest(double frames_done, double now_s) const {
+std::string Progress::rate_and_rest(double part_of_a_frame, double now_s) const {
+  const double frames_done = static_cast<double>(std::max(done_, rendered_)) + part_of_a_frame;
   if (frames_done <= 0) return "";
   const double seconds_a_frame = (now_s - start_s_) / frames_done;
-  const double rest = seconds_a_frame * (static_cast<double>(total_) - frames_done);
+  double rest = seconds_a_frame * (static_cast<double>(total_ + only_rendered_) - frames_done);
+  if (done_ < total_) rest = std::max(rest, 1.0);  // it still works
   const std::string rate = seconds_a_frame < 1 ? fixed(1 / seconds_a_frame, 1) + " frames/s"
                                                : fixed(seconds_a_frame, 1) + " s/frame";
   return ", " + rate + ", " + duration_words(rest) + " left";
@@ -52,17 +59,24 @@ void Progress::sample(std::uint64_t frame, int done, int total, double now_s) {
   const double part = static_cast<double>(done) / std::max(total, 1);
   clear_line();
   out_ << "frame " << frame << ": " << done << "/" << total << " samples; " << done_ << " of "
-       << total_ << " frames" << rate_and_rest(static_cast<double>(done_) + part, now_s)
+       << total_ << (total_ == 1 ? " frame" : " frames") << rate_and_rest(part, now_s)
        << std::flush;
   line_shown_ = true;
+}
+
+void Progress::frame_rendered(std::uint64_t frame, double now_s) {
+  const std::lock_guard lock(mutex_);
+  ++rendered_;
+  clear_line();
+  out_ << "frame " << frame << ": rendered (" << rendered_ << " of " << total_ + only_rendered_
+       << rate_and_rest(0, now_s) << ")" << std::endl;
 }
 
 void Progress::frame_done(const std::string& text, double now_s) {
   const std::lock_guard lock(mutex_);
   ++done_;
   clear_line();
-  out_ << text << " (" << done_ << " of " << total_
-       << rate_and_rest(static_cast<double>(done_), now_s) << ")" << std::endl;
+  out_ << text << " (" << done_ << " of " << total_ << rate_and_rest(0, now_s) << ")" << std::endl;
 }
 
 void Progress::note(const std::string& text) {

@@ -13,11 +13,15 @@ std::string duration_words(double seconds);
 
 class Progress {
  public:
-  // `total_frames` is the number of frames still to do. Times are in seconds of any one clock.
-  Progress(std::ostream& out, bool terminal, std::uint64_t total_frames, double start_s);
+  // `total_frames` is the number of frames still to do, and `only_rendered` of those that are
+  // rendered for them, as their neighbours. Times are in seconds of any one clock.
+  Progress(std::ostream& out, bool terminal, std::uint64_t total_frames, double start_s,
+           std::uint64_t only_rendered = 0);
 
   // Shows progress within a frame, on a terminal only.
   void sample(std::uint64_t frame, int done, int total, double now_s);
+  // Reports a frame that is rendered, but finished only together with its neighbours.
+  void frame_rendered(std::uint64_t frame, double now_s);
   // Reports a finished frame; `text` describes the result.
   void frame_done(const std::string& text, double now_s);
   // Prints a line that stays.
@@ -25,14 +29,15 @@ class Progress {
 
  private:
   void clear_line();
-  std::string rate_and_rest(double frames_done, double now_s) const;
+  std::string rate_and_rest(double part_of_a_frame, double now_s) const;
 
   std::mutex mutex_;  // the render and the output stage both report
   std::ostream& out_;
   const bool terminal_;
   const std::uint64_t total_;
+  const std::uint64_t only_rendered_;
   const double start_s_;
-  std::uint64_t done_ = 0;
+  std::uint64_t done_ = 0, rendered_ = 0;
   bool line_shown_ = false;
 };
 

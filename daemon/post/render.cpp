@@ -30,6 +30,7 @@
 #include "daemon/scene/lamp_strength.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/scene/scene.hpp"
+#include "daemon/set/check.hpp"
 #include "daemon/tracking/pose_judgement.hpp"
 #include "drivers/error.hpp"
 
@@ -62,14 +63,14 @@ std::string percent_words(double share) {
 std::string done_text(const Shot& shot) {
   const std::string frame = "frame " + std::to_string(shot.index) + ": ";
   if (!shot.untouched.empty()) return frame + "plate untouched, " + shot.untouched;
-  std::string text = frame + std::to_string(samples_of(shot)) + " samples in " +
+  std::string text = frame + set::plural(std::uint64_t(samples_of(shot)), "sample") + " in " +
                      output::duration_words(shot.render_s);
   if (shot.error > 0) text += ", error " + percent_words(shot.error);
   return text;
 }
 
 std::string quality_words(const set::Quality& quality) {
-  std::string text = std::to_string(quality.samples) + " samples";
+  std::string text = set::plural(std::uint64_t(quality.samples), "sample");
   if (pipeline::spreads_samples(quality))
     text += " on average";
   else if (quality.adaptive)
@@ -79,8 +80,7 @@ std::string quality_words(const set::Quality& quality) {
     text += ", then for " + output::duration_words(quality.seconds) + " per frame at most";
   if (quality.denoise) text += ", denoised";
   if (const int neighbours = neighbours_of(quality))
-    text += ", over " + std::to_string(neighbours) + (neighbours == 1 ? " frame" : " frames") +
-            " on either side";
+    text += ", over " + set::plural(std::uint64_t(neighbours), "frame") + " on either side";
   return text;
 }
 
@@ -215,8 +215,11 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
   });
   if (neighbours > 0)
     stages.stage_ahead("render", lit, rendered, [&](std::optional<Shot> shot) {
-      return shot ? among_neighbours(*std::move(shot))
-                  : among_neighbours.end(options.stop.stop_requested());
+      if (!shot) return among_neighbours.end(options.stop.stop_requested());
+      const std::uint64_t index = shot->index;
+      std::vector<Shot> shown = among_neighbours(*std::move(shot));
+      if (!options.stop.stop_requested()) progress.frame_rendered(index, now_s());
+      return shown;
     });
   else
     stages.stage("render", lit, rendered, [&](Shot shot) {
@@ -256,11 +259,23 @@ void check_memory(const RenderOptions& options, const pipeline::Take& take,
                                      render::memory_of(device), free_bytes);
 }
 
+// Returns how many frames are rendered only as neighbours of others.
+std::uint64_t only_neighbours(const std::set<std::uint64_t>& to_do, std::uint64_t neighbours,
+                              std::uint64_t take_frames) {
+  std::set<std::uint64_t> rendered;
+  for (const std::uint64_t frame : to_do)
+    for (std::uint64_t at = frame - std::min(frame, neighbours);
+         at <= frame + neighbours && at < take_frames; ++at)
+      rendered.insert(at);
+  return rendered.size() - to_do.size();
+}
+
 // Renders the frames, and then those that another process had and did not finish: it was killed.
 void render_all(const RenderOptions& options, const pipeline::Take& take,
                 std::set<std::uint64_t> to_do, RenderDirectory& directory,
                 pipeline::Metrics& metrics, const SumsFolders* sums, RenderReport& report,
                 std::ostream& out) {
+  out << take.session.info.name << ": reading the scene" << std::endl;
   const scene::Scene scene = scene::load_scene(take.set);
   std::vector<std::string> notes = scene.notes;
   std::ranges::move(scene::remarks_on_bright_lamps(scene, take.set, pipeline::first_exposure(take)),
@@ -279,14 +294,17 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
   if (!options.set_file)
     out << take.session.info.name << ": uses the set recorded with it; --set FILE uses another"
         << std::endl;
-  out << take.session.info.name << ": " << to_do.size() << " frames of "
+  out << take.session.info.name << ": " << set::plural(to_do.size(), "frame") << " of "
       << size_words(pipeline::scaled(take.observer, options.scale).intrinsics) << ", "
       << quality_words(take.set.quality)
       << (options.sample_range ? ", range " + to_string(*options.sample_range) + " of them" : "")
       << (sums ? ", merged from their ranges" : "") << ", on " << render::device_name(*device)
       << std::endl;
   if (options.on_begin) options.on_begin();
-  output::Progress progress(out, options.terminal, to_do.size(), now_s());
+  output::Progress progress(
+      out, options.terminal, to_do.size(), now_s(),
+      only_neighbours(to_do, static_cast<std::uint64_t>(neighbours_of(take.set.quality)),
+                      take.observer_stream->records().size()));
   tracking::PoseJudgement judgement(take.set.tracking, take.observer);
   LightJudgement light(take, options.scale);
   const Job job{options, take, scene, device, directory, metrics, sums, report, judgement, light};
@@ -315,8 +333,8 @@ void report_opened(const RenderDirectory& directory, const RenderReport& report,
   const std::string folder = directory.path().string();
   for (const std::string& note : directory.notes()) out << folder << ": " << note << std::endl;
   if (report.found_finished > 0)
-    out << folder << ": " << report.found_finished
-        << " frames already rendered, and their files are as they were written" << std::endl;
+    out << folder << ": " << set::plural(report.found_finished, "frame")
+        << " already rendered, and the files are as they were written" << std::endl;
   for (const auto& [why, frames] : directory.rejected())
     out << folder << ": rendered again: " << frames_words(frames) << ": " << why << std::endl;
 }

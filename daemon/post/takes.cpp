@@ -9,6 +9,7 @@
 #include "daemon/output/take_list.hpp"
 #include "daemon/post/render_folder.hpp"
 #include "daemon/post/take_copy.hpp"
+#include "daemon/set/check.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/set.hpp"
 #include "drivers/error.hpp"
@@ -215,7 +216,7 @@ int check_takes(const Paths& takes, std::ostream& out, const std::stop_token& st
     if (faults.empty() && !take.fault.empty()) faults.push_back(take.fault);
     for (const std::string& fault : faults) say(take.directory, fault, out);
     if (faults.empty())
-      say(take.directory, "whole, " + std::to_string(take.summary.frames) + " frames", out);
+      say(take.directory, "whole, " + set::plural(take.summary.frames, "frame"), out);
     else
       result = 1;
   }
@@ -241,7 +242,7 @@ int repair_takes(const RepairOptions& options, std::ostream& out, const std::sto
     const session::Repair repair = session::repair_session(take.directory, place, stop);
     for (const std::string& what : repair.lacked) say(take.directory, what, out);
     say(place,
-        "repaired, " + std::to_string(repair.frames) + " frames" +
+        "repaired, " + set::plural(repair.frames, "frame") +
             (repair.is_complete ? ", nothing is lost" : "; what is lost is in its session.toml"),
         out);
     for (const std::string& fault : damage_of(place, stop)) say(place, fault, out);

@@ -14,7 +14,8 @@ namespace {
 
 constexpr float diffuse_roughness = 0.5f;
 constexpr int tiles_a_side = 4;
-constexpr int identity_samples = 16;
+// About as many are rendered in half a second by a slow machine, and the progress then goes on.
+constexpr double pixel_samples_a_piece = 200'000;
 constexpr std::uint32_t no_surface = 0;  // in identity pictures surfaces count from 1
 
 bool is_diffuse(const scene::Material& m) {
@@ -24,27 +25,41 @@ bool is_diffuse(const scene::Material& m) {
          m.alpha_mode == scene::AlphaMode::opaque;
 }
 
-// Makes every surface of the real world glow with its number; surfaces that are not diffuse are
-// black.
-scene::Scene glowing(scene::Scene scene, std::vector<KnownSurface>& surfaces) {
-  // A recoloured surface leaves its file's original material unused, under the same name.
+// Calls `visit` with each diffuse material that is in use. A recoloured surface leaves its file's
+// original material unused, under the same name.
+template <typename Visit>
+void each_diffuse(const scene::Scene& scene, Visit visit) {
   std::vector<bool> used(scene.materials.size());
   for (const scene::Instance& instance : scene.instances) used[instance.material] = true;
-  for (std::size_t i = 0; i < scene.materials.size(); ++i) {
-    scene::Material& material = scene.materials[i];
-    scene::Material glow;
-    glow.name = material.name;
-    glow.base_color = glm::vec3(0);
-    glow.specular = 0;
-    if (used[i] && is_diffuse(material)) {
-      auto known = std::ranges::find(surfaces, material.name, &KnownSurface::material);
-      if (known == surfaces.end())
-        known = surfaces.insert(surfaces.end(), {material.name, glm::dvec3(material.base_color)});
-      const auto k = float(known - surfaces.begin() + 1);
-      glow.emission = glm::vec3(k, k * k, 1);
-    }
-    material = glow;
+  for (std::size_t i = 0; i < scene.materials.size(); ++i)
+    if (used[i] && is_diffuse(scene.materials[i])) visit(i);
+}
+
+std::vector<KnownSurface> surfaces_of(const scene::Scene& scene) {
+  std::vector<KnownSurface> surfaces;
+  each_diffuse(scene, [&](std::size_t i) {
+    const scene::Material& material = scene.materials[i];
+    if (std::ranges::find(surfaces, material.name, &KnownSurface::material) == surfaces.end())
+      surfaces.push_back({material.name, glm::dvec3(material.base_color)});
+  });
+  return surfaces;
+}
+
+// Makes every surface of the real world glow with its number; surfaces that are not diffuse are
+// black.
+scene::Scene glowing(scene::Scene scene, const std::vector<KnownSurface>& surfaces) {
+  std::vector<scene::Material> glows(scene.materials.size());
+  for (std::size_t i = 0; i < glows.size(); ++i) {
+    glows[i].name = scene.materials[i].name;
+    glows[i].base_color = glm::vec3(0);
+    glows[i].specular = 0;
   }
+  each_diffuse(scene, [&](std::size_t i) {
+    const auto known = std::ranges::find(surfaces, glows[i].name, &KnownSurface::material);
+    const auto k = float(known - surfaces.begin() + 1);
+    glows[i].emission = glm::vec3(k, k * k, 1);
+  });
+  scene.materials = std::move(glows);
   scene.lights.clear();
   return scene;
 }
@@ -90,114 +105,139 @@ set::Lighting lit_by_image(set::Lighting lighting) {
   return lighting;
 }
 
-class Probe {
- public:
-  Probe(const pipeline::Take& take, const scene::Scene& scene,
-        const std::shared_ptr<render::Device>& device, const ProbeOptions& options)
-      : take_(take),
-        options_(options),
-        scale_(std::min(1.0, double(options.width) / take.observer.intrinsics.width)),
-        small_(pipeline::scaled(take.observer, scale_)),
-        worlds_(device, paired(take.set), small_),
-        identity_(device, paired(take.set), small_) {
-    const scene::Scene real = scene::real_world(scene);
-    worlds_.set_scene(real);
-    identity_.set_scene(glowing(real, found_.surfaces));
-    identity_.set_environment(darkness(), set::LightSampling::bsdf);
-  }
+// Both worlds are the same, so that one estimate is of both.
+set::Estimation paired(const set::Set& set) {
+  set::Estimation estimation = set.estimation;
+  estimation.estimator = set::Estimator::paired;
+  estimation.composite = set::Composite::additive;
+  return estimation;
+}
 
-  SurfacePixels run() {
-    // The take is divided into equal shares, and the first tracked frame of each is probed.
-    const std::size_t count = take_.observer_stream->records().size();
-    const auto shares = std::size_t(options_.frames);
-    std::size_t share = 0;
-    pipeline::TakeShotsOptions options;
-    options.wanted = [&](std::uint64_t frame) {
-      return share < shares && frame >= share * count / shares;
-    };
-    options.lighting = lit_by_image(take_.set.lighting);
-    options.whole_light = true;
-    options.from_start = false;
-    for (pipeline::Shot& shot : pipeline::TakeShots(take_, options)) {
-      if (!shot.track.pose) continue;
-      do ++share;
-      while (share < shares && share * count / shares <= shot.index);
-      if (!shot.light) continue;
-      worlds_.set_environment(shot.light->lighting.environment, take_.set.lighting.sampling);
-      add(shot);
-      if (options_.each_shot) options_.each_shot(shot);
-    }
-    if (found_.world_from_cameras.empty())
-      throw Error(take_.session.directory.string() +
-                  ": no frame has both a pose and light: nothing to balance");
-    return std::move(found_);
-  }
-
- private:
-  static set::Estimation paired(const set::Set& set) {
-    set::Estimation estimation = set.estimation;
-    estimation.estimator = set::Estimator::paired;
-    estimation.composite = set::Composite::additive;
-    return estimation;
-  }
-
-  void add(pipeline::Shot& shot) {
-    const Plate& full = *plate_of(shot);
-    const lighting::Response response(take_.observer.response, full.bits);
-    const auto scaled_plate =
-        std::make_shared<const Plate>(pipeline::scaled(full, scale_, response));
-    const Plate& plate = *scaled_plate;
-    const double exposure = take_.set.observer.exposure.value_or(shot.frame->exposure);
-    const render::FrameInput input{scaled_plate, exposure, shot.track.pose->world_from_camera};
-    identity_.begin(input);
-    identity_.render(identity_samples);
-    worlds_.begin(input);
-    worlds_.render(options_.samples);
-    const std::vector<glm::vec3> identity = identity_.layers().real;
-    const std::vector<glm::vec3> real = worlds_.layers().real;
-    const std::vector<bool> blind = blinded(full, plate.width, plate.height);
-    const auto at = [&](int x, int y) {
-      return std::size_t(y) * std::size_t(plate.width) + std::size_t(x);
-    };
-    const auto frame = static_cast<std::uint32_t>(found_.world_from_cameras.size());
-    const glm::dvec2 pixel_size(double(full.width) / plate.width,
-                                double(full.height) / plate.height);
-    for (int y = 1; y + 1 < plate.height; ++y)
-      for (int x = 1; x + 1 < plate.width; ++x) {
-        const std::uint32_t surface = surface_of(identity[at(x, y)]);
-        const bool alone = surface != no_surface && surface == surface_of(identity[at(x - 1, y)]) &&
-                           surface == surface_of(identity[at(x + 1, y)]) &&
-                           surface == surface_of(identity[at(x, y - 1)]) &&
-                           surface == surface_of(identity[at(x, y + 1)]);
-        if (!alone || blind[at(x, y)]) continue;
-        SurfacePixel pixel{.surface = surface - 1,
-                           .tile = tile(plate, frame, x, y),
-                           .plate = {},
-                           .rendered = glm::dvec3(real[at(x, y)]),
-                           .frame = frame,
-                           .px = (glm::dvec2(x, y) + 0.5) * pixel_size - 0.5};
-        for (int c = 0; c < 3; ++c)
-          pixel.plate[c] =
-              response.inverse()[plate.samples[3 * at(x, y) + std::size_t(c)]] / exposure;
-        found_.pixels.push_back(pixel);
-      }
-    found_.world_from_cameras.push_back(shot.track.pose->world_from_camera);
-  }
-
-  static std::uint32_t tile(const Plate& plate, std::uint32_t frame, int x, int y) {
-    const int column = x * tiles_a_side / plate.width, row = y * tiles_a_side / plate.height;
-    return (frame * tiles_a_side + std::uint32_t(row)) * tiles_a_side + std::uint32_t(column);
-  }
-
-  const pipeline::Take& take_;
-  const ProbeOptions options_;
-  const double scale_;
-  const ObserverCalibration small_;
-  render::Renderer worlds_, identity_;
-  SurfacePixels found_;
-};
+std::uint32_t tile_of(const Plate& plate, std::uint32_t frame, int x, int y) {
+  const int column = x * tiles_a_side / plate.width, row = y * tiles_a_side / plate.height;
+  return (frame * tiles_a_side + std::uint32_t(row)) * tiles_a_side + std::uint32_t(column);
+}
 
 }  // namespace
+
+std::vector<ProbedShot> probed_shots(const pipeline::Take& take, int count,
+                                     const EachShot& each_shot) {
+  const std::size_t frames = take.observer_stream->records().size();
+  const auto shares = std::size_t(count);
+  std::size_t share = 0;
+  pipeline::TakeShotsOptions options;
+  options.wanted = [&](std::uint64_t frame) {
+    return share < shares && frame >= share * frames / shares;
+  };
+  options.lighting = lit_by_image(take.set.lighting);
+  options.whole_light = true;
+  options.from_start = false;
+  std::vector<ProbedShot> shots;
+  for (pipeline::Shot& shot : pipeline::TakeShots(take, options)) {
+    if (!shot.track.pose) continue;
+    do ++share;
+    while (share < shares && share * frames / shares <= shot.index);
+    if (!shot.light) continue;
+    shots.push_back({plate_of(shot), take.set.observer.exposure.value_or(shot.frame->exposure),
+                     shot.track.pose->world_from_camera, shot.light});
+    if (each_shot) each_shot(shot);
+  }
+  if (shots.empty())
+    throw Error(take.session.directory.string() +
+                ": no frame has both a pose and light: nothing to balance");
+  return shots;
+}
+
+SurfaceProbe::SurfaceProbe(const pipeline::Take& take, const std::vector<ProbedShot>& shots,
+                           const scene::Scene& scene, const std::shared_ptr<render::Device>& device,
+                           const ProbeSize& size, PixelSamplesDone done)
+    : take_(take),
+      shots_(shots),
+      scale_(std::min(1.0, double(size.width) / take.observer.intrinsics.width)),
+      small_(pipeline::scaled(take.observer, scale_)),
+      device_(device),
+      done_(std::move(done)),
+      worlds_(device, paired(take.set), small_) {
+  for (const ProbedShot& shot : shots_) {
+    const lighting::Response response(take_.observer.response, shot.plate->bits);
+    plates_.push_back(
+        std::make_shared<const Plate>(pipeline::scaled(*shot.plate, scale_, response)));
+  }
+  find_pixels(scene::real_world(scene), size.identity_samples);
+}
+
+void SurfaceProbe::render(render::Renderer& renderer, std::size_t shot, int samples) {
+  renderer.begin({plates_[shot], shots_[shot].exposure, shots_[shot].world_from_camera});
+  const double pixels = double(plates_[shot]->width) * plates_[shot]->height;
+  const int piece = std::max(1, int(pixel_samples_a_piece / pixels));
+  for (int at = 0; at < samples; at += piece) {
+    const int count = std::min(piece, samples - at);
+    renderer.render(count);
+    if (!done_) continue;
+    renderer.wait();
+    done_(pixels * count);
+  }
+}
+
+void SurfaceProbe::find_pixels(const scene::Scene& real, int samples) {
+  seen_.surfaces = surfaces_of(real);
+  render::Renderer identity(device_, paired(take_.set), small_);
+  identity.set_scene(glowing(real, seen_.surfaces));
+  identity.set_environment(darkness(), set::LightSampling::bsdf);
+  for (std::size_t i = 0; i < shots_.size(); ++i) {
+    render(identity, i, samples);
+    add_pixels(shots_[i], *plates_[i], identity.layers().real);
+  }
+}
+
+void SurfaceProbe::add_pixels(const ProbedShot& shot, const Plate& plate,
+                              const std::vector<glm::vec3>& identity) {
+  const lighting::Response response(take_.observer.response, shot.plate->bits);
+  const std::vector<bool> blind = blinded(*shot.plate, plate.width, plate.height);
+  const auto at = [&](int x, int y) {
+    return std::size_t(y) * std::size_t(plate.width) + std::size_t(x);
+  };
+  const auto frame = static_cast<std::uint32_t>(seen_.world_from_cameras.size());
+  const glm::dvec2 pixel_size(double(shot.plate->width) / plate.width,
+                              double(shot.plate->height) / plate.height);
+  for (int y = 1; y + 1 < plate.height; ++y)
+    for (int x = 1; x + 1 < plate.width; ++x) {
+      const std::uint32_t surface = surface_of(identity[at(x, y)]);
+      const bool alone = surface != no_surface && surface == surface_of(identity[at(x - 1, y)]) &&
+                         surface == surface_of(identity[at(x + 1, y)]) &&
+                         surface == surface_of(identity[at(x, y - 1)]) &&
+                         surface == surface_of(identity[at(x, y + 1)]);
+      if (!alone || blind[at(x, y)]) continue;
+      SurfacePixel pixel{.surface = surface - 1,
+                         .tile = tile_of(plate, frame, x, y),
+                         .plate = {},
+                         .rendered = {},
+                         .frame = frame,
+                         .px = (glm::dvec2(x, y) + 0.5) * pixel_size - 0.5};
+      for (int c = 0; c < 3; ++c)
+        pixel.plate[c] =
+            response.inverse()[plate.samples[3 * at(x, y) + std::size_t(c)]] / shot.exposure;
+      seen_.pixels.push_back(pixel);
+      places_.push_back(at(x, y));
+    }
+  seen_.world_from_cameras.push_back(shot.world_from_camera);
+}
+
+SurfacePixels SurfaceProbe::compare(const scene::Scene& scene, int samples) {
+  const scene::Scene real = scene::real_world(scene);
+  SurfacePixels seen = seen_;
+  seen.surfaces = surfaces_of(real);
+  worlds_.set_scene(real);
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < shots_.size(); ++i) {
+    worlds_.set_environment(shots_[i].light->lighting.environment, take_.set.lighting.sampling);
+    render(worlds_, i, samples);
+    const std::vector<glm::vec3> rendered = worlds_.layers().real;
+    for (; next < places_.size() && seen.pixels[next].frame == i; ++next)
+      seen.pixels[next].rendered = glm::dvec3(rendered[places_[next]]);
+  }
+  return seen;
+}
 
 void append(const SurfacePixels& more, SurfacePixels& to) {
   const auto surfaces = std::uint32_t(to.surfaces.size());
@@ -214,7 +254,9 @@ void append(const SurfacePixels& more, SurfacePixels& to) {
 SurfacePixels probe_surfaces(const pipeline::Take& take, const scene::Scene& scene,
                              const std::shared_ptr<render::Device>& device,
                              const ProbeOptions& options) {
-  return Probe(take, scene, device, options).run();
+  const std::vector<ProbedShot> shots = probed_shots(take, options.frames, options.each_shot);
+  return SurfaceProbe(take, shots, scene, device, {.width = options.width})
+      .compare(scene, options.samples);
 }
 
 }  // namespace previz::calibrate

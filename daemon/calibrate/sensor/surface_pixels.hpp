@@ -11,10 +11,12 @@
 #include <string>
 #include <vector>
 
+#include "daemon/pipeline/light.hpp"
 #include "daemon/pipeline/shot.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/render/renderer.hpp"
 #include "daemon/scene/scene.hpp"
+#include "drivers/plate.hpp"
 
 namespace previz::calibrate {
 
@@ -43,20 +45,74 @@ struct SurfacePixels {
 // Adds the surfaces and pixels of `more`; tiles of the two are not the same ones.
 void append(const SurfacePixels& more, SurfacePixels& to);
 
+using EachShot = std::function<void(pipeline::Shot&)>;
+
 struct ProbeOptions {
-  int frames = 3;                                       // tracked frames, spread over the take
-  int width = 160;                                      // of the rendered picture
-  int samples = 64;                                     // per pixel
-  std::function<void(pipeline::Shot&)> each_shot = {};  // is given each frame that was looked at
+  int frames = 3;           // tracked frames, spread over the take
+  int width = 160;          // of the rendered picture
+  int samples = 64;         // per pixel
+  EachShot each_shot = {};  // is given each frame that was looked at
 };
 
-// Renders the real world alone (no virtual object) at a fraction of the observer's size. A second
-// pass finds which surface each pixel shows: surface k glows with (k, k^2, 1) and nothing else, so
-// that a pixel's means show whether it covers one surface only. The pixels returned show one
-// diffuse surface, as do their four neighbours, and no sample of the plate under them is black or
-// white. Diffuse means opaque, no metal, nothing transmitted or emitted, and no coat smoother than
-// roughness 0.5. Surfaces of the same material name are one surface. Throws previz::Error if no
-// frame is tracked and lit.
+// A frame of a take with everything that a comparison needs of it.
+struct ProbedShot {
+  PlatePtr plate;
+  double exposure = 1;
+  glm::dmat4 world_from_camera{1};
+  pipeline::LightPtr light;
+};
+
+// Returns the first frame with a pose and light of each of `count` equal shares of the take. Throws
+// previz::Error if there is none.
+std::vector<ProbedShot> probed_shots(const pipeline::Take& take, int count,
+                                     const EachShot& each_shot = {});
+
+// The width of rendered pictures, and the samples by which each pixel's surface is found.
+struct ProbeSize {
+  int width = 160;
+  int identity_samples = 16;
+};
+
+// Receives the number of samples that pixels got, a few times a second.
+using PixelSamplesDone = std::function<void(double)>;
+
+// Compares shots with the real world's model, once for each guess of its colours, with the same
+// random numbers. Only the real world is rendered (no virtual object), at a fraction of the
+// observer's size. A pass in the beginning finds which surface each pixel shows: surface k glows
+// with (k, k^2, 1) and nothing else, so that a pixel's means show whether it covers one surface
+// only. The pixels returned show one diffuse surface, as do their four neighbours, and no sample of
+// the plate under them is black or white. Diffuse means opaque, no metal, nothing transmitted or
+// emitted, and no coat smoother than roughness 0.5. Surfaces of the same material name are one
+// surface.
+class SurfaceProbe {
+ public:
+  // `take` and `shots` must outlive this.
+  SurfaceProbe(const pipeline::Take& take, const std::vector<ProbedShot>& shots,
+               const scene::Scene& scene, const std::shared_ptr<render::Device>& device,
+               const ProbeSize& size, PixelSamplesDone done = {});
+
+  // The scene is the constructor's, but for the colours of its diffuse materials.
+  SurfacePixels compare(const scene::Scene& scene, int samples);
+
+ private:
+  void find_pixels(const scene::Scene& real, int samples);
+  void add_pixels(const ProbedShot& shot, const Plate& plate,
+                  const std::vector<glm::vec3>& identity);
+  void render(render::Renderer& renderer, std::size_t shot, int samples);
+
+  const pipeline::Take& take_;
+  const std::vector<ProbedShot>& shots_;
+  const double scale_;
+  const ObserverCalibration small_;
+  const std::shared_ptr<render::Device> device_;
+  const PixelSamplesDone done_;
+  std::vector<PlatePtr> plates_;  // of each shot, scaled
+  render::Renderer worlds_;
+  SurfacePixels seen_;               // as yet without what is rendered
+  std::vector<std::size_t> places_;  // of its pixels in their rendered pictures
+};
+
+// Probes shots of the take once. Throws previz::Error if no frame is tracked and lit.
 SurfacePixels probe_surfaces(const pipeline::Take& take, const scene::Scene& scene,
                              const std::shared_ptr<render::Device>& device,
                              const ProbeOptions& options);

@@ -188,6 +188,10 @@ TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
     EXPECT_NEAR(colour_in(found, "tag 0 print")[c], 0.04, 0.01);
   }
   EXPECT_THAT(out.str(), HasSubstr("under tag 2: continued from"));
+  // How far it is, from the first line on.
+  EXPECT_THAT(out.str(), StartsWith(session.string() + ": looking for tags and edges\n"));
+  EXPECT_THAT(out.str(), HasSubstr("colours: first rounds ("));
+  EXPECT_THAT(out.str(), HasSubstr("colours: looking around tags (100 %, 0 s left)"));
   for (const bool hides : {false, true}) expect_tags(made, hides);
 }
 

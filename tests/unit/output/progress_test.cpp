@@ -32,9 +32,24 @@ TEST(Progress, TerminalRewritesOneLine) {
   progress.sample(7, 8, 16, 0.1);
   progress.frame_done("frame 7: 16 samples", 0.2);
   EXPECT_EQ(out.str(),
-            "frame 7: 8/16 samples; 0 of 2 frames, 5.0 frames/s, 0 s left"
+            "frame 7: 8/16 samples; 0 of 2 frames, 5.0 frames/s, 1 s left"
             "\r\x1b[K"
-            "frame 7: 16 samples (1 of 2, 5.0 frames/s, 0 s left)\n");
+            "frame 7: 16 samples (1 of 2, 5.0 frames/s, 1 s left)\n");
+}
+
+// A picture that is averaged with its neighbours is finished when these are rendered.
+TEST(Progress, CountsTheWorkOfNeighbours) {
+  std::ostringstream out;
+  Progress progress(out, false, 1, 0, 2);
+  progress.frame_rendered(2, 10);
+  progress.frame_rendered(3, 20);
+  progress.frame_rendered(4, 30);
+  progress.frame_done("frame 3: 16 samples", 31);
+  EXPECT_EQ(out.str(),
+            "frame 2: rendered (1 of 3, 10.0 s/frame, 20 s left)\n"
+            "frame 3: rendered (2 of 3, 10.0 s/frame, 10 s left)\n"
+            "frame 4: rendered (3 of 3, 10.0 s/frame, 1 s left)\n"
+            "frame 3: 16 samples (1 of 1, 10.3 s/frame, 0 s left)\n");
 }
 
 TEST(ShareProgress, TellsTheShareOfTheWorkAndTheTimeLeft) {
