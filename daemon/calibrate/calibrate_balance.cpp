@@ -10,7 +10,6 @@
 #include "daemon/calibrate/sensor/surface_pixels.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/load.hpp"
-#include "daemon/scene/real_world.hpp"
 #include "daemon/set/file_edit.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/error.hpp"
@@ -91,14 +90,9 @@ SurfacePixels probed(const pipeline::Take& take, const BalanceOptions& options) 
   const scene::Scene scene = scene::load_scene(take.set);
   const auto device =
       render::open_device(render::options_for(options.device, take.set.quality.hardware_rays));
-  Paper paper(take.set, take.observer, scene::real_world(scene), device, options.samples);
-  SurfacePixels of_paper;
-  ProbeOptions probe;
-  probe.frames = options.frames;
-  probe.samples = options.samples;
-  probe.each_shot = [&](pipeline::Shot& shot) { paper.add(shot, of_paper); };
-  SurfacePixels seen = probe_surfaces(take, scene, device, probe);
-  append(of_paper, seen);
+  const std::vector<ProbedShot> shots = probed_shots(take, options.frames);
+  SurfacePixels seen = SurfaceProbe(take, shots, scene, device, {}).compare(scene, options.samples);
+  append(Paper(take.set, take.observer, scene, device, options.samples).look_at(shots), seen);
   return seen;
 }
 

@@ -5,7 +5,6 @@
 #include "daemon/calibrate/calibrate.hpp"
 #include "daemon/calibrate/lens/report.hpp"
 #include "daemon/calibrate/sensor/rotation_fit.hpp"
-#include "daemon/calibrate/sensor/surface_pixels.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/load.hpp"
 #include "daemon/set/file_edit.hpp"
@@ -16,17 +15,6 @@ namespace previz::calibrate {
 namespace {
 
 constexpr int frames = 3, width = 80;
-
-ShadingAt shading_of(const pipeline::Take& take) {
-  const scene::Scene scene = scene::load_scene(take.set);
-  const auto device = render::open_device(render::options_for({}, take.set.quality.hardware_rays));
-  return [=](double rotation_rad, int samples) {
-    pipeline::Take turned = take;
-    turned.set.lighting.environment_rotation_rad += rotation_rad;
-    return shading_off(probe_surfaces(turned, scene, device,
-                                      {.frames = frames, .width = width, .samples = samples}));
-  };
-}
 
 }  // namespace
 
@@ -39,7 +27,9 @@ void calibrate_rotation(const LightOptions& options, std::ostream& out) {
         options.footage.string() +
         ": its set has no lighting.environment that could be turned; a light camera's place "
         "is its [light_camera.pose], which --tags SET finds");
-  const RotationFit fit = fit_rotation(shading_of(take));
+  const scene::Scene scene = scene::load_scene(take.set);
+  const auto device = render::open_device(render::options_for({}, take.set.quality.hardware_rays));
+  const RotationFit fit = fit_rotation(shading_of(take, scene, device, frames, width));
   const double rotation = std::remainder(
       take.set.lighting.environment_rotation_rad + fit.rotation_rad, 2 * std::numbers::pi);
   fmt::print(

@@ -1,12 +1,16 @@
 #include "daemon/model/colours.hpp"
 
-#include <fmt/format.h>
+#include <fmt/ostream.h>
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <glm/common.hpp>
+#include <glm/exponential.hpp>
 
 #include "daemon/calibrate/sensor/balance_fit.hpp"
+#include "daemon/calibrate/sensor/paper.hpp"
+#include "daemon/pipeline/light_figure.hpp"
 #include "daemon/scene/load.hpp"
 
 namespace previz::model {
@@ -21,6 +25,7 @@ constexpr int coarse_samples = 4, fine_samples = 64, around_samples = 8;
 // Pictures are so wide, as far as the camera's are: to measure colours, and to see around tags.
 constexpr calibrate::ProbeSize probe_of_colours{160, 16}, probe_around_tags{480, 4};
 constexpr int probed_frames = 3;
+constexpr int paper_samples = 64;
 // No paint reflects less or more; the round that guesses such an albedo has a wrong light or model.
 constexpr double least_albedo = 0.005, most_albedo = 0.98;
 
@@ -117,6 +122,7 @@ ColourComparison::ColourComparison(pipeline::Take take, std::shared_ptr<render::
       rounds_work_(pixels_of(take_, shots_.size(), probe_of_colours) *
                    (probe_of_colours.identity_samples + (2 * most_rounds + 1) * coarse_samples +
                     fine_samples)),
+      out_(out),
       progress_(out, terminal,
                 rounds_work_ + (has_tags ? pixels_of(take_, shots_.size(), probe_around_tags) *
                                                (probe_around_tags.identity_samples + around_samples)
@@ -128,6 +134,23 @@ void ColourComparison::worked(double pixel_samples) {
   progress_.worked(step_, pixel_samples, now_s());
 }
 
+void ColourComparison::fit_to_paper(const scene::Scene& scene) {
+  const calibrate::SurfacePixels paper =
+      calibrate::Paper(take_.set, take_.observer, scene, device_, paper_samples).look_at(shots_);
+  if (paper.pixels.empty()) return;
+  const calibrate::Balance balance = calibrate::fit_balance(paper, {});
+  calibrate::relight(shots_, balance.scale);
+  const glm::dvec3& scale = balance.scale;
+  const glm::dvec3 stops = glm::abs(glm::log2(scale));
+  if (std::max({stops.r, stops.g, stops.b}) > pipeline::light_off_stops)
+    fmt::print(
+        out_,
+        "by the tags' paper, the set's light is to be multiplied by {:.2f} {:.2f} {:.2f}, and "
+        "colours are measured as under that light: previzd calibrate balance writes it into "
+        "the set\n",
+        scale.r, scale.g, scale.b);
+}
+
 calibrate::SurfaceProbe ColourComparison::probe(const scene::Scene& scene,
                                                 const calibrate::ProbeSize& size) {
   return {take_, shots_, scene, device_, size, [this](double samples) { worked(samples); }};
@@ -135,6 +158,7 @@ calibrate::SurfaceProbe ColourComparison::probe(const scene::Scene& scene,
 
 std::map<std::string, Colour> ColourComparison::measure(const std::vector<NamedMesh>& meshes) {
   scene::Scene scene = scene_of(take_, meshes, {});
+  fit_to_paper(scene);
   step_ = "colours: finding which surfaces the pictures show";
   calibrate::SurfaceProbe surfaces = probe(scene, probe_of_colours);
   std::map<std::string, Colour> colours;

@@ -35,7 +35,9 @@ class ColourComparison {
   // Returns the colour of every mesh that enough pixels show, by its name. The model is
   // rendered grey by the take's light, with all bounces, and each albedo is multiplied by what the
   // plates have over it, until it changes no more: the same comparison as `previzd calibrate
-  // balance`, whose result, lighting.balance, is taken as right.
+  // balance`. The light is made to fit the paper of the set's tags first, so that it does not
+  // matter whether the balance is in the set yet; without paper, lighting.balance is taken as
+  // right.
   std::map<std::string, Colour> measure(const std::vector<NamedMesh>& meshes);
   // Renders the model in its colours by the take's light, large enough to see what is around tags,
   // and returns what it and the plates have in pixels that show one surface. What is rendered has
@@ -45,12 +47,14 @@ class ColourComparison {
 
  private:
   calibrate::SurfaceProbe probe(const scene::Scene& scene, const calibrate::ProbeSize& size);
+  void fit_to_paper(const scene::Scene& scene);
   void worked(double pixel_samples);
 
   const pipeline::Take take_;
   const std::shared_ptr<render::Device> device_;
-  const std::vector<calibrate::ProbedShot> shots_;
+  std::vector<calibrate::ProbedShot> shots_;
   const double rounds_work_;  // at most
+  std::ostream& out_;
   output::ShareProgress progress_;
   std::string step_;
   double done_ = 0;

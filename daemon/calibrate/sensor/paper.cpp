@@ -11,6 +11,7 @@
 
 #include "daemon/lighting/response.hpp"
 #include "daemon/pipeline/preview_size.hpp"
+#include "daemon/scene/real_world.hpp"
 #include "daemon/tracking/tag_family.hpp"
 #include "drivers/calibration/pinhole.hpp"
 
@@ -65,14 +66,14 @@ struct Paper::Impl {
     double cell_m;
   };
 
-  Impl(const set::Set& set, const ObserverCalibration& the_camera, scene::Scene the_scene,
+  Impl(const set::Set& set, const ObserverCalibration& the_camera, const scene::Scene& scene,
        const std::shared_ptr<render::Device>& device, int the_samples)
       : camera(the_camera),
-        exposure(set.observer.exposure),
         sampling(set.lighting.sampling),
         samples(the_samples),
         renderer(device, set.estimation, the_camera),
         identity(device, set.estimation, the_camera) {
+    scene::Scene the_scene = scene::real_world(scene);
     scene::Material paper;
     paper.name = paper_name;
     paper.base_color = glm::vec3(static_cast<float>(paper_albedo));
@@ -105,10 +106,10 @@ struct Paper::Impl {
 
   std::optional<glm::dvec2> pixel(const glm::dvec3& in_camera) const;
   std::optional<SeenTag> seen(const Printed& tag, const glm::dmat4& world_from_camera) const;
-  std::optional<glm::dvec3> rendered(const SeenTag& tag, const pipeline::Shot& shot);
+  std::optional<glm::dvec3> rendered(const SeenTag& tag, const ProbedShot& shot);
+  void add(const ProbedShot& shot, SurfacePixels& seen);
 
   const ObserverCalibration camera;
-  const std::optional<double> exposure;
   const set::LightSampling sampling;
   const int samples;
   std::vector<Printed> printed;
@@ -161,13 +162,12 @@ std::optional<SeenTag> Paper::Impl::seen(const Printed& tag,
 }
 
 // Returns the mean radiance of the tag's paper under the shot's light, where it is seen.
-std::optional<glm::dvec3> Paper::Impl::rendered(const SeenTag& tag, const pipeline::Shot& shot) {
+std::optional<glm::dvec3> Paper::Impl::rendered(const SeenTag& tag, const ProbedShot& shot) {
   const ObserverCalibration crop = cropped(camera, tag.low, tag.high);
   const int longest = std::max(crop.intrinsics.width, crop.intrinsics.height);
   const ObserverCalibration small =
       pipeline::scaled(crop, std::min(1.0, double(rendered_px) / longest));
-  const render::FrameInput input{.exposure = 1,
-                                 .world_from_camera = shot.track.pose->world_from_camera};
+  const render::FrameInput input{.exposure = 1, .world_from_camera = shot.world_from_camera};
   const auto layers_of = [&](render::Renderer& which, int count) {
     which.resize(small);
     which.begin(input);
@@ -189,29 +189,19 @@ std::optional<glm::dvec3> Paper::Impl::rendered(const SeenTag& tag, const pipeli
   return sum / double(count);
 }
 
-Paper::Paper(const set::Set& set, const ObserverCalibration& camera, scene::Scene scene,
-             const std::shared_ptr<render::Device>& device, int samples)
-    : impl_(std::make_unique<Impl>(set, camera, std::move(scene), device, samples)) {}
-Paper::~Paper() = default;
-
-void Paper::add(pipeline::Shot& shot, SurfacePixels& seen) {
-  const glm::dmat4& pose = shot.track.pose->world_from_camera;
+void Paper::Impl::add(const ProbedShot& shot, SurfacePixels& seen) {
   std::vector<SeenTag> tags;
-  for (const Impl::Printed& printed : impl_->printed)
-    if (auto tag = impl_->seen(printed, pose)) tags.push_back(*std::move(tag));
+  for (const Printed& one : printed)
+    if (auto tag = this->seen(one, shot.world_from_camera)) tags.push_back(*std::move(tag));
   std::ranges::sort(tags, std::greater(), &SeenTag::cell_px);
   tags.resize(std::min(tags.size(), most_tags));
 
-  const Plate& plate = *plate_of(shot);
-  const lighting::Response response(impl_->camera.response, plate.bits);
+  const Plate& plate = *shot.plate;
+  const lighting::Response response(camera.response, plate.bits);
   const std::uint32_t clipped = response.clipping().from;
-  const double exposure = impl_->exposure.value_or(shot.frame->exposure);
-  auto surface = std::ranges::find(seen.surfaces, paper_name, &KnownSurface::material);
-  if (surface == seen.surfaces.end())
-    surface = seen.surfaces.insert(seen.surfaces.end(), {paper_name, glm::dvec3(paper_albedo)});
   for (const SeenTag& tag : tags) {
     std::vector<SurfacePixel> pixels;
-    SurfacePixel pixel{.surface = std::uint32_t(surface - seen.surfaces.begin())};
+    SurfacePixel pixel;
     for (const SurfacePixel& other : seen.pixels) pixel.tile = std::max(pixel.tile, other.tile + 1);
     for (const glm::dvec2& at : tag.white) {
       const auto i = std::size_t(std::lround(at.y)) * std::size_t(plate.width) +
@@ -220,16 +210,28 @@ void Paper::add(pipeline::Shot& shot, SurfacePixels& seen) {
       if (std::any_of(sample, sample + 3,
                       [&](std::uint16_t code) { return code == 0 || code >= clipped; }))
         continue;
-      for (int c = 0; c < 3; ++c) pixel.plate[c] = response.inverse()[sample[c]] / exposure;
+      for (int c = 0; c < 3; ++c) pixel.plate[c] = response.inverse()[sample[c]] / shot.exposure;
       pixel.px = at;
       pixels.push_back(pixel);
     }
     if (pixels.size() < least_cells) continue;
-    const auto radiance = impl_->rendered(tag, shot);
+    const auto radiance = rendered(tag, shot);
     if (!radiance) continue;
     for (SurfacePixel& one : pixels) one.rendered = *radiance;
     seen.pixels.insert(seen.pixels.end(), pixels.begin(), pixels.end());
   }
+}
+
+Paper::Paper(const set::Set& set, const ObserverCalibration& camera, const scene::Scene& scene,
+             const std::shared_ptr<render::Device>& device, int samples)
+    : impl_(std::make_unique<Impl>(set, camera, scene, device, samples)) {}
+Paper::~Paper() = default;
+
+SurfacePixels Paper::look_at(const std::vector<ProbedShot>& shots) {
+  SurfacePixels seen;
+  seen.surfaces = {{paper_name, glm::dvec3(paper_albedo)}};
+  for (const ProbedShot& shot : shots) impl_->add(shot, seen);
+  return seen;
 }
 
 }  // namespace previz::calibrate

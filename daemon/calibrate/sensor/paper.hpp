@@ -2,10 +2,9 @@
 #pragma once
 
 #include <memory>
-#include <string>
+#include <vector>
 
 #include "daemon/calibrate/sensor/surface_pixels.hpp"
-#include "daemon/pipeline/shot.hpp"
 #include "daemon/render/gpu.hpp"
 #include "daemon/set/set.hpp"
 
@@ -15,19 +14,18 @@ namespace previz::calibrate {
 inline constexpr const char* paper_name = "paper";
 inline constexpr double paper_albedo = 0.79;
 
-// Looks at the tags of the stage in single shots. A tag counts where two or more of its white cells
+// Looks at the tags of the stage. A tag counts where two or more of its white cells
 // are at least three pixels wide and not clipped, where it faces the camera, and where the model
 // does not hide it. Its radiance under the light is rendered by itself, so that a tag that is small
 // in the picture is as good as a large one.
 class Paper {
  public:
-  // The model of what is real comes in `scene`, which no virtual object is in.
-  Paper(const set::Set& set, const ObserverCalibration& camera, scene::Scene scene,
+  Paper(const set::Set& set, const ObserverCalibration& camera, const scene::Scene& scene,
         const std::shared_ptr<render::Device>& device, int samples);
   ~Paper();
 
-  // Adds the white pixels of a tracked and lit shot; each view of a tag is a tile of its own.
-  void add(pipeline::Shot& shot, SurfacePixels& seen);
+  // Returns the white pixels of all shots; each view of a tag is a tile of its own.
+  SurfacePixels look_at(const std::vector<ProbedShot>& shots);
 
  private:
   struct Impl;

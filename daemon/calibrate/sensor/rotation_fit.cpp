@@ -5,9 +5,11 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "daemon/pipeline/light_stage.hpp"
 namespace previz::calibrate {
 namespace {
 
@@ -70,6 +72,30 @@ ShadingOff shading_off(const SurfacePixels& seen) {
   off.patches = count;
   off.mean_square = count > 0 ? std::exp(sum / double(count)) : HUGE_VAL;
   return off;
+}
+
+ShadingAt shading_of(const pipeline::Take& take, const scene::Scene& scene,
+                     const std::shared_ptr<render::Device>& device, int frames, int width) {
+  struct Turned {
+    set::Set set;
+    std::vector<ProbedShot> shots;
+    std::optional<SurfaceProbe> probe;
+  };
+  const auto turned = std::make_shared<Turned>();
+  turned->set = take.set;
+  turned->set.lighting.mode = set::LightMode::image;
+  turned->set.captured_lamps.clear();
+  for (set::Light& light : turned->set.lights) light.captured = light.measured = false;
+  turned->shots = probed_shots(take, frames);
+  turned->probe.emplace(take, turned->shots, scene, device, ProbeSize{.width = width});
+  return [&take, &scene, turned](double rotation_rad, int samples) {
+    turned->set.lighting.environment_rotation_rad =
+        take.set.lighting.environment_rotation_rad + rotation_rad;
+    const pipeline::LightPtr light =
+        pipeline::LightStage(turned->set, take.light, take.observer).light();
+    for (ProbedShot& shot : turned->shots) shot.light = light;
+    return shading_off(turned->probe->compare(scene, samples));
+  };
 }
 
 RotationFit fit_rotation(const ShadingAt& shading_at) {

@@ -31,6 +31,11 @@ struct RotationFit {
 // pixel.
 using ShadingAt = std::function<ShadingOff(double rotation_rad, int samples)>;
 
+// Renders frames of the take, spread over it, `width` pixels wide, under its set's environment. The
+// take and the scene must outlive the result. Throws previz::Error as probed_shots() does.
+ShadingAt shading_of(const pipeline::Take& take, const scene::Scene& scene,
+                     const std::shared_ptr<render::Device>& device, int frames, int width);
+
 // Tries all around in steps of 15 degrees, and then goes on from the best one to a degree and less.
 RotationFit fit_rotation(const ShadingAt& shading_at);
 

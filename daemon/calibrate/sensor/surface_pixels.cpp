@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "daemon/lighting/response.hpp"
 #include "daemon/pipeline/preview_size.hpp"
@@ -120,8 +121,7 @@ std::uint32_t tile_of(const Plate& plate, std::uint32_t frame, int x, int y) {
 
 }  // namespace
 
-std::vector<ProbedShot> probed_shots(const pipeline::Take& take, int count,
-                                     const EachShot& each_shot) {
+std::vector<ProbedShot> probed_shots(const pipeline::Take& take, int count) {
   const std::size_t frames = take.observer_stream->records().size();
   const auto shares = std::size_t(count);
   std::size_t share = 0;
@@ -140,12 +140,24 @@ std::vector<ProbedShot> probed_shots(const pipeline::Take& take, int count,
     if (!shot.light) continue;
     shots.push_back({plate_of(shot), take.set.observer.exposure.value_or(shot.frame->exposure),
                      shot.track.pose->world_from_camera, shot.light});
-    if (each_shot) each_shot(shot);
   }
   if (shots.empty())
     throw Error(take.session.directory.string() +
                 ": no frame has both a pose and light: nothing to balance");
   return shots;
+}
+
+void relight(std::vector<ProbedShot>& shots, const glm::dvec3& factors) {
+  std::map<pipeline::LightPtr, pipeline::LightPtr> relit;  // frames may share theirs
+  for (ProbedShot& shot : shots) {
+    pipeline::LightPtr& of_shot = relit[shot.light];
+    if (!of_shot) {
+      pipeline::Light light = *shot.light;
+      for (glm::vec3& radiance : light.lighting.environment.radiance) radiance *= factors;
+      of_shot = std::make_shared<const pipeline::Light>(std::move(light));
+    }
+    shot.light = of_shot;
+  }
 }
 
 SurfaceProbe::SurfaceProbe(const pipeline::Take& take, const std::vector<ProbedShot>& shots,
@@ -249,14 +261,6 @@ void append(const SurfacePixels& more, SurfacePixels& to) {
     pixel.tile += tiles;
     to.pixels.push_back(pixel);
   }
-}
-
-SurfacePixels probe_surfaces(const pipeline::Take& take, const scene::Scene& scene,
-                             const std::shared_ptr<render::Device>& device,
-                             const ProbeOptions& options) {
-  const std::vector<ProbedShot> shots = probed_shots(take, options.frames, options.each_shot);
-  return SurfaceProbe(take, shots, scene, device, {.width = options.width})
-      .compare(scene, options.samples);
 }
 
 }  // namespace previz::calibrate

@@ -45,15 +45,6 @@ struct SurfacePixels {
 // Adds the surfaces and pixels of `more`; tiles of the two are not the same ones.
 void append(const SurfacePixels& more, SurfacePixels& to);
 
-using EachShot = std::function<void(pipeline::Shot&)>;
-
-struct ProbeOptions {
-  int frames = 3;           // tracked frames, spread over the take
-  int width = 160;          // of the rendered picture
-  int samples = 64;         // per pixel
-  EachShot each_shot = {};  // is given each frame that was looked at
-};
-
 // A frame of a take with everything that a comparison needs of it.
 struct ProbedShot {
   PlatePtr plate;
@@ -64,8 +55,10 @@ struct ProbedShot {
 
 // Returns the first frame with a pose and light of each of `count` equal shares of the take. Throws
 // previz::Error if there is none.
-std::vector<ProbedShot> probed_shots(const pipeline::Take& take, int count,
-                                     const EachShot& each_shot = {});
+std::vector<ProbedShot> probed_shots(const pipeline::Take& take, int count);
+
+// Multiplies the light around the set by a factor for each channel.
+void relight(std::vector<ProbedShot>& shots, const glm::dvec3& factors);
 
 // The width of rendered pictures, and the samples by which each pixel's surface is found.
 struct ProbeSize {
@@ -111,10 +104,5 @@ class SurfaceProbe {
   SurfacePixels seen_;               // as yet without what is rendered
   std::vector<std::size_t> places_;  // of its pixels in their rendered pictures
 };
-
-// Probes shots of the take once. Throws previz::Error if no frame is tracked and lit.
-SurfacePixels probe_surfaces(const pipeline::Take& take, const scene::Scene& scene,
-                             const std::shared_ptr<render::Device>& device,
-                             const ProbeOptions& options);
 
 }  // namespace previz::calibrate

@@ -6,7 +6,6 @@
 #include "daemon/calibrate/sensor/paper.hpp"
 #include "daemon/calibrate/sensor/rotation_fit.hpp"
 #include "daemon/scene/load.hpp"
-#include "daemon/scene/real_world.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -130,12 +129,9 @@ class TruthBalance : public testing::Test {
     pipeline::Take take = pipeline::open_take(session, set_file);
     if (!device_) device_ = render::open_device();
     const scene::Scene scene = scene::load_scene(take.set);
-    paper_ = {};
-    Paper paper(take.set, take.observer, scene::real_world(scene), device_, 32);
-    return probe_surfaces(take, scene, device_,
-                          {.frames = 1, .width = 80, .samples = 16, .each_shot = [&](auto& shot) {
-                             paper.add(shot, paper_);
-                           }});
+    const std::vector<ProbedShot> shots = probed_shots(take, 1);
+    paper_ = Paper(take.set, take.observer, scene, device_, 32).look_at(shots);
+    return SurfaceProbe(take, shots, scene, device_, {.width = 80}).compare(scene, 16);
   }
 
   SurfacePixels paper_;  // of the last probe
@@ -228,12 +224,9 @@ TEST_F(TruthBalance, ATurnedEnvironmentIsFoundByItsShadows) {
   const pipeline::Take take = pipeline::open_take(session, set_file);
   const scene::Scene scene = scene::load_scene(take.set);
   const auto device = render::open_device();
-  const RotationFit fit = fit_rotation([&](double rotation_rad, int samples) {
-    pipeline::Take turned = take;
-    turned.set.lighting.environment_rotation_rad += rotation_rad;
-    return shading_off(
-        probe_surfaces(turned, scene, device, {.frames = 1, .width = 64, .samples = samples / 4}));
-  });
+  const ShadingAt shading = shading_of(take, scene, device, 1, 64);
+  const RotationFit fit = fit_rotation(
+      [&](double rotation_rad, int samples) { return shading(rotation_rad, samples / 2); });
   std::printf("turned by %.2f +- %.2f degrees, off by %.3f, unturned %.3f, second %.2f\n",
               fit.rotation_rad / degree, fit.sigma_rad / degree, fit.off, fit.off_unturned,
               fit.second);
