@@ -187,7 +187,7 @@ calibrate::SurfacePixels ColourComparison::look_around(const std::vector<NamedMe
   step_ = "colours: looking around tags";
   const scene::Scene scene = scene_of(take_, meshes, colours);
   calibrate::SurfacePixels seen = probe(scene, probe_around_tags).compare(scene, around_samples);
-  progress_.step_done(step_, now_s());
+  progress_.step_done(step_, now_s(), true);
   return seen;
 }
 

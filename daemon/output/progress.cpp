@@ -88,21 +88,25 @@ void Progress::note(const std::string& text) {
 ShareProgress::ShareProgress(std::ostream& out, bool terminal, double total, double start_s)
     : out_(out), terminal_(terminal), total_(total), start_s_(start_s) {}
 
-std::string ShareProgress::share_and_rest(double now_s) const {
-  const double share = std::min(done_ / total_, 1.0);
+std::string ShareProgress::share_and_rest(double now_s, bool is_last) const {
+  if (is_last) return "100 %";
+  const double share = std::min(done_ / total_, 0.99);
   std::string text = std::to_string(static_cast<int>(100 * share)) + " %";
-  if (share > 0) text += ", " + duration_words((now_s - start_s_) * (1 / share - 1)) + " left";
+  if (done_ > total_) return text + ", longer than expected";
+  if (share > 0)
+    text += ", " + duration_words(std::max((now_s - start_s_) * (1 / share - 1), 1.0)) + " left";
   return text;
 }
 
 void ShareProgress::worked(const std::string& step, double work, double now_s) {
   done_ += work;
-  if (terminal_) out_ << erase_line << step << " (" << share_and_rest(now_s) << ")" << std::flush;
+  if (terminal_)
+    out_ << erase_line << step << " (" << share_and_rest(now_s, false) << ")" << std::flush;
 }
 
-void ShareProgress::step_done(const std::string& text, double now_s) {
-  out_ << (terminal_ ? erase_line : std::string_view()) << text << " (" << share_and_rest(now_s)
-       << ")" << std::endl;
+void ShareProgress::step_done(const std::string& text, double now_s, bool is_last) {
+  out_ << (terminal_ ? erase_line : std::string_view()) << text << " ("
+       << share_and_rest(now_s, is_last) << ")" << std::endl;
 }
 
 }  // namespace previz::output

@@ -50,11 +50,11 @@ class ShareProgress {
 
   // Adds some work of a step; shown on a terminal only.
   void worked(const std::string& step, double work, double now_s);
-  // Reports a finished step.
-  void step_done(const std::string& text, double now_s);
+  // Reports a finished step. Until the last, something is left to do, whatever is counted.
+  void step_done(const std::string& text, double now_s, bool is_last = false);
 
  private:
-  std::string share_and_rest(double now_s) const;
+  std::string share_and_rest(double now_s, bool is_last) const;
 
   std::ostream& out_;
   const bool terminal_;

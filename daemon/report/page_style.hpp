@@ -16,6 +16,7 @@ body { margin: 0 auto; max-width: 61rem; padding: 2.5rem 1.25rem 5rem; backgroun
   color: var(--ink); font: 16px/1.55 system-ui, sans-serif; }
 h1 { font-size: 1.9rem; line-height: 1.2; margin: 0 0 .6rem; font-weight: 650; }
 h2 { font-size: 1.25rem; margin: 3.2rem 0 .4rem; font-weight: 650; }
+body { overflow-wrap: break-word; } pre { overflow-x: auto; }
 p { max-width: 44rem; margin: .4rem 0 1rem; } .soft, figcaption, th { color: var(--soft); }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; margin: .8rem 0 0; width: 100%; }
 th, td { text-align: left; padding: .35rem 1.2rem .35rem 0; border-bottom: 1px solid var(--line); }
@@ -36,7 +37,9 @@ svg .cloud { --c: var(--soft); opacity: .45; } .s1 { --c: var(--s1); } .s2 { --c
 @media (max-width: 40rem) { body { padding-top: 1.5rem; } th, td { padding-right: .7rem; }
   table, .scroll { display: block; overflow-x: auto; } .scroll svg { min-width: 42rem; } .answers tr { display: block; padding: .5rem 0;
   border-bottom: 1px solid var(--line); } .answers td { display: block; border: 0; padding: 0; }
-  .answers td:first-child { font-weight: 600; } .answers th, .answers td.n { display: none; } }
+  .answers td:first-child { font-weight: 600; } .answers th { display: none; }
+  .answers td:nth-child(n+3) { text-align: left; } .answers td:nth-child(3)::before { content: "a frame: "; }
+  .answers td:nth-child(4)::before { content: "error: "; } .answers td:nth-child(5)::before { content: "file: "; } }
 )";
 
 }  // namespace previz::report

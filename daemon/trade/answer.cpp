@@ -190,8 +190,7 @@ std::string error_words(const TradeAnswer& answer) {
 }
 
 std::string making_words(const Making& making) {
-  return fmt::format("{} at {:.0f} % of the size{}",
-                     making.samples == 1 ? "1 sample" : std::to_string(making.samples) + " samples",
+  return fmt::format("{} at {:.0f} % of the size{}", samples_words(making.samples),
                      100 * making.scale, making.denoise ? ", denoised" : "");
 }
 
@@ -326,11 +325,13 @@ TradeAnswer answer_still(const std::string& use, const TradeQuestion& question, 
   wanted.quality.samples = found.making.samples;
   answer.toml = set::overlay_toml(set, wanted);
   answer.words = answer.is_met
-                     ? fmt::format("error {} after {}, with {} samples{}", error_words(answer),
-                                   time_words(found.seconds), found.making.samples,
+                     ? fmt::format("error {} after {}, with {}{}", error_words(answer),
+                                   time_words(found.seconds), samples_words(found.making.samples),
                                    found.making.denoise ? ", denoised" : "")
-                     : fmt::format("an error of {} is not reached; {} is the lowest expected",
-                                   share_words(question.error), error_words(answer));
+                     : fmt::format("an error of {} is not reached{}", share_words(question.error),
+                                   std::isfinite(answer.error)
+                                       ? "; " + error_words(answer) + " is the lowest expected"
+                                       : "");
   answer.words += unfinished_words(found);
   return answer;
 }

@@ -8,7 +8,15 @@
 
 namespace previz::trade {
 
-enum class TradePhase { reference, sweep, live, live_steps, live_rehearsal, still };
+enum class TradePhase {
+  reference,
+  least_reference,
+  sweep,
+  live,
+  live_steps,
+  live_rehearsal,
+  still
+};
 
 class TradeBudget {
  public:
@@ -24,6 +32,8 @@ class TradeBudget {
     return seconds_ ? std::max(start_s_ + share_of(phase) * *seconds_ - now_s, 0.0)
                     : std::numeric_limits<double>::infinity();
   }
+  // Returns the seconds in all with which a phase ends after so many.
+  double for_phase(TradePhase phase, double seconds) const { return seconds / share_of(phase); }
   // What a phase leaves over falls to the next.
   bool is_over(TradePhase phase, double now_s) const {
     return seconds_ && now_s - start_s_ >= share_of(phase) * *seconds_;
@@ -36,6 +46,8 @@ class TradeBudget {
     switch (phase) {
       case TradePhase::reference:
         return searches_ ? 0.2 : 0.3;
+      case TradePhase::least_reference:
+        return 0.35;
       case TradePhase::sweep:
         return searches_ ? 0.45 : 0.9;
       case TradePhase::live:

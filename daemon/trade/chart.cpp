@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "daemon/output/progress.hpp"
+#include "daemon/set/check.hpp"
 
 namespace previz::trade {
 namespace {
@@ -183,7 +184,11 @@ std::string time_words(double seconds) {
 }
 
 std::string share_words(double share) {
-  return two_digits(100 * share) + " %";
+  return std::isfinite(share) ? two_digits(100 * share) + " %" : "unknown";
+}
+
+std::string samples_words(int samples) {
+  return set::plural(static_cast<std::uint64_t>(samples), "sample");
 }
 
 std::string escaped(const std::string& text) {

@@ -31,8 +31,10 @@ std::string to_svg(const LogChart& chart);
 
 // Returns a time as "32 ms", "3.2 s" or "1:20".
 std::string time_words(double seconds);
-// Returns a share with two digits: "0.35 %", "4 %", "120 %".
+// Returns a share with two digits: "0.35 %", "4 %", "120 %"; one that is not finite is
+// "unknown".
 std::string share_words(double share);
+std::string samples_words(int samples);
 // Escapes text for HTML and SVG.
 std::string escaped(const std::string& text);
 

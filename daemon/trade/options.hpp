@@ -13,6 +13,9 @@
 
 namespace previz::trade {
 
+// With fewer samples in both halves a reference tells nothing.
+inline constexpr int least_reference_samples = 32;
+
 struct TradeOptions {
   TradeSource source;
   // The rate and the error that are asked for; absent: quality.fps, or 25, and 2 %.
@@ -23,8 +26,8 @@ struct TradeOptions {
   double scale = 0.25;                             // of the observer's size, above 0 and at most 1
   std::vector<std::string> axes;                   // by name; empty: all
   std::vector<int> samples = {1, 2, 4, 8, 16};     // per pixel
-  // Samples of both halves together; absent: 256 times the largest of `samples`, so that the
-  // reference's error is about a sixteenth of the set's own best.
+  // Samples of both halves together, at least least_reference_samples; absent: 256 times the
+  // largest of `samples`, so that the reference's error is about a sixteenth of the set's own best.
   std::optional<int> reference_samples;
   std::optional<double> minutes;  // that it may take, above 0; absent: as long as it takes
   bool anew = false;              // takes nothing from the last table in the directory

@@ -32,10 +32,6 @@ std::string sentence(std::string words) {
   return words;
 }
 
-std::string samples_words(int samples) {
-  return std::to_string(samples) + (samples == 1 ? " sample" : " samples");
-}
-
 std::string share_or_none(const std::optional<double>& share) {
   return share ? share_words(*share) : "none there";
 }
@@ -191,7 +187,7 @@ std::string answers_section(const TradeReport& report) {
   for (const TradeAnswer& answer : report.answers)
     html += (answer.is_met ? "<tr>" : "<tr class=\"bend\">") + cell(answer.use) +
             cell(answer.words) + cell(time_words(answer.seconds), true) +
-            cell(std::isfinite(answer.error) ? share_words(answer.error) : "unknown", true) +
+            cell(share_words(answer.error), true) +
             cell(answer.is_met ? answer.use + ".toml" : "none") + "</tr>\n";
   html += "</table>\n";
   for (const TradeAnswer& answer : report.answers)

@@ -25,7 +25,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double settling_share = 1.0 / 3;
 constexpr std::size_t least_pictures = 3;
-constexpr std::chrono::seconds first_picture_patience{60};
+// Until the first picture, a device may compile its programs: so many times the rehearsal.
+constexpr double first_picture_patience = 2;
 constexpr std::chrono::milliseconds look_delay{20};
 
 // The set with the take in the place of its cameras, without what a rehearsal must not touch.
@@ -133,8 +134,9 @@ Rehearsal rehearse(const std::shared_ptr<render::Device>& device, const set::Set
     while (Clock::now() < end && !stop.stop_requested() && !inbox.finished())
       std::this_thread::sleep_for(look_delay);
   };
-  // Until then a device may compile its programs.
-  const auto latest = Clock::now() + first_picture_patience;
+  const auto latest =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                         std::chrono::duration<double>(first_picture_patience * seconds));
   while (shown.count() == 0 && Clock::now() < latest && !stop.stop_requested() && !inbox.finished())
     std::this_thread::sleep_for(look_delay);
   const auto begin = Clock::now();

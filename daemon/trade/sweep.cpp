@@ -1,5 +1,7 @@
 #include "daemon/trade/sweep.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -85,7 +87,8 @@ Sweep::Sweep(const TradeOptions& options, TradeFrame& frame, const scene::Scene&
                .now_s = steady_s,
                .stop = options.stop},
               own_settings(frame), memory),
-      last_s_(steady_s()) {
+      start_s_(steady_s()),
+      last_s_(start_s_) {
   const PinholeIntrinsics& full = frame.calibration().intrinsics;
   const PinholeIntrinsics sweep = pipeline::scaled(frame.calibration(), options.scale).intrinsics;
   report_.set = frame.set().name;
@@ -166,10 +169,24 @@ TradePicture Sweep::picture_of(const render::Layers& layers) const {
                        1 / frame_.exposure());
 }
 
+// Says what to give, so that there is a reference.
+void Sweep::refuse_short_reference(int samples, double began_s) const {
+  const double now = steady_s(), rendered_s = now - began_s;
+  const double needed_s =
+      now - start_s_ + rendered_s * (1.0 * least_reference_samples / samples - 1);
+  const double minutes = std::ceil(budget_.for_phase(TradePhase::least_reference, needed_s) / 60);
+  const double scale = options_.scale * std::sqrt(0.8 * samples / least_reference_samples);
+  throw Error(fmt::format(
+      "--minutes {:g}: errors are measured against a picture of {} samples or more, and it got {} "
+      "in its share of that time; nothing was measured, and no file is written. Give --minutes "
+      "{:g}, or --scale {:.2g} for a smaller picture",
+      *options_.minutes, least_reference_samples, samples, std::max(minutes, 1.0), scale));
+}
+
 // More of the reference tells little where its noise is far below the error that is asked for.
 bool Sweep::is_enough(const KeptReference& reference) const {
   if (reference.samples >= report_.reference_samples / 2) return true;
-  if (!options_.answers || reference.samples == 0) return false;
+  if (!options_.answers || 2 * reference.samples < least_reference_samples) return false;
   const TradeReference so_far(picture_of(reference.halves[0]), picture_of(reference.halves[1]));
   return so_far.noise().picture.value_or(0) <= question_of(options_, frame_).error * enough_noise;
 }
@@ -184,6 +201,7 @@ void Sweep::make_reference() {
   const int samples = report_.reference_samples / 2, most = std::max(samples / parts_of_half, 1);
   std::vector<OnTheWay> seen;
   int done = 0;
+  const double began = steady_s();
   if (!is_enough(before)) {
     std::array<MethodRenderer, 2> halves{renderer_of(0), renderer_of(0)};
     const auto used = 2 * static_cast<std::uint32_t>(before.samples);
@@ -197,8 +215,11 @@ void Sweep::make_reference() {
       worked("reference", 2.0 * now);
       const double took = std::max(steady_s() - begun, 1e-6);
       step = std::clamp(static_cast<int>(now * step_s / took), 1, most);
+      const bool is_short = 2 * (before.samples + done) < least_reference_samples;
       const bool is_over =
-          options_.stop.stop_requested() || budget_.is_over(TradePhase::reference, steady_s());
+          options_.stop.stop_requested() ||
+          budget_.is_over(is_short ? TradePhase::least_reference : TradePhase::reference,
+                          steady_s());
       if (done < next && !is_over) continue;
       memory_.reference = before;
       memory_.reference.add(done, {&halves[0].layers(), &halves[1].layers()});
@@ -210,6 +231,10 @@ void Sweep::make_reference() {
       memory_.reference = before;
       memory_.reference.add(done, {&halves[0].layers(), &halves[1].layers()});
     }
+  }
+  if (2 * memory_.reference.samples < least_reference_samples) {
+    stop_if_asked();
+    refuse_short_reference(2 * done, began);
   }
   use_reference();
   const StillCurves now = curves_of(seen);

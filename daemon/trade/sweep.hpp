@@ -58,6 +58,7 @@ class Sweep {
   StillCurves curves_of(const std::vector<OnTheWay>& seen) const;
   void sweep(const std::function<void(const TradeReport&)>& save);
   bool has_time_for_a_method() const;
+  [[noreturn]] void refuse_short_reference(int samples, double began_s) const;
   void worked(const std::string& step, double work);
   KeptPoint& kept(std::size_t method, std::size_t point);
   int rounds_of(std::size_t method);
@@ -90,6 +91,7 @@ class Sweep {
   TradeBudget budget_;
   Probes probes_;
   std::optional<output::ShareProgress> progress_;
+  const double start_s_;
   double last_s_;             // when progress was shown last
   double of_a_method_s_ = 0;  // the longest measurement of a method so far
 };

@@ -50,9 +50,10 @@ TradeOptions checked(TradeOptions options) {
                   std::to_string(most_samples));
   if (!options.reference_samples)
     options.reference_samples = reference_over_most * options.samples.back();
-  if (*options.reference_samples < 2)
+  if (*options.reference_samples < least_reference_samples)
     throw Error("--reference-samples " + std::to_string(*options.reference_samples) +
-                ": must be at least 2, one for each half");
+                ": must be at least " + std::to_string(least_reference_samples) +
+                ", as errors are measured against it");
   return options;
 }
 

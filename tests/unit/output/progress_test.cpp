@@ -64,4 +64,18 @@ TEST(ShareProgress, TellsTheShareOfTheWorkAndTheTimeLeft) {
             "\r\x1b[Kreference (25 %, 30 s left)\r\x1b[Kreference (25 %, 30 s left)\n");
 }
 
+TEST(ShareProgress, LeavesSomethingUntilTheLastStep) {
+  std::ostringstream out;
+  ShareProgress progress(out, false, 200, 100);
+  progress.worked("search", 200, 110);
+  progress.step_done("search", 110);
+  progress.worked("search", 1, 130);
+  progress.step_done("search", 130);
+  progress.step_done("pictures", 131, true);
+  EXPECT_EQ(out.str(),
+            "search (99 %, 1 s left)\n"
+            "search (99 %, longer than expected)\n"
+            "pictures (100 %)\n");
+}
+
 }  // namespace previz::output::progress_test

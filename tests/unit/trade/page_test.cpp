@@ -71,6 +71,14 @@ TEST(TradePage, NeedsNothingBesidesItself) {
   EXPECT_EQ(pictures, 5);  // two corners with their differences, and the reference
 }
 
+// On a telephone a table that is too wide is moved within its own box.
+TEST(TradePage, ShowsEveryValueHoweverNarrowItIs) {
+  const std::string html = trade_page(made_report());
+  EXPECT_THAT(html, Not(HasSubstr("td.n { display: none")));
+  EXPECT_THAT(html, HasSubstr("table, .scroll { display: block; overflow-x: auto; }"));
+  EXPECT_THAT(html, HasSubstr("pre { overflow-x: auto; }"));
+}
+
 TEST(TradePage, TellsTheFrontInWords) {
   const TradeReport report = made_report();
   EXPECT_EQ(front_words(report, {1, 0}), "20 ms: depth 1, 1 sample, error 25 %");
@@ -97,6 +105,7 @@ TEST(TradePage, WhatPeopleNamedCannotBreakIt) {
 }
 
 TEST(TradeChart, NumbersReadWell) {
+  EXPECT_EQ(share_words(std::numeric_limits<double>::infinity()), "unknown");
   EXPECT_EQ(time_words(0.0321), "32 ms");
   EXPECT_EQ(time_words(0.1), "0.1 s");
   EXPECT_EQ(time_words(3.24), "3.2 s");

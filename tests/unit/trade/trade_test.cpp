@@ -21,7 +21,7 @@ class Trade : public testing::Test {
     options.scale = 2.0 / 3;
     options.axes = {"estimator"};
     options.samples = {2, 1};
-    options.reference_samples = 16;
+    options.reference_samples = 32;
     return options;
   }
   // Trades with options_; out_ has what this one said.
@@ -40,6 +40,7 @@ class Trade : public testing::Test {
     text.replace(text.find(from), from.size(), to);
     std::ofstream(directory_ / "set.toml") << text;
   }
+  void expect_no_files() const { EXPECT_TRUE(std::filesystem::is_empty(directory_ / "out")); }
   test::TemporaryDirectory directory_;
   TradeOptions options_ = options();
   std::ostringstream out_;
@@ -156,6 +157,8 @@ TEST_F(Trade, RefusesWhatCannotBeTraded) {
   expect_refused([&](auto& o) { o.directory = directory_ / "set.toml"; }, "is not a folder");
   expect_refused([](auto& o) { o.axes = {"colour"}; }, "--axes colour: unknown axis; estimator, ");
   expect_refused([](auto& o) { o.samples = {0}; }, "--samples 0: must be from 1");
+  expect_refused([](auto& o) { o.reference_samples = 31; },
+                 "--reference-samples 31: must be at least 32");
 }
 
 TEST_F(Trade, RefusesASetWithoutAReplayedCamera) {
@@ -168,7 +171,7 @@ TEST_F(Trade, RefusesAPictureWithNothingVirtualInIt) {
   test::write_small_take(bare.path(), false);
   const auto of_bare_take = [&](TradeOptions& options) {
     options.source.set_or_session = bare / "set.toml";
-    options.reference_samples = 2;
+    options.reference_samples = 32;
   };
   expect_refused(of_bare_take, "nothing virtual");
 }
@@ -178,6 +181,14 @@ TEST_F(Trade, AStopLeavesWhatIsKnown) {
   std::stop_source stop;
   stop.request_stop();
   options_.stop = stop.get_token();
+  EXPECT_TRUE(trade().interrupted);
+  expect_no_files();
+
+  options_.stop = {};
+  options_.axes = {"resolution"};
+  trade();
+  options_.stop = stop.get_token();
+  options_.axes = {"estimator"};
   const TradeReport report = trade();
   EXPECT_TRUE(report.interrupted);
   const std::string page = test::content_of(report.page);
@@ -187,9 +198,24 @@ TEST_F(Trade, AStopLeavesWhatIsKnown) {
   EXPECT_TRUE(report.answers.empty());
 }
 
+// With a picture of few samples to measure against, nothing would be right.
+TEST_F(Trade, MeasuresNothingWithoutTimeForAReference) {
+  options_.minutes = 1e-5;
+  options_.answers = true;
+  EXPECT_THAT(
+      test::error_of([&] { trade(); }),
+      AllOf(StartsWith("--minutes 1e-05: "), HasSubstr(" of 32 samples or more"),
+            HasSubstr("nothing was measured"), HasSubstr("Give --minutes 1, or --scale 0.")));
+  expect_no_files();
+}
+
 // Whatever the time, the set's own settings are measured and judged; the rest is named.
 TEST_F(Trade, TakesTheTimeThatItIsGiven) {
-  options_.minutes = 1e-3;
+  options_.rounds = 1;
+  options_.axes = {"resolution"};
+  trade();  // so that there is a reference
+  options_ = options();
+  options_.minutes = 1e-5;
   options_.answers = true;
   options_.fps = 1e-3;
   const TradeReport report = trade();
