@@ -128,7 +128,7 @@ std::vector<TrackedFrame> track_frames(const pipeline::Take& take,
                                        const std::function<void(const std::string&)>& note,
                                        const std::stop_token& stop,
                                        tracking::PoseJudgement* judgement) {
-  pipeline::TrackStage stage(take.set, take.observer, take.session.track, pipeline::start_of(take));
+  pipeline::TrackStage stage(take);
   std::vector<TrackedFrame> frames;
   const std::size_t count = take.observer_stream->records().size();
   for (std::size_t i = 0; i < count && !stop.stop_requested(); ++i) {

@@ -23,7 +23,7 @@ set::Set lit(set::Set set, const TakeShotsOptions& options) {
 
 TakeShots::TakeShots(const Take& take, TakeShotsOptions options)
     : options_(std::move(options)),
-      track_(take.set, take.observer, take.session.track, start_of(take)),
+      track_(take),
       light_(lit(take.set, options_), take.light, take.observer,
              options_.whole_light ? nullptr : options_.scene),
       light_stream_(take.light_stream) {

@@ -4,10 +4,41 @@
 #include <utility>
 
 #include "daemon/pipeline/edits.hpp"
+#include "daemon/pipeline/take.hpp"
+#include "daemon/tracking/tag_trust.hpp"
 #include "daemon/tracking/trackers.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::pipeline {
+namespace {
+
+constexpr std::size_t frames_asked = 12, frames_decisive = 2;
+
+std::set<int> moved_tags(const Take& take) {
+  const set::Tracking& tracking = take.set.tracking;
+  if (!tracking.enabled || tracking.tags.size() < 3) return {};
+  const auto tracker =
+      tracking::make_apriltag_tracker(tracking, take.observer.intrinsics, take.observer.response);
+  tracking::TagTrust trust(tracking, take.observer.intrinsics);
+  const std::size_t frames = take.observer_stream->records().size();
+  const std::size_t parts = std::min(frames_asked, frames);
+  for (std::size_t i = 0; i < parts; ++i) {
+    tracker->reset();
+    try {
+      trust.add(tracker->track(*take.observer_stream->read((2 * i + 1) * frames / (2 * parts))));
+    } catch (const Error&) {
+      continue;  // whoever needs that frame names it
+    }
+  }
+  return trust.moved(frames_decisive);
+}
+
+}  // namespace
+
+TrackStage::TrackStage(const Take& take)
+    : TrackStage(take.set, take.observer, take.session.track, start_of(take)) {
+  leave_out(moved_tags(take));
+}
 
 TrackStage::TrackStage(const set::Set& set, const ObserverCalibration& calibration,
                        const std::vector<session::TrackRecord>& recorded, std::int64_t start_ns,

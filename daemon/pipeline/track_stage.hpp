@@ -18,6 +18,8 @@
 
 namespace previz::pipeline {
 
+struct Take;
+
 class TrackStage {
  public:
   // `recorded` is used if the set says tracking.enabled = false or lighting.from = "recording";
@@ -27,6 +29,13 @@ class TrackStage {
   TrackStage(const set::Set& set, const ObserverCalibration& calibration,
              const std::vector<session::TrackRecord>& recorded, std::int64_t start_ns,
              std::int64_t lap_ns = 0, tracking::Search search = tracking::Search::whole);
+
+  // Of a take. Tags are left out for the camera that other tags say have moved, in frames spread
+  // over all of it, so that a picture is the same whichever part of the take is looked at.
+  explicit TrackStage(const Take& take);
+
+  // As tracking::Tracker::leave_out().
+  void leave_out(const std::set<int>& tags) { tracker_->leave_out(tags); }
 
   // Fills shot.track, shot.motion and shot.scene, and shot.recorded_light from the recorded track.
   // A frame that was not tracked is lost, never guessed; a carrier that is not found stays where it

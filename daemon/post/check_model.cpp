@@ -64,8 +64,7 @@ fit::Figure fit_of_model(const pipeline::Take& take, const scene::Scene& scene) 
   fit::Measurement measurement(model, take.observer);
   if (model.edges().empty()) return measurement.figure();
   try {
-    pipeline::TrackStage track(take.set, take.observer, take.session.track,
-                               pipeline::start_of(take));
+    pipeline::TrackStage track(take);
     const std::size_t frames = take.observer_stream->records().size();
     const std::size_t parts = std::min(frames_looked_at, frames);
     for (std::size_t i = 0; i < parts; ++i)

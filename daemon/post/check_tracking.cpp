@@ -14,7 +14,7 @@ namespace previz::post {
 void remark_on_tracking(const pipeline::Take& take, set::Findings& findings) {
   if (!take.set.tracking.enabled || take.set.tracking.tags.empty()) return;
   tracking::PoseJudgement judgement(take.set.tracking, take.observer);
-  pipeline::TrackStage track(take.set, take.observer, take.session.track, pipeline::start_of(take));
+  pipeline::TrackStage track(take);
   const std::size_t frames = take.observer_stream->records().size();
   const std::size_t parts = std::min(fit::frames_judged, frames);
   std::size_t seen = 0, tracked = 0;

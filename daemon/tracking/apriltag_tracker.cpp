@@ -65,6 +65,8 @@ class AprilTagTracker final : public Tracker {
     return track;
   }
 
+  void leave_out(const std::set<int>& ids) override { stage_.leave_out(ids); }
+
   void reset() override {
     stage_.reset();
     for (Carrier& carrier : carriers_) carrier.map.reset();

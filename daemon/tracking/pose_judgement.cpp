@@ -25,23 +25,14 @@ namespace {
 constexpr std::size_t kMostKept = 8;  // frames of a kind
 constexpr std::size_t kMostPictures = 5;
 constexpr double kDoubtfulShare = 0.05;  // of the tracked frames
-// Lenses and paper are off their models by as much in a good set (calibrate::TagAdjustment).
-constexpr double kWorthAWordPx = 0.3;
-constexpr double kDeviate = 4.753;  // of the normal distribution: one in a million is above
-constexpr double kLeastGain = 4;    // by which a cause lessens the residuals' mean square
-constexpr double kDecisive = 10;    // difference of Bayesian information criteria
+constexpr double kLeastGain = 4;         // by which a cause lessens the residuals' mean square
+constexpr double kDecisive = 10;         // difference of Bayesian information criteria
 constexpr double kWorthAFactor = 0.004;
 constexpr double kAgreesPx = 0.5;      // of tags that disagreed before
 constexpr std::size_t kLeastTags = 3;  // of two, one that moved away looks like a factor of sizes
 constexpr double kSameFactor = 0.015;
 // A factor is looked for in so much of the frames first.
 constexpr std::size_t kScannedFrames = 3, kScannedTags = 8;
-
-// Returns what a chi-square exceeds once in a million times (Wilson and Hilferty 1931).
-double rare_chi_square(int degrees) {
-  const double spread = 2.0 / (9.0 * degrees);
-  return degrees * std::pow(1 - spread + kDeviate * std::sqrt(spread), 3);
-}
 
 // An explanation of residuals, by a model with further unknowns.
 struct Cause {
@@ -254,6 +245,13 @@ std::string cause_words(const Frames& frames, const PinholeIntrinsics& lens,
   for (const auto& [cause, words] : causes)
     if (cause.criterion() < causes.front().first.criterion() + kDecisive)
       add_to_list(text, fmt::format("{} ({:.2f} px remain)", words, cause.rms_px), "; or ");
+  if (std::ranges::all_of(frames, [](const JudgedFrame& one) { return one.tags.size() == 2; })) {
+    const std::vector<TagObservation>& two = frames.front().tags;
+    add_to_list(text,
+                tags_in_words({two[0].id, two[1].id}) +
+                    " do not stand as the set has them: `previzd calibrate tags TAKE`",
+                "; or ");
+  }
   return text.empty() ? "the lens, the [[tag]] tables and how flat the tags are do not fit "
                         "together: `previzd calibrate tags` measures where the tags are"
                       : text;
@@ -268,7 +266,7 @@ double median_of(std::vector<double> values) {
 }  // namespace
 
 PoseJudgement::PoseJudgement(const set::Tracking& tracking, const ObserverCalibration& camera)
-    : tracking_(tracking), camera_(camera) {}
+    : tracking_(tracking), camera_(camera), trust_(tracking, camera.intrinsics) {}
 
 void PoseJudgement::add(const FramePtr& frame, const Track& track) {
   ++frames_;
@@ -295,7 +293,9 @@ void PoseJudgement::add(const FramePtr& frame, const Track& track) {
     return;
   }
   ++tracked_;
-  count(track, tags);
+  trust_.add(track);
+  for (const TagObservation& tag : tags) measured_.insert(tag.id);
+  for (const UnusableTag& tag : track.unusable) ++unusable_[tag.id][tag.why];
   const std::vector<int>& used = track.pose->tags;
   std::erase_if(tags, [&](const TagObservation& tag) {
     return std::ranges::find(used, tag.id) == used.end();
@@ -318,42 +318,11 @@ void PoseJudgement::add(const FramePtr& frame, const Track& track) {
   if (worst_.size() > kMostKept) worst_.pop_back();
 }
 
-void PoseJudgement::count(const Track& track, const std::vector<TagObservation>& tags) {
-  const std::vector<int>& used = track.pose->tags;
-  for (const TagObservation& tag : tags) {
-    Seen& seen = seen_[tag.id];
-    ++seen.frames;
-    if (std::ranges::find(used, tag.id) != used.end()) {
-      ++seen.used;
-      continue;
-    }
-    if (seen.views.size() >= kMostKept) continue;
-    double variance = kCornerFloorPx * kCornerFloorPx;
-    for (std::size_t i = 0; i < 8; ++i) variance += tag.covariance[9 * i] / 8;
-    seen.views.push_back({camera_from_world(track.pose->world_from_camera), tag.corners, variance});
-  }
-  for (const UnusableTag& tag : track.unusable) ++seen_[tag.id].troubles[tag.why];
-}
-
-std::vector<std::string> PoseJudgement::doubts_about_unused(const std::stop_token& stop) const {
-  std::vector<std::string> all;
-  for (const auto& [id, seen] : seen_) {
-    if (stop.stop_requested()) break;
-    const std::size_t left_out = seen.frames - seen.used;
-    const auto tag = std::ranges::find(tracking_.tags, id, &set::Tag::id);
-    if (left_out <= seen.used || tag == tracking_.tags.end()) continue;
-    all.push_back(fmt::format("tag {} is in {} tracked {} and used for the camera in {}: it {}", id,
-                              seen.frames, seen.frames == 1 ? "frame" : "frames", seen.used,
-                              why_elsewhere(*tag, tracking_.tags, camera_.intrinsics, seen.views)));
-  }
-  return all;
-}
-
 std::string PoseJudgement::why_unusable(int id) const {
-  const auto seen = seen_.find(id);
-  if (seen == seen_.end() || seen->second.frames > 0) return "";
+  const auto unusable = unusable_.find(id);
+  if (unusable == unusable_.end() || measured_.contains(id)) return "";
   std::string why;
-  for (const auto& [trouble, frames] : seen->second.troubles)
+  for (const auto& [trouble, frames] : unusable->second)
     add_to_list(why, trouble + " in " + set::plural(frames, "frame"), "; ");
   return why;
 }
@@ -390,7 +359,8 @@ std::vector<std::string> PoseJudgement::doubts(const std::stop_token& stop) cons
   std::vector<std::string> all{
       doubt_about_none(stop), doubt_about_residuals(stop), doubt_about_lost(stop),
       doubles_in_words(doubles_, "frame", "only one that is where the other tags have it is used")};
-  for (std::string& doubt : doubts_about_unused(stop)) all.push_back(std::move(doubt));
+  for (const int id : trust_.moved())
+    if (!stop.stop_requested()) all.push_back(fmt::format("tag {} {}", id, trust_.words(id)));
   std::erase(all, "");
   return stop.stop_requested() ? std::vector<std::string>{} : all;
 }

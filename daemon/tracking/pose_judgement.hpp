@@ -4,13 +4,14 @@
 
 #include <cstddef>
 #include <map>
+#include <set>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/joint_pose.hpp"
-#include "daemon/tracking/tag_place.hpp"
+#include "daemon/tracking/tag_trust.hpp"
 #include "daemon/tracking/tracker.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
@@ -40,9 +41,9 @@ class PoseJudgement {
   //              - 6 degrees of freedom), and by more than kWorthAWordPx. The cause is the factor
   //              of all sizes, the factor of the focal length, or the motion while rows are read
   //              that takes most of it away.
-  //   tags       One that is in a picture twice; one that most tracked frames that show it cannot
-  //              use, and why (why_elsewhere()); all that disagree, if a factor of all sizes or of
-  //              the focal length makes them agree.
+  //   tags       One that is in a picture twice; one that disagrees with the others, and why
+  //              (TagTrust); all that disagree, if a factor of all sizes or of the focal length
+  //              makes them agree.
   //   none       No picture shows a tag of the family: what they hold instead (other_tags()).
   std::vector<std::string> doubts(const std::stop_token& stop = {}) const;
 
@@ -54,15 +55,6 @@ class PoseJudgement {
   std::string doubt_about_residuals(const std::stop_token& stop) const;
   std::string doubt_about_lost(const std::stop_token& stop) const;
   std::string doubt_about_none(const std::stop_token& stop) const;
-  std::vector<std::string> doubts_about_unused(const std::stop_token& stop) const;
-
-  // A tag of the stage in the tracked frames.
-  struct Seen {
-    std::size_t frames = 0, used = 0;
-    std::vector<TagView> views;  // some of those that were not used
-    std::map<std::string, std::size_t> troubles;
-  };
-  void count(const Track& track, const std::vector<TagObservation>& tags);
 
   set::Tracking tracking_;
   ObserverCalibration camera_;
@@ -71,7 +63,9 @@ class PoseJudgement {
   std::vector<JudgedFrame> lost_;             // whose tags disagree
   std::vector<double> rms_px_, expected_px_;  // of the doubtful ones
   std::map<int, std::size_t> doubles_;        // frames in which a tag is more than once
-  std::map<int, Seen> seen_;
+  TagTrust trust_;
+  std::set<int> measured_;                                      // in tracked frames
+  std::map<int, std::map<std::string, std::size_t>> unusable_;  // frames, by the reason
   bool has_seen_a_tag_ = false;
   std::vector<FramePtr> without_tags_;
 };

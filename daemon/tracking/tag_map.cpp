@@ -111,10 +111,14 @@ Track TagMap::locate(const std::vector<TagDetection>& detections, std::int64_t t
     return track;
   }
 
-  choose(solve_joint_pose(tags, lens_, last_), tags, time_ns, &track);
-  if (track.pose) {
+  std::vector<TagObservation> trusted;
+  std::ranges::copy_if(tags, std::back_inserter(trusted),
+                       [&](const TagObservation& tag) { return !left_out_.contains(tag.id); });
+  if (!trusted.empty()) choose(solve_joint_pose(trusted, lens_, last_), trusted, time_ns, &track);
+  if (track.pose || trusted.empty()) {
     std::vector<int> left_out;
-    std::multiset<int> used(track.pose->tags.begin(), track.pose->tags.end());
+    std::multiset<int> used;
+    if (track.pose) used.insert(track.pose->tags.begin(), track.pose->tags.end());
     for (const TagObservation& tag : tags) {
       const auto found = used.find(tag.id);
       if (found == used.end())

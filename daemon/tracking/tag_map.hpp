@@ -6,7 +6,9 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/set/set.hpp"
@@ -37,6 +39,8 @@ class TagMap {
   // Returns the camera's pose from the detections that belong to this map. Fills neither seen_tags
   // nor carriers.
   Track locate(const std::vector<TagDetection>& detections, std::int64_t time_ns) const;
+  // Uses these tags for no pose from now on (Tracker::leave_out()).
+  void leave_out(std::set<int> ids) { left_out_ = std::move(ids); }
   void remember(const Pose& pose, std::int64_t time_ns);
   void forget_if_old(std::int64_t now_ns);
   void reset();
@@ -58,6 +62,7 @@ class TagMap {
   double ambiguity_ratio_;
   double farthest_ray_;  // that may be in the picture, from the axis on the plane z = 1
   std::map<int, set::Tag> tags_;
+  std::set<int> left_out_;
   std::optional<CameraFromWorld> last_, before_last_;
   std::int64_t last_time_ns_ = 0, before_last_time_ns_ = 0;
 };

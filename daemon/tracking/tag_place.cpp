@@ -169,6 +169,34 @@ glm::dmat4 fitted_place(const PinholeIntrinsics& lens, std::span<const TagView> 
   return least_squares(PlaceProblem{lens, views, size_m}, start, limits).at;
 }
 
+TagView view_of(const TagObservation& tag, const glm::dmat4& world_from_camera) {
+  double variance = kCornerFloorPx * kCornerFloorPx;
+  for (std::size_t i = 0; i < 8; ++i) variance += tag.covariance[9 * i] / 8;
+  return {camera_from_world(world_from_camera), tag.corners, variance};
+}
+
+double chi_square_of(const PinholeIntrinsics& lens, const TagObservation& tag, const Pose& pose) {
+  const auto off_after = [&](int axis, double amount) {
+    std::array<double, 6> by{};
+    by[std::size_t(axis)] = amount;
+    glm::dmat4 motion(rotation_by({by[0], by[1], by[2]}));
+    motion[3] = glm::dvec4(by[3], by[4], by[5], 1);
+    return rows_of(corners_off(lens, view_of(tag, pose.world_from_camera * motion),
+                               tag.world_from_tag, tag.size_m));
+  };
+  constexpr double small = 1e-6;
+  cv::Matx<double, 8, 6> by_motion;
+  for (int axis = 0; axis < 6; ++axis) {
+    const EightRows slope = (off_after(axis, small) - off_after(axis, -small)) * (0.5 / small);
+    for (int k = 0; k < 8; ++k) by_motion(k, axis) = slope(k);
+  }
+  cv::Matx<double, 8, 8> spread(tag.covariance.data());
+  for (int i = 0; i < 8; ++i) spread(i, i) += kCornerFloorPx * kCornerFloorPx;
+  spread += by_motion * cv::Matx<double, 6, 6>(pose.covariance.data()) * by_motion.t();
+  const EightRows off = off_after(0, 0);
+  return off.dot(spread.solve(off, cv::DECOMP_SVD));
+}
+
 std::string why_elsewhere(const set::Tag& tag, const std::vector<set::Tag>& tags,
                           const PinholeIntrinsics& lens, std::span<const TagView> views) {
   const glm::dmat4 place = place_of(tag, lens, views);
@@ -186,7 +214,7 @@ std::string why_elsewhere(const set::Tag& tag, const std::vector<set::Tag>& tags
         "it was, or is not flat",
         off_px);
   constexpr const char* what_to_do =
-      ": put it back, or measure where it is (`previzd calibrate tags`)";
+      ": put it back, or measure where it is (`previzd calibrate tags TAKE`)";
   for (const set::Tag& other : tags)
     if (other.id != tag.id && turn_between(other.world_from_tag, place) < kSameTurnRad &&
         glm::distance(glm::dvec3(other.world_from_tag[3]), glm::dvec3(place[3])) <

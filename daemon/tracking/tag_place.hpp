@@ -9,6 +9,7 @@
 #include "daemon/set/set.hpp"
 #include "daemon/tracking/camera_pose.hpp"
 #include "daemon/tracking/corners.hpp"
+#include "daemon/tracking/tracker.hpp"
 #include "drivers/calibration.hpp"
 
 namespace previz::tracking {
@@ -19,6 +20,8 @@ struct TagView {
   CornerPixels corners{};
   double variance_px2 = 0;  // of a corner's coordinate
 };
+
+TagView view_of(const TagObservation& tag, const glm::dmat4& world_from_camera);
 
 // Returns where a tag's corners are projected; infinite coordinates if one is behind the camera.
 CornerPixels projected_tag(const PinholeIntrinsics& lens, const CameraFromWorld& camera,
@@ -38,6 +41,10 @@ double place_cost(const PinholeIntrinsics& lens, std::span<const TagView> views,
 // Moves the place to the nearest minimum of place_cost().
 glm::dmat4 fitted_place(const PinholeIntrinsics& lens, std::span<const TagView> views,
                         const glm::dmat4& start, double size_m);
+
+// Returns the chi-square of 8 degrees of freedom of a tag's corners by a pose that does not use it,
+// against the covariances of both.
+double chi_square_of(const PinholeIntrinsics& lens, const TagObservation& tag, const Pose& pose);
 
 // Says why a tag of the set is not where its views have it, and what to do: it is printed at
 // another size, exchanged with another of the set's `tags`, moved, turned, or has not stayed in one

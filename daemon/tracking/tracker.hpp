@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <glm/mat4x4.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -66,6 +67,9 @@ class Tracker {
   // everything about tags empty. Frames come in capture order; a tracker may use the last pose.
   // Never throws for picture content.
   virtual Track track(const Frame& frame) = 0;
+  // Uses these tags of the stage for no pose from now on, because they are not where the set has
+  // them; they are still observed. Does nothing where there are no tags.
+  virtual void leave_out(const std::set<int>& /*ids*/) {}
   // Forgets the last pose (after a cut or a seek).
   virtual void reset() = 0;
 };

@@ -53,7 +53,7 @@ void run(const Options& options) {
   const DisplayMode mode = parse_display_mode(options.mode).value();
   const auto display = display_driver("headless").open({.connector = {}, .mode = mode});
   const output::GuidePainter painter(mode.width, mode.height, DisplayScale::letterbox);
-  pipeline::TrackStage track(take.set, take.observer, take.session.track, pipeline::start_of(take));
+  pipeline::TrackStage track(take);
   Spent spent;
   fit::Things things;
   std::size_t found = 0;

@@ -140,6 +140,51 @@ TEST_F(UntrackedTake, PosesAreFoundWithoutRendering) {
   EXPECT_EQ(count, frames);
 }
 
+// Three frames show three tags, three more only those two that disagree.
+TEST(MovedTag, IsNamedAndNotUsedWhereTwoOthersAgree) {
+  for (const double moved_m : {0.01, 0.04}) {
+    const test::TemporaryDirectory directory;
+    test::TagScene scene;
+    scene.lens = test::plain_lens(width, height, 300);
+    scene.tags = {test::flat_tag(0, 0.12, glm::dvec3(0)),
+                  test::flat_tag(1, 0.12, {0.2 + moved_m, 0, 0}),
+                  test::flat_tag(2, 0.12, {-0.2, 0.02, 0})};
+    session::SessionInfo info;
+    info.set_text = "[set]\nname = 'three'\n[observer]\ndriver = 'replay'\ndevice = 'x'\n";
+    for (int id = 0; id < 3; ++id)
+      info.set_text +=
+          "[[tag]]\nid = " + std::to_string(id) + "\nsize_m = 0.12\nposition_m = [" +
+          std::vector<std::string>{"0.0, 0.0", "0.2, 0.0", "-0.2, 0.02"}[std::size_t(id)] +
+          ", 0.0]\n";
+    info.observer.emplace();
+    info.observer->intrinsics = scene.lens;
+    {
+      session::SessionWriter writer(directory / "session", info);
+      std::mt19937 random(1);
+      for (int i = 0; i < 6; ++i) {
+        scene.world_from_camera = test::camera_looking({0.1, -0.5, 0.6 - 0.01 * i}, {0, 0, 0});
+        if (i == 3) scene.tags.pop_back();
+        Frame frame =
+            test::expose(test::render(scene), {.response = info.observer->response}, random);
+        frame.source = "observer";
+        frame.sequence = static_cast<std::uint64_t>(i);
+        frame.timestamp_ns = frame.arrival_ns = 1'000'000'000 + i * 40'000'000;
+        writer.write(frame);
+      }
+      writer.close();
+    }
+    TrackOptions options;
+    options.session = directory / "session";
+    std::ostringstream said;
+    EXPECT_EQ(track_take(options, said), 0);
+    EXPECT_THAT(said.str(), HasSubstr("6 of 6 frames tracked"));
+    EXPECT_THAT(said.str(), HasSubstr("tag 1: seen in 6 frames, used for the camera in 0"));
+    EXPECT_THAT(said.str(), HasSubstr("warning: tag 1 is "));
+    EXPECT_THAT(said.str(), HasSubstr("`previzd calibrate tags TAKE`"));
+    EXPECT_THAT(said.str(), Not(HasSubstr("all tags measure")));
+  }
+}
+
 // The tracker's tests show what is judged (PoseJudgement.*).
 TEST_F(UntrackedTake, SaysWhatDoesNotHold) {
   TrackOptions options;
