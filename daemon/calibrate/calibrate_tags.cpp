@@ -171,11 +171,13 @@ void calibrate_tags(const TagsOptions& options, std::ostream& out) {
   for (const set::Tag& tag : set.tracking.tags) wanted.push_back(tag.id);
   const std::string doubts =
       insist(missing_of_tags(survey, wanted, how.origin), options.force, out);
-  if (options.write)
-    write_back(*options.set_file,
-               with_lens(with_tags(set::read_set_file(*options.set_file), survey, doubts),
-                         camera.intrinsics, survey.lens),
-               out);
+  if (options.write) {
+    const std::string text =
+        with_lens(with_tags(set::read_set_file(*options.set_file), survey, doubts),
+                  camera.intrinsics, survey.lens);
+    set::parse_set(text, *options.set_file);
+    write_back(*options.set_file, text, out);
+  }
   write_tables(lens_table(camera.intrinsics, survey.lens) + doubts + tag_tables(survey),
                options.table_file, out);
 }

@@ -11,6 +11,11 @@ void check(const set::CheckedSet& checked, set::Findings& findings) {
   if (!checked.set.lighting.environment) return;
   auto coarse = checked.set.lighting;
   coarse.resolution = 16;  // only the file is checked
+  if (coarse.environment_rotation_rad == 0)
+    findings.remarks.emplace_back(
+        "lighting.environment is not turned, as if it had been taken on the set: previzd calibrate "
+        "light TAKE --rotation finds how it is to be turned, and calibrate balance how bright it "
+        "is");
   findings.attempt([&] {
     for (const auto& note : load_environment(coarse).report.notes) findings.remarks.push_back(note);
   });

@@ -181,6 +181,15 @@ All marks, tags and camera poses are adjusted together. Then the edges of boxes 
 Printed tags can be removed from the picture, with their light, shadows and reflections: by `hide = true` in the table [tags] of the set file, by the action `tags` of a button, or with `previzd render --hide-tags`. For that a phantom must have them. `previzd model` makes for each flat tag the nodes "tag 3 paper" and "tag 3 print", and from a session with light "under tag 3" as well: the surface that the tag lies on, in the colours that the plates have around it. Phantoms of other programs can have nodes of such names, too; without the last one, what is below the paper is shown as it is. To keep such a phantom, add `--tags-only --write`, for which no mark and no file of parts is needed: that puts the tags alone onto that phantom. A paper that goes on beyond the white cells of its tag needs `tag_paper_m = [width, height]` in its [[plane]] or [[box]], in metres along the tag's own edges and with the tag in the middle; a little too large does no harm. The place of a hidden tag is rendered as a virtual object is, with as much noise, and covers what the model does not have, such as a hand over the tag.
 )"};
 
+const Chapter light_chapter{"THE LIGHT", R"(
+Virtual things are lit by what is really there, and shadows on real things are as deep as the model under that light says. Light that does not fit the picture is the first thing that a viewer sees, so previzd compares the two: `previzd check TAKE`, `previzd render` and the running rig say how many times as bright as the picture the model of what is real comes out under this light, in red, green and blue, wherever nothing virtual is. A factor of 1.26, a third of a stop, is worth a word; a shadow never takes more light than the picture has.
+A fisheye on the set is best: it sees the lamps as they are in every frame, with their colours, and follows them when they change. Let it take brackets (README.md, "On a rig"), and calibrate it.
+An environment from elsewhere (`environment` in [lighting], OpenEXR or Radiance .hdr) has neither the brightness, nor the white, nor the direction of your set. Three commands with a take make it fit, in this order, each of which writes its result into the set file and keeps the old one beside it: `previzd calibrate light TAKE --rotation --set SET --write` turns it until the shadows and the shading of the model are those of the picture, or says that nothing in the picture tells; `previzd calibrate balance TAKE --set SET --write` gives it the brightness and white of the film camera; `previzd model TAKE --set SET --parts FILE` measures the colours of what is real. The first needs a model that casts a shadow or has sides, in any colours; grey will do.
+Without either, lamps of the set file alone light the set (`from = "set"`, and [[light]] with `gain_real = 1`); measure their places, and let the messages tell how bright they are to be.
+The grey card is in the picture already: the white paper of printed tags reflects 79 % of the light in all colours, so `calibrate balance` goes by it wherever a tag shows two white cells that are three pixels wide, and so does `model`, before it measures colours. A real grey card in the model, or any surface whose colour you know, is named with `--reference`. Without tags and without a reference, all colours of the model count as if as many were too dark as too bright; a model whose colours were measured under a wrong light then agrees with that light. Coloured, glossy or grey paper is not 79 % white: name another reference.
+What it costs: LIGHT_COSTS
+)"};
+
 const Chapter lenses_chapter{"LENSES OF OTHER PROGRAMS", R"(
 `previzd calibrate from FILE` recognises by their content: OpenCV's YAML, XML and JSON (4, 5 or 8 coefficients, or a fisheye's 4), ROS's camera_info (plumb_bob, rational_polynomial, equidistant), Kalibr's camchain (pinhole with radtan, equidistant or none), COLMAP's cameras.txt (all models up to FULL_OPENCV and OPENCV_FISHEYE), Metashape's camera XML (frame cameras), transforms.json of nerfstudio and instant-ngp (OPENCV and OPENCV_FISHEYE), and RealSense's intrinsics as JSON (all but inverse models). The output says what is assumed or converted, such as COLMAP's pixel coordinates, which are counted from the corner of the first one and not from its centre.
 A fisheye becomes the light camera's lens and a pinhole the film camera's, unless `--as` says otherwise: then the lens is fitted with the other model, and the largest difference over the picture is reported. More than 0.1 px needs `--force`.
@@ -246,18 +255,17 @@ Chapter see_also(const std::string& pages) {
 }  // namespace
 
 std::vector<Page> man_pages() {
-  return {
-      {"previzd.8",
-       man_page(general_commands(), 8,
-                {service_chapter, security_chapter, examples_chapter, tags_chapter, model_chapter,
-                 lenses_chapter, glossary_chapter, previzd_cameras, previzd_files, previzd_formats,
-                 previzd_status, see_also("previzctl(1), previzd-farm(1), previz-set(5)")})},
-      {"previzd-farm.1", man_page(farm_commands(), 1, farm_chapters())},
-      {"previzctl.1",
-       man_page(
-           previzctl_commands(), 1,
-           {{"ACTIONS", actions_text()}, previzctl_status, see_also("previzd(8), previz-set(5)")})},
-      {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
+  return {{"previzd.8", man_page(general_commands(), 8,
+                                 {service_chapter, security_chapter, examples_chapter, tags_chapter,
+                                  model_chapter, light_chapter, lenses_chapter, glossary_chapter,
+                                  previzd_cameras, previzd_files, previzd_formats, previzd_status,
+                                  see_also("previzctl(1), previzd-farm(1), previz-set(5)")})},
+          {"previzd-farm.1", man_page(farm_commands(), 1, farm_chapters())},
+          {"previzctl.1", man_page(previzctl_commands(), 1,
+                                   {{"ACTIONS", actions_text()},
+                                    previzctl_status,
+                                    see_also("previzd(8), previz-set(5)")})},
+          {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
 }
 
 std::vector<Page> bash_completions() {

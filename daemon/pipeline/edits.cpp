@@ -62,6 +62,7 @@ void relight(const LightEdit& edit, session::LightState& light) {
 session::SceneState scene_state(const set::Set& set, const Edits& edits, const Motion& motion) {
   session::SceneState state;
   state.hides_tags = edits.hides_tags;
+  if (edits.environment_turn_rad != 0) state.environment_turn_rad = edits.environment_turn_rad;
   if (std::ranges::any_of(set.objects, [](const auto& o) { return !o.animation.empty(); }))
     state.animation_s = motion.animation_s;
   for (const set::Object& object : set.objects) {

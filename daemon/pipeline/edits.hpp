@@ -45,6 +45,7 @@ struct Edits {
   std::map<std::string, ObjectEdit> objects;
   std::map<std::string, LightEdit> lights;
   std::optional<bool> hides_tags = {};  // absent: as the set has it
+  double environment_turn_rad = 0;      // of the environment file, counter-clockwise from above
 
   friend bool operator==(const Edits&, const Edits&) = default;
 };

@@ -124,6 +124,14 @@ void LightStage::use(set::LightMode mode) {
   changed_ = !newest_.empty();
 }
 
+void LightStage::turn(double turn_rad) {
+  if (!settings_.environment || turn_rad == turned_rad_) return;
+  settings_.environment_rotation_rad += turn_rad - turned_rad_;
+  turned_rad_ = turn_rad;
+  given_ = lighting::load_environment(settings_);
+  show_given();
+}
+
 bool LightStage::usable(const Frame& frame) {
   const std::string name = "light frame " + std::to_string(frame.sequence);
   if (frame.width != intrinsics_.width || frame.height != intrinsics_.height)
@@ -307,6 +315,7 @@ LightPtr LightStage::light() {
 }
 
 LightPtr LightStage::light_for(const Shot& shot) {
+  turn(shot.scene.environment_turn_rad.value_or(0));
   if (settings_.from != set::LightFrom::recording) return light();
   if (!shot.recorded_light) return nullptr;
   // The light changes seldom; an unchanged one need not be put into the renderer again.

@@ -68,6 +68,7 @@ class LightStage {
  private:
   bool given() const;
   void show_given();
+  void turn(double turn_rad);
   void claim_lamps(const set::Set& set, const scene::Scene* scene, int map_size);
   LightPtr finished(lighting::Lighting lighting, std::vector<std::uint64_t> sequences,
                     std::int64_t timestamp_ns);
@@ -88,6 +89,7 @@ class LightStage {
   const std::optional<double> observer_exposure_;  // overrides the observer frames' own
   std::optional<lighting::Estimator> estimator_;   // absent: the light needs no frames
   lighting::Lighting given_;                       // from the set file
+  double turned_rad_ = 0;                          // by the crew, in settings_ and given_
   FisheyeIntrinsics intrinsics_;                   // the light camera's
   std::shared_ptr<const lighting::Room> room_;
   glm::dvec3 seen_from_{0};     // where the image is seen from; world, metres

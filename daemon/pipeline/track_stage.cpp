@@ -109,6 +109,7 @@ void TrackStage::place(Shot& shot, const session::TrackRecord* record) const {
   for (const auto& [name, light] : record->scene.lights) shot.scene.lights[name] = light;
   shot.scene.variants = record->scene.variants;
   shot.scene.hides_tags = record->scene.hides_tags;
+  shot.scene.environment_turn_rad = record->scene.environment_turn_rad;
 }
 
 }  // namespace previz::pipeline

@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <glm/common.hpp>
 #include <glm/gtc/matrix_transform.hpp>
+#include <glm/trigonometric.hpp>
 #include <iterator>
 #include <numbers>
 #include <utility>
@@ -46,7 +48,8 @@ Controls::Controls(const set::Set& set, pipeline::Edits edits, const scene::Scen
           set.objects, [](const set::Object& object) { return !object.animation.empty(); })),
       has_tags_(std::ranges::find(scene.instances, scene::TagPart::printed,
                                   &scene::Instance::tag) != scene.instances.end()),
-      hides_tags_(set.hides_tags) {
+      hides_tags_(set.hides_tags),
+      has_environment_(set.lighting.environment.has_value()) {
   for (const set::Object& object : set.objects)
     if (object.presence == set::Presence::virtual_object) objects_.push_back(object.name);
   for (const scene::Variants& variants : scene.variants) {
@@ -290,6 +293,14 @@ Outcome Controls::apply(const set::NextEstimator&) {
 Outcome Controls::apply(const set::NextLightMode&) {
   look_.light_mode = next_named(look_.light_mode);
   return {std::string("light: ") + set::name_of(look_.light_mode), false, {}};
+}
+
+Outcome Controls::apply(const set::TurnEnvironment& effect) {
+  if (!has_environment_) return {"no environment file lights this set; nothing to turn", true, {}};
+  if (look_.state.mode != Mode::live) return only_live();
+  double& turn = look_.edits.environment_turn_rad;
+  turn = std::remainder(turn + effect.steps * control_.turn_step_rad, 2 * std::numbers::pi);
+  return {fmt::format("environment turned by {:+.0f} degrees", glm::degrees(turn)), false, {}};
 }
 
 Outcome Controls::apply(const set::NextView&) {

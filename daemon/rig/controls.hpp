@@ -132,6 +132,7 @@ class Controls {
   Outcome apply(const set::ToggleAccumulation& effect);
   Outcome apply(const set::NextEstimator& effect);
   Outcome apply(const set::NextLightMode& effect);
+  Outcome apply(const set::TurnEnvironment& effect);
   Outcome apply(const set::NextView& effect);
   Outcome apply(const set::ToggleOsd& effect);
   Outcome apply(const set::TogglePassTimes& effect);
@@ -185,6 +186,7 @@ class Controls {
   const bool is_animated_;
   const bool has_tags_;    // a phantom has printed tags
   const bool hides_tags_;  // as the set has it
+  const bool has_environment_;
   std::size_t object_ = 0;
   // The selected lamp, which stays so while it is not found in the light; empty: the first there
   // is.

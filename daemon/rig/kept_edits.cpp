@@ -73,6 +73,11 @@ void put_tags(bool hidden, set::FileEdit& file) {
   file.append(fmt::format("[tags]\nhide = {}\n", value));
 }
 
+void put_environment_turn(double rotation_rad, set::FileEdit& file) {
+  const std::string value = printed(rotation_rad * per_degree, degree_steps);
+  file.put("lighting", 0, "environment_rotation_deg", value);
+}
+
 // A cone that holds the lamp, its blurred edge and what it may be off by from frame to frame.
 std::string captured_table(const std::string& name, const pipeline::LightEdit& edit) {
   const double cone_deg = std::min(60.0, 1.2 * edit.found_radius_rad * per_degree + 1.5);
@@ -88,6 +93,8 @@ std::string captured_table(const std::string& name, const pipeline::LightEdit& e
 std::string with_edits(const std::string& text, const set::Set& set, const pipeline::Edits& edits) {
   set::FileEdit file(text);
   if (edits.hides_tags) put_tags(*edits.hides_tags, file);
+  if (edits.environment_turn_rad != 0 && set.lighting.environment)
+    put_environment_turn(set.lighting.environment_rotation_rad + edits.environment_turn_rad, file);
   for (std::size_t i = 0; i < set.objects.size(); ++i)
     if (const auto edit = edits.objects.find(set.objects[i].name); edit != edits.objects.end())
       put_object(i, set.objects[i], edit->second, file);

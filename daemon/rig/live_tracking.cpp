@@ -80,6 +80,8 @@ Shot LiveTracking::track(Shot shot) {
   if (filter_) shot.shown_pose = filter_->shown(shot.track, shot.frame->timestamp_ns);
   if (shot.shown_pose && !shot.track.pose) parts_.kept.metrics.count("predicted poses");
   shot.motion.animation_s = animation_s;
+  if (look->edits.environment_turn_rad != 0)
+    shot.scene.environment_turn_rad = look->edits.environment_turn_rad;
   lighting_.attempt([&] {
     shot.light = parts_.light.light_for(shot, look->light_mode);
     parts_.light.see_observer(shot);

@@ -26,6 +26,8 @@ constexpr Action action_table[] = {
     {"accumulate", "Switch frame averaging off; press again to switch it on.", ToggleAccumulation{}},
     {"estimator", "Next estimator: paired, difference.", NextEstimator{}},
     {"light_mode", "Next way to use the light camera's picture: image, sources, hybrid.", NextLightMode{}},
+    {"environment_left", "Turn the environment file that lights the set a step counter-clockwise, seen from above.", TurnEnvironment{1}},
+    {"environment_right", "Turn the environment file a step clockwise.", TurnEnvironment{-1}},
     {"debug_view", "Show the next layer in place of the composite.", NextView{}},
     {"osd", "Hide the overlay; press again to show it.", ToggleOsd{}},
     {"pass_times", "Show on the overlay how long each pass of the graphics card takes (a hidden overlay comes back); press again to hide the times.", TogglePassTimes{}},

@@ -38,6 +38,9 @@ struct HoldRate {};  // gives samples and size back to quality.fps
 struct ToggleAccumulation {};
 struct NextEstimator {};
 struct NextLightMode {};
+struct TurnEnvironment {
+  int steps = 1;  // counter-clockwise, seen from above
+};
 struct NextView {};
 struct ToggleOsd {};
 struct TogglePassTimes {};
@@ -83,10 +86,10 @@ struct ChangeExposure {
 using Effect =
     std::variant<ToMode, Record, MarkGood, Acknowledge, Snapshot, ReloadSet, KeepEdits, OtherSet,
                  ChangeSamples, HoldRate, ToggleAccumulation, NextEstimator, NextLightMode,
-                 NextView, ToggleOsd, TogglePassTimes, ToggleGuides, ToggleMarking, MarkCorner,
-                 Unmark, NextCorner, NextBox, SelectObject, MoveObject, TurnObject, ScaleObject,
-                 ChangeVariant, ResetObject, ToggleTags, PlayAnimations, HoldAnimations,
-                 SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
+                 TurnEnvironment, NextView, ToggleOsd, TogglePassTimes, ToggleGuides, ToggleMarking,
+                 MarkCorner, Unmark, NextCorner, NextBox, SelectObject, MoveObject, TurnObject,
+                 ScaleObject, ChangeVariant, ResetObject, ToggleTags, PlayAnimations,
+                 HoldAnimations, SelectLight, DimLight, TintLight, ResetLight, ChangeExposure>;
 
 struct Action {
   const char* name;

@@ -176,6 +176,8 @@ TrackRecord parse_track_line(const Json& json) {
   get_members(json, "carriers", record.carriers);
   if (json.contains("animation_s")) get(json.at("animation_s"), record.scene.animation_s.emplace());
   if (json.contains("hides_tags")) get(json.at("hides_tags"), record.scene.hides_tags.emplace());
+  if (json.contains("environment_turn_rad"))
+    get(json.at("environment_turn_rad"), record.scene.environment_turn_rad.emplace());
   if (json.contains("captured_light"))
     record.captured_light = captured_light_of(json.at("captured_light"));
   if (!record.tracked) return record;
@@ -276,6 +278,8 @@ std::string to_line(const TrackRecord& record) {
   if (record.scene.animation_s)
     json["animation_s"] = finite(*record.scene.animation_s, "animation_s");
   if (record.scene.hides_tags) json["hides_tags"] = *record.scene.hides_tags;
+  if (record.scene.environment_turn_rad)
+    json["environment_turn_rad"] = *record.scene.environment_turn_rad;
   if (record.captured_light) json["captured_light"] = to_json(*record.captured_light);
   return json.dump();
 }

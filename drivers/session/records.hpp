@@ -103,6 +103,8 @@ struct SceneState {
   std::map<std::string, std::string> variants = {};
   std::optional<double> animation_s;    // time in the animations; absent: nothing is animated
   std::optional<bool> hides_tags = {};  // absent: as the set file has it
+  // How the environment file was turned, counter-clockwise from above; absent: as the set has it.
+  std::optional<double> environment_turn_rad = {};
 
   friend bool operator==(const SceneState&, const SceneState&) = default;
 };

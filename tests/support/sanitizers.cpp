@@ -4,9 +4,9 @@
 // stay loaded, and the driver's leaks can be named. So does x265, which encodes videos for tests,
 // with its parameters, fontconfig with its patterns, and the validation layer with what it knows of
 // a device. ThreadSanitizer sees neither the locks of GLib
-// nor the threads' hand-over within Aravis and Mesa's CPU driver, nor how the standard library
-// counts the owners of an exception that one thread hands to another; and it lets a child that was
-// forked beside threads start its own, as the recorder's tests do, only if it is asked to.
+// nor the threads' hand-over within Aravis, Embree and Mesa's CPU driver, nor how the standard
+// library counts the owners of an exception that one thread hands to another; and it lets a child
+// that was forked beside threads start its own, as the recorder's tests do, only if it is asked to.
 
 extern "C" {
 
@@ -17,7 +17,7 @@ const char* __lsan_default_suppressions() {
 
 const char* __tsan_default_suppressions() {
   return "race:libaravis-0.8.so\nrace:libglib-2.0.so\nrace:libgio-2.0.so\nrace:libgobject-2.0.so\n"
-         "race:swrast_dri.so\nrace:libvulkan_lvp.so\nrace:libopencv_core.so\n"
+         "race:libembree3.so\nrace:swrast_dri.so\nrace:libvulkan_lvp.so\nrace:libopencv_core.so\n"
          "race:std::__exception_ptr::exception_ptr::_M_release\n";
 }
 

@@ -7,7 +7,6 @@
 
 #include "daemon/calibrate/lens/residual_plot.hpp"
 #include "daemon/set/file_edit.hpp"
-#include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
@@ -98,7 +97,6 @@ void write_tables(const std::string& tables, const std::optional<std::filesystem
 }
 
 void write_back(const std::filesystem::path& set_file, const std::string& text, std::ostream& out) {
-  set::parse_set(text, set_file);
   const std::filesystem::path old = set::keep_beside(set_file);
   session::replace_file(set_file, text);
   fmt::print(out, "written to {}; previous version: {}\n", set_file.string(), old.string());

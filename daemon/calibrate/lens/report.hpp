@@ -39,7 +39,7 @@ std::string as_comment(const std::string& text);
 void write_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,
                   std::ostream& out);
 
-// Replaces a set file by `text`, which must be a set, keeps the old file beside it, and says so.
+// Replaces a set file by `text`, keeps the old file beside it, and says so.
 void write_back(const std::filesystem::path& set_file, const std::string& text, std::ostream& out);
 
 }  // namespace previz::calibrate

@@ -133,6 +133,7 @@ TEST(Session, WhatWasMovedAndRelitComesBackBitForBit) {
   record.scene.lights["torch"] = std::nullopt;
   record.scene.variants = {{"card", "a \"b\""}, {"vase", ""}};
   record.scene.hides_tags = false;
+  record.scene.environment_turn_rad = -1.0 / 3;
   record.scene.animation_s = 1.0 / 3;
   CarrierState& stick = record.carriers["stick"];
   stick.world_from_carrier = glm::dmat4(1.0 / 7);

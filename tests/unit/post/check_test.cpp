@@ -171,6 +171,18 @@ TEST_F(Check, NoLightCameraSeesNoLight) {
   expect_said("environment: from the session's light camera, if it has one");
 }
 
+// Nobody takes a panorama with its middle along the set's X by chance.
+TEST_F(Check, RemarksOnAnEnvironmentThatNobodyTurned) {
+  std::string grey;
+  for (int pixel = 0; pixel < 8; ++pixel) grey += "\x80\x80\x80\x81";
+  write("room.hdr", "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n" + grey);
+  const std::string set = "[lighting]\nenvironment='room.hdr'\n";
+  ASSERT_EQ(check(set), 0) << said_;
+  expect_said("previzd calibrate light TAKE --rotation");
+  ASSERT_EQ(check(set + "environment_rotation_deg=70\n"), 0) << said_;
+  EXPECT_THAT(said_, Not(HasSubstr("--rotation")));
+}
+
 TEST_F(Check, DescribesWhatASetAsksFor) {
   write("table.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 0})"));
   write("ring.gltf", triangle(R"("pbrMetallicRoughness": {"metallicFactor": 1})"));

@@ -268,6 +268,37 @@ TEST_F(RenderSession, ALightThatDoesNotFitThePictureIsSaid) {
     for (int c = 0; c < 3; ++c) ASSERT_GE(value[c], 0);
 }
 
+// A frame that was recorded with the environment turned by hand has the light that the set's key
+// gives, bit for bit.
+TEST_F(RenderSession, ATurnedEnvironmentIsAsItWasRecorded) {
+  std::string panorama = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 4\n";
+  for (int pixel = 0; pixel < 8; ++pixel) panorama += {char(10 + 30 * pixel), 80, 90, char(129)};
+  const auto light_with = [&](const std::string& key, const std::string& recorded) {
+    write_take(true, "[lighting]\nenvironment = \"room.hdr\"\n" + key);
+    for (const auto& folder : {directory_.path(), directory_ / "session"})
+      std::ofstream(folder / "room.hdr", std::ios::binary) << panorama;
+    std::string lines = test::content_of(directory_ / "session/track.jsonl");
+    const std::string before = "\"tracked\"";
+    for (std::size_t at = 0; (at = lines.find(before, at)) != std::string::npos;
+         at += recorded.size() + before.size())
+      lines.insert(at, recorded);
+    std::ofstream(directory_ / "session/track.jsonl") << lines;
+    std::filesystem::remove_all(directory_ / "out");
+    RenderOptions options = of_frames(1, 1);
+    options.set_file = directory_ / "set.toml";
+    std::vector<glm::vec3> radiance;
+    options.on_frame = [&](const pipeline::Shot& shot) {
+      radiance = shot.light->lighting.environment.radiance;
+    };
+    render(options);
+    return radiance;
+  };
+  const auto by_hand =
+      light_with("environment_rotation_deg = 20\n", "\"environment_turn_rad\":0.5235987755982988,");
+  EXPECT_EQ(by_hand, light_with("environment_rotation_deg = 50\n", ""));
+  EXPECT_NE(by_hand, light_with("environment_rotation_deg = 20\n", ""));
+}
+
 TEST_F(RenderSession, WithNothingVirtualEveryPictureIsThePlateBitForBit) {
   write_take(false);
   render({});

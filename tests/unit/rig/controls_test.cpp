@@ -156,6 +156,20 @@ TEST(Controls, HidesTagsAndShowsThemAgain) {
   EXPECT_EQ(other.scene().hides_tags, false);
 }
 
+TEST(Controls, TurnsTheEnvironmentFile) {
+  EXPECT_EQ(Desk()("environment_left").said,
+            "no environment file lights this set; nothing to turn");
+  set::Set lit = stage();
+  lit.lighting.environment = "room.exr";
+  Desk desk{lit};
+  EXPECT_EQ(desk("environment_left").said, "environment turned by +5 degrees");
+  EXPECT_NEAR(desk.scene().environment_turn_rad.value_or(0), glm::radians(5.0), 1e-12);
+  for (int i = 0; i < 36; ++i) desk("environment_left");
+  EXPECT_EQ(desk("environment_right").said, "environment turned by +180 degrees");
+  for (int i = 0; i < 36; ++i) desk("environment_right");
+  EXPECT_NEAR(desk.controls.look().edits.environment_turn_rad, 0, 1e-12);
+}
+
 TEST(Controls, TagsThatNoPhantomHasCannotBeHidden) {
   const Outcome outcome = Desk()("tags");
   EXPECT_TRUE(outcome.refused);

@@ -143,6 +143,18 @@ TEST_F(KeptEdits, HiddenTagsAreWrittenIntoTheTableThatTheSetHasOrANewOne) {
       HasSubstr("tags is an inline table, {...}; write it under a header of its own, [tags]"));
 }
 
+TEST_F(KeptEdits, AnEnvironmentIsTurnedFromWhereTheSetHasIt) {
+  std::ofstream(folder_ / "room.exr") << "not looked into";
+  const std::string text =
+      "[lighting]\nenvironment = \"room.exr\"\nenvironment_rotation_deg = 60  # by eye\n";
+  pipeline::Edits edits;
+  edits.environment_turn_rad = glm::radians(10.0);
+  const std::string after = with_edits(text, parse(text), edits);
+  EXPECT_NEAR(glm::degrees(parse(after).lighting.environment_rotation_rad), 70, 1e-4);
+  EXPECT_THAT(after, HasSubstr("# by eye"));
+  EXPECT_EQ(kept(edits), stage) << "it has no environment";
+}
+
 TEST_F(KeptEdits, ALampIsAsItWasShown) {
   pipeline::Edits edits;
   for (const char* name : {"key", "window"}) {

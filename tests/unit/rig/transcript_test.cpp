@@ -38,6 +38,8 @@ constexpr Line transcript[] = {
     {"accumulate", "button accumulate: frame averaging on"},
     {"estimator", "button estimator: estimator: difference"},
     {"light_mode", "button light_mode: light: sources"},
+    {"environment_left", "button environment_left: no environment file lights this set; nothing to turn (refused)", "", "no environment file lights this set"},
+    {"environment_right", "button environment_right: no environment file lights this set; nothing to turn (refused)", "", "no environment file lights this set"},
     {"debug_view", "button debug_view: view: mixed"},
     {"record", "button record: recording", "Recording=yes", "● 00:"},
     {"next_object", "button next_object: object: sign", "Object=sign"},
