@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 #include <ostream>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -76,8 +77,6 @@ int refuse(const std::vector<std::string>& problems, std::ostream& out) {
 
 void describe(const set::CheckedSet& checked, const scene::Scene& scene, std::ostream& out) {
   const set::Set& set = checked.set;
-  out << set.name << " ("
-      << (checked.is_take ? "the set recorded with the take" : set.file.string()) << ") is valid\n";
   set::describe_cameras(set, out);
   tracking::describe(set.tracking, out);
   scene::describe_objects(set, scene, out);
@@ -128,16 +127,21 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
 
   set::remark_on_cameras(checked, findings);
   scene::remark_on(*scene, checked, findings);
-  describe(checked, *scene, out);
+  std::ostringstream details;
+  describe(checked, *scene, details);
   if (take) {
     const fit::Figure figure = fit_of_model(*take, *scene);
-    describe_fit(figure, take->set, out);
+    describe_fit(figure, take->set, details);
     remark_on_fit(figure, take->set, findings);
     remark_on_tracking(*take, findings);
-    describe_light(*take, *scene, findings, out);
+    describe_light(*take, *scene, findings, details);
   }
+  out << checked.set.name << " ("
+      << (checked.is_take ? "the set recorded with the take" : checked.set.file.string())
+      << ") is valid\n";
   if (!findings.remarks.empty()) out << "\nworth checking\n";
   for (const std::string& remark : findings.remarks) out << "  " << remark << '\n';
+  out << details.str();
   return 0;
 }
 

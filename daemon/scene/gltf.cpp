@@ -157,8 +157,8 @@ void GltfFile::Loader::add(const set::Object& object, std::uint32_t object_index
   }
   keep_looks(object_index);
   if (!played && !model.animations.empty())
-    notes.add("object \"" + set::one_line(object.name) + "\" plays none of its " +
-              std::to_string(model.animations.size()) + " animations");
+    notes.add("object \"" + set::one_line(object.name) + "\" plays no animation; " +
+              list_of_animations(model));
   if (played) {
     animation.object = object_index;
     animation.duration_s = played->duration_s();

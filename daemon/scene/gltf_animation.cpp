@@ -39,22 +39,6 @@ std::string duration_of(const tinygltf::Model& model, const tinygltf::Animation&
   return text.str();
 }
 
-std::string list_of_animations(const tinygltf::Model& model) {
-  constexpr std::size_t most_listed = 20;
-  const std::size_t count = model.animations.size();
-  if (count == 0) return "it has none";
-  std::string list = "it has ";
-  for (std::size_t i = 0; i < std::min(count, most_listed); ++i) {
-    const tinygltf::Animation& animation = model.animations[i];
-    list += (i > 0 ? ", " : "") + std::to_string(i) +
-            (animation.name.empty() ? " without a name"
-                                    : " \"" + set::one_line(animation.name) + "\"") +
-            " (" + duration_of(model, animation) + ")";
-  }
-  if (count > most_listed) list += " and " + std::to_string(count - most_listed) + " more";
-  return list + "; give the name, the index or \"*\" for all";
-}
-
 std::vector<std::size_t> chosen_animations(const tinygltf::Model& model, const std::string& which,
                                            const std::string& file) {
   const std::vector<tinygltf::Animation>& all = model.animations;
@@ -140,6 +124,22 @@ AnimationChannel channel_of(const tinygltf::Model& model, const tinygltf::Animat
 }
 
 }  // namespace
+
+std::string list_of_animations(const tinygltf::Model& model) {
+  constexpr std::size_t most_listed = 20;
+  const std::size_t count = model.animations.size();
+  if (count == 0) return "it has none";
+  std::string list = "it has ";
+  for (std::size_t i = 0; i < std::min(count, most_listed); ++i) {
+    const tinygltf::Animation& animation = model.animations[i];
+    list += (i > 0 ? ", " : "") + std::to_string(i) +
+            (animation.name.empty() ? " without a name"
+                                    : " \"" + set::one_line(animation.name) + "\"") +
+            " (" + duration_of(model, animation) + ")";
+  }
+  if (count > most_listed) list += " and " + std::to_string(count - most_listed) + " more";
+  return list + "; give the name, the index or \"*\" for all";
+}
 
 GltfAnimation::GltfAnimation(const tinygltf::Model& model, const std::string& which,
                              const std::string& file, Notes& notes)

@@ -14,6 +14,9 @@
 
 namespace previz::scene {
 
+// Returns "it has 0 "sway" (2 s); give the name, the index or "*" for all".
+std::string list_of_animations(const tinygltf::Model& model);
+
 // Reads what is played and adds the nodes that it moves to an object's list as they are used.
 class GltfAnimation {
  public:

@@ -37,13 +37,26 @@ void apply(const set::Surface& surface, const std::string& set_file, Scene& scen
                 surface.material + "\"; there are " + (known.empty() ? "none with a name" : known));
 }
 
+// A session stores its files by their checksums; notes begin with the file's name.
+std::string as_crews_know(const set::Object& object, std::string note) {
+  const std::string stored = object.file.string();
+  const std::filesystem::path known = object.file_as_written;
+  if (!known.empty() && object.file.filename() != known.filename() && note.starts_with(stored))
+    note.replace(0, stored.size(), known.string());
+  return note;
+}
+
 }  // namespace
 
 Scene load_scene(const set::Set& set, std::uint64_t most_texels) {
   Scene scene;
   Budget budget(set.estimation.filter_textures, most_texels);
   std::map<std::filesystem::path, std::unique_ptr<GltfFile>> files;
-  std::vector<GltfFile*> in_order;
+  struct Named {
+    GltfFile* file;
+    const set::Object& object;  // the first that uses it
+  };
+  std::vector<Named> in_order;
   for (std::size_t i = 0; i < set.objects.size(); ++i) {
     const set::Object& object = set.objects[i];
     std::error_code not_there;
@@ -51,18 +64,19 @@ Scene load_scene(const set::Set& set, std::uint64_t most_texels) {
     auto& file = files[not_there ? object.file : canonical];
     if (!file) {
       file = std::make_unique<GltfFile>(object.file, scene, budget);
-      in_order.push_back(file.get());
+      in_order.push_back({file.get(), object});
     }
     file->add(object, static_cast<std::uint32_t>(i));
     scene.light_objects.resize(scene.lights.size(), static_cast<std::uint32_t>(i));
   }
-  for (GltfFile* file : in_order) file->finish();
+  for (const auto& [file, object] : in_order) file->finish();
   for (const set::Surface& surface : set.surfaces) apply(surface, set.file.string(), scene);
   hide_tags(scene.instances, set.hides_tags);  // a tag's colour is real, hidden or not
   scene.lights.insert(scene.lights.end(), set.lights.begin(), set.lights.end());
   scene.light_objects.resize(scene.lights.size(), no_object);
-  for (const GltfFile* file : in_order)
-    for (std::string& note : file->notes()) scene.notes.push_back(std::move(note));
+  for (const auto& [file, object] : in_order)
+    for (std::string& note : file->notes())
+      scene.notes.push_back(as_crews_know(object, std::move(note)));
   return scene;
 }
 

@@ -179,7 +179,12 @@ toml::table parse_toml(const std::string& text, const std::string& file,
     return toml::parse(text, file);
   } catch (const toml::parse_error& error) {
     const std::string what(error.description());
-    if (!add_other_brackets(what, position(error.source()), text, sections, problems))
+    const auto first = text.find_first_not_of(" \t\r\n");
+    if (first != std::string::npos && text[first] == '{')
+      problems.add(position(error.source()), "",
+                   "is JSON, and a set file is TOML; a list of frames like this is for previzd "
+                   "import FILE SESSION");
+    else if (!add_other_brackets(what, position(error.source()), text, sections, problems))
       problems.add(position(error.source()), "", "not valid TOML: " + what);
     problems.throw_if_any();
     throw;

@@ -96,7 +96,11 @@ Session open_session(const std::filesystem::path& directory, const std::stop_tok
     throw Error(directory.string() +
                 ": not found; `previzd takes list FOLDER` shows the existing takes");
   if (!std::filesystem::exists(std::filesystem::symlink_status(toml)))
-    throw Error(directory.string() + ": is not a session; it holds no session.toml");
+    throw Error(directory.string() +
+                (std::filesystem::is_directory(directory)
+                     ? ": is not a session; it holds no session.toml"
+                     : ": is a file and not a session, which is a folder") +
+                "; previzd import makes one of pictures or a video");
   const SessionFile file = read_session_toml(toml);
   Session session{directory, file.info, {}, {}};
   read_end(file, session);

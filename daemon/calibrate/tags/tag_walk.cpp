@@ -16,13 +16,12 @@ namespace previz::calibrate {
 namespace {
 
 constexpr std::size_t pictures_of_a_session = 150;
-constexpr std::size_t every_of_a_walk = 5;
 constexpr std::size_t most_sampled = 5;  // pictures, to say what they hold in place of the tags
 
 std::size_t stride_of(const PictureSource& source, const WalkOptions& options) {
   if (options.every > 0) return std::size_t(options.every);
   const auto count = source.count();
-  if (!count) return every_of_a_walk;
+  if (!count) return 1;  // thin_out() does the rest
   return std::max<std::size_t>(1, (*count + pictures_of_a_session - 1) / pictures_of_a_session);
 }
 
@@ -85,6 +84,15 @@ void number_tags(const std::vector<SeenTag>& seen, const TagSizes& sizes, TagWal
   }
 }
 
+// Leaves out every second picture.
+void thin_out(std::vector<SeenTag>& seen, std::vector<std::string>& pictures) {
+  std::erase_if(seen, [](const SeenTag& tag) { return tag.sighting.picture % 2 == 1; });
+  for (SeenTag& tag : seen) tag.sighting.picture /= 2;
+  std::vector<std::string> kept;
+  for (std::size_t i = 0; i < pictures.size(); i += 2) kept.push_back(std::move(pictures[i]));
+  pictures = std::move(kept);
+}
+
 // Says that no picture shows a tag that can be measured, and what they show instead.
 std::string nothing_seen(std::size_t looked_at, const std::vector<FramePtr>& sampled,
                          const ResponseCurve& response, const std::string& family) {
@@ -132,7 +140,9 @@ TagWalk gather_walk(PictureSource& source, const PinholeIntrinsics& lens,
   std::map<int, std::size_t> doubles;
   std::vector<FramePtr> sampled;
   std::size_t index = 0, looked_at = 0;
-  const std::size_t stride = stride_of(source, options);
+  std::size_t stride = stride_of(source, options);
+  // Nobody knows how long a video is before its end: of a short one all pictures are used.
+  const bool is_of_any_length = options.every == 0 && !source.count();
   for (auto picture = source.next(); picture; picture = source.next()) {
     if (index++ % stride) continue;
     ++looked_at;
@@ -147,6 +157,9 @@ TagWalk gather_walk(PictureSource& source, const PinholeIntrinsics& lens,
       seen.push_back(tag);
     }
     walk.pictures.push_back(picture->name);
+    if (!is_of_any_length || walk.pictures.size() < pictures_of_a_session) continue;
+    thin_out(seen, walk.pictures);
+    stride *= 2;
   }
   if (!doubles.empty())
     report(tracking::doubles_in_words(doubles, "picture", "those pictures are used without it"));

@@ -29,7 +29,7 @@ struct WalkOptions {
   tracking::DetectorSettings detector;
   TagSizes sizes;
   std::vector<int> left_out;  // ids that are not fixed in the world: those of carriers
-  // Uses every n-th picture; 0: all of a folder, about 150 of a session, every 5th of a video.
+  // Uses every n-th picture; 0: all of a folder, at most about 150 of a session or a video.
   int every = 0;
 };
 

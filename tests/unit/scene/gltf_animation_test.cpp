@@ -89,6 +89,18 @@ TEST_F(GltfAnimations, StayAtTheirEndWhereTheyDoNotLoop) {
   EXPECT_EQ(world_from_nodes(loaded.animations.at(0), 9)[0][3], glm::dvec4(0, -2, 0, 1));
 }
 
+// A session stores files by their checksums, and what to write into the set is the next question.
+TEST_F(GltfAnimations, ThatAreNotPlayedAreNamedBesideTheFilesOwnName) {
+  gltf.root("a", gltf.triangle_mesh());
+  gltf.json["animations"] = {movement(0, 2, 1), movement(0, 2, 3)};
+  gltf.json["animations"][1]["name"] = "sway";
+  object.file_as_written = "models/plant.glb";
+  EXPECT_THAT(load().notes,
+              Contains(AllOf(StartsWith("models/plant.glb: object "),
+                             HasSubstr("plays no animation; it has 0 without a name (1 s), 1 "
+                                       "\"sway\" (3 s); give the name, the index"))));
+}
+
 TEST_F(GltfAnimations, AreChosenByNameOrIndex) {
   gltf.root("a", gltf.triangle_mesh());
   const auto named = [&](const char* name, float duration_s) {

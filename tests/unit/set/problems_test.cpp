@@ -54,6 +54,8 @@ const Mistake syntax[] = {
     {"[quality]\nsamples = 1\nsamples = 2\n", "3:", "not valid TOML"},
     {"\n\n[set]\nname = \"a\n", "4:10: not valid TOML", ""},
     {"[set]\nname = \"\xff\"\n", "2:", "not valid TOML"},
+    {"\n{ \"format_version\": 1 }", "2:1: is JSON, and a set file is TOML",
+     "previzd import FILE SESSION"},
     {TAG "[tag]\nhide=true\n", "4:1: tag: is a list of tables; allowed: [[tag]]",
      "did you mean [tags]?"},
     {"[set]\n  [tag]\nhide=true\n" TAG, "2:3: tag: is a list of tables", "did you mean [tags]?"},

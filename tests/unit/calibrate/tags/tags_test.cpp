@@ -240,6 +240,43 @@ TEST(TagSurvey, TheLensOfAnotherCameraIsSuspected) {
               HasSubstr("is the lens calibration the one for this camera"));
 }
 
+// Pictures of one tag, as many as are asked for, whose number nobody knows before.
+class Video : public PictureSource {
+ public:
+  explicit Video(int pictures) : left_(pictures) {
+    test::TagScene scene;
+    scene.lens = lens();
+    scene.tags = {test::flat_tag(1, 0.08, {0, 0, 0})};
+    scene.world_from_camera = test::camera_looking({0, -0.2, 0.3}, {0, 0, 0});
+    std::mt19937 random(1);
+    frame_ = std::make_shared<const Frame>(
+        test::expose(test::render(scene), {.full_well_e = 20000, .response = {}}, random));
+  }
+  static PinholeIntrinsics lens() { return test::plain_lens(160, 120, 150); }
+  std::optional<NamedFrame> next() override {
+    if (left_-- == 0) return std::nullopt;
+    return NamedFrame{frame_, std::to_string(left_)};
+  }
+
+ private:
+  int left_;
+  FramePtr frame_;
+};
+
+TEST(GatherWalk, TakesAllOfAShortVideoAndAtMostAHundredAndFiftyOfALongOne) {
+  const auto taken = [](int pictures) {
+    Video video(pictures);
+    WalkOptions options;
+    options.sizes.common_m = 0.08;
+    return int(gather_walk(video, Video::lens(), {}, options, [](const auto&) {}).pictures.size());
+  };
+  EXPECT_EQ(taken(24), 24);
+  EXPECT_EQ(taken(149), 149);
+  const int of_many = taken(700);
+  EXPECT_GE(of_many, 75);
+  EXPECT_LT(of_many, 150);
+}
+
 TEST(TagSizes, AreReadAsWritten) {
   const TagSizes sizes = parse_tag_sizes("80mm,7:12cm");
   EXPECT_EQ(sizes.of(3), 0.08);
