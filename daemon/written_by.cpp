@@ -92,6 +92,7 @@ void add_calibrate(const calibrate::Commands& commands, Places& places) {
   const auto add_set = [&](const auto& options) {
     if (options.write) places.add(options.set_file);
   };
+  add_set(commands.observer);
   add_set(commands.light);
   add_set(commands.balance);
   add_set(commands.tags);

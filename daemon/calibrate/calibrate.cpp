@@ -11,6 +11,7 @@
 #include "daemon/calibrate/lens/observer.hpp"
 #include "daemon/calibrate/lens/report.hpp"
 #include "daemon/calibrate/lens/residual_plot.hpp"
+#include "daemon/set/file_edit.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/error.hpp"
@@ -138,6 +139,8 @@ constexpr auto pose_by_hand =
 }  // namespace
 
 void calibrate_observer(const LensOptions& options, std::ostream& out) {
+  if (options.write && !options.set_file)
+    throw Error("--write needs --set: it changes that set file");
   Views views;
   ObserverFit observer = fit_of_passes(options, "observer", views, out, fit_observer);
   print_fit(views, observer.fit, observer.parameters, observer.picture, out);
@@ -150,8 +153,13 @@ void calibrate_observer(const LensOptions& options, std::ostream& out) {
   if (doubts.empty()) doubts = warn(doubts_of(observer), out);
   ObserverCalibration calibration;
   calibration.intrinsics = observer.intrinsics;
-  write_tables(doubts + set::intrinsics_toml(calibration) + statistics_of(observer),
-               options.table_file, out);
+  const std::string lens = set::intrinsics_toml(calibration), fit = statistics_of(observer);
+  if (!options.write) return write_tables(doubts + lens + fit, options.table_file, out);
+  std::string text = set::with_table(set::read_set_file(*options.set_file), "observer.intrinsics",
+                                     doubts + lens, /*whole=*/true);
+  if (!fit.empty()) text = set::with_table(text, "observer.lens_fit", fit, /*whole=*/true);
+  set::parse_set(text, *options.set_file);
+  write_back(*options.set_file, text, out);
 }
 
 void calibrate_light(const LightOptions& options, std::ostream& out) {

@@ -19,15 +19,16 @@ struct LensOptions {
   bool force = false;             // print the table although views are missing
   std::optional<std::filesystem::path> table_file;     // gets the tables too, beside `out`
   std::optional<std::filesystem::path> residual_plot;  // an SVG
+  std::optional<std::filesystem::path> set_file;       // that `write` changes
+  bool write = false;
 };
 
 struct LightOptions : LensOptions {
   // The set file whose tags the light camera sees; the camera's pose is found from them. Without
   // `board` the lens is the set's, or else the session's.
   std::optional<std::filesystem::path> tags_set;
-  bool rotation = false;                          // of lighting.environment in place of all that
-  std::optional<std::filesystem::path> set_file;  // with it; absent: the session's own
-  bool write = false;                             // change that set file
+  // Of lighting.environment in place of all that, by the set file, or else by the session's own.
+  bool rotation = false;
 };
 
 enum class CameraRole { observer, light };

@@ -23,6 +23,9 @@ void add_observer(CLI::App& calibrate, LensOptions& options) {
   CLI::App& command = *calibrate.add_subcommand("observer", "The film camera's lens");
   add_lens_options(command, options);
   command.get_option("--board")->required();
+  command.add_option("--set", options.set_file, "Set file that --write changes");
+  command.add_flag("--write", options.write,
+                   "Write the lens to the set file; keeps the old file beside it");
 }
 
 void add_light(CLI::App& calibrate, LightOptions& options) {

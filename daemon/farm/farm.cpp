@@ -99,11 +99,16 @@ std::uint64_t frames_of(const Job& job) {
   return frames;
 }
 
-void print_plan(const Job& job, const JobFolder& folder, std::ostream& out) {
+void print_plan(const Job& job, const JobFolder& folder, const Division& division,
+                std::ostream& out) {
   out << folder.path().string() << ": " << frames_of(job)
       << (frames_of(job) == 1 ? " frame of " : " frames of ") << job.takes.size()
       << (job.takes.size() == 1 ? " take" : " takes") << " in " << job.first_merge()
       << (job.first_merge() == 1 ? " task" : " tasks");
+  if (!division.chunk && job.first_merge() < static_cast<std::size_t>(division.machines))
+    out << " (fewer than --nodes " << division.machines
+        << ", because a task of few frames also renders their neighbours, with which pictures are "
+           "averaged; --chunk 2 divides it all the same)";
   if (job.sample_ranges > 1)
     out << ", each frame in " << job.sample_ranges << " sample ranges, and "
         << job.chunks.size() - job.first_merge() << " more that merge them";
@@ -183,7 +188,7 @@ void submit(const FarmOptions& options, std::ostream& out) {
   const Job job = make_job(options);
   const JobFolder folder = folder_for(options, job);
   const ScriptPlaces places = places_of(folder, job, options.program);
-  print_plan(job, folder, out);
+  print_plan(job, folder, options.division, out);
   if (options.dry_run) {
     if (options.openjd)
       out << openjd_template(places, job, folder.name());

@@ -117,6 +117,17 @@ void FileEdit::put(const std::string& tables, std::size_t index, const std::stri
     replacements_.push_back({{where.new_keys, where.new_keys}, "\n" + key + " = " + value});
 }
 
+void FileEdit::remove(const std::string& tables, std::size_t index, const std::string& key) {
+  const Table& where = table(tables, index);
+  const auto known = where.values.find(key);
+  if (known == where.values.end()) return;
+  // With the end of the line before, so that what is added behind the last key stays apart.
+  const std::size_t before = text_.rfind('\n', known->second.begin);
+  replacements_.push_back({{before == std::string::npos ? 0 : before,
+                            std::min(text_.find('\n', known->second.end), text_.size())},
+                           ""});
+}
+
 std::string FileEdit::text() const {
   std::vector<Replacement> in_order = replacements_;
   std::ranges::stable_sort(in_order, {}, [](const Replacement& r) { return r.span.begin; });
@@ -133,7 +144,8 @@ std::string FileEdit::text() const {
   return result;
 }
 
-std::string with_table(const std::string& text, const std::string& name, const std::string& table) {
+std::string with_table(const std::string& text, const std::string& name, const std::string& table,
+                       bool whole) {
   FileEdit file(text);
   if (file.count(name) == 0) {
     file.append(table);
@@ -142,6 +154,8 @@ std::string with_table(const std::string& text, const std::string& name, const s
   const FileEdit given(table);
   for (const std::string& key : given.keys(name, 0))
     file.put(name, 0, key, *given.written(name, 0, key));
+  for (const std::string& key : file.keys(name, 0))
+    if (whole && !given.has(name, 0, key)) file.remove(name, 0, key);
   return file.text();
 }
 

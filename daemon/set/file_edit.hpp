@@ -33,6 +33,9 @@ class FileEdit {
   void put(const std::string& tables, std::size_t index, const std::string& key,
            const std::string& value);
 
+  // Takes a key with its line, or lines, out of the table.
+  void remove(const std::string& tables, std::size_t index, const std::string& key);
+
   // Adds a table, with its header, at the end of the file.
   void append(const std::string& table) { appended_ += "\n" + table; }
 
@@ -59,9 +62,11 @@ class FileEdit {
   std::vector<Replacement> replacements_;
 };
 
-// Returns a set file's text with the keys of `table`, the text of a [name] with its header; keys
-// that the file's own table has beside them stay. Throws previz::Error as FileEdit does.
-std::string with_table(const std::string& text, const std::string& name, const std::string& table);
+// Returns a set file's text with the keys of `table`, the text of a [name] with its header. Keys
+// that the file's own table has beside them stay, or go with `whole`. Throws previz::Error as
+// FileEdit does.
+std::string with_table(const std::string& text, const std::string& name, const std::string& table,
+                       bool whole = false);
 
 // Returns the text of a set file. Throws previz::Error that names it where it cannot be read, and
 // where it is no file: a pipe can be read only once, and one that nobody writes to, never.

@@ -69,6 +69,20 @@ TEST(FileEdit, AddsAKeyBehindTheTablesLastAndATableAtTheEnd) {
 }
 
 // Every kind of value ends where it ends.
+TEST(FileEdit, TakesATableOverKeyByKeyOrAsAWhole) {
+  const std::string lens =
+      "[observer.intrinsics]  # of July\nfx = 600.0\nk3 = 0.1  # by hand\n"
+      "more = [1,\n  2]\ncx = 320.0\n[quality]\nsamples = 3\n";
+  const std::string measured = "# measured\n[observer.intrinsics]\nfx = 610.5\nk1 = -0.2\n";
+  EXPECT_EQ(with_table(lens, "observer.intrinsics", measured),
+            "[observer.intrinsics]  # of July\nfx = 610.5\nk3 = 0.1  # by hand\n"
+            "more = [1,\n  2]\ncx = 320.0\nk1 = -0.2\n[quality]\nsamples = 3\n");
+  EXPECT_EQ(with_table(lens, "observer.intrinsics", measured, true),
+            "[observer.intrinsics]  # of July\nfx = 610.5\nk1 = -0.2\n[quality]\nsamples = 3\n");
+  EXPECT_EQ(with_table("[quality]\n", "observer.intrinsics", measured, true),
+            "[quality]\n\n" + measured);
+}
+
 TEST(FileEdit, KnowsWhereValuesEnd) {
   for (const char* value : {"1", "-1.5e3", "true", "\"a # b\"", "'c]d'", "[1, 2]", "[[1, 2], [3]]",
                             "[ # one\n 1,\n]", "\"\"\"x\ny\"\"\"", "1979-05-27", "inf", "0x1F"})
