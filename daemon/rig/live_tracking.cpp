@@ -36,7 +36,8 @@ LiveTracking::LiveTracking(Parts parts, const ObserverCalibration& calibration)
     : parts_(std::move(parts)),
       calibration_(calibration),
       tracking_("tracking", parts_.kept, &pipeline::Patience::stage, [this] { make_stage(); }),
-      lighting_("picture lighting", parts_.kept, &pipeline::Patience::stage) {
+      lighting_("picture lighting", parts_.kept, &pipeline::Patience::stage),
+      doubts_(parts_.set.tracking, calibration_, parts_.kept.reports) {
   make_stage();
 }
 
@@ -72,6 +73,7 @@ void LiveTracking::judge_tags(const Shot& shot) {
   if (moved == moved_) return;
   moved_ = std::move(moved);
   stage_->leave_out(moved_);
+  doubts_.forget();  // the poses will be others
   std::string text;
   for (const int id : moved_)
     add_to_list(text, "tag " + std::to_string(id) + " " + trust_->words(id), "; ");
@@ -93,6 +95,7 @@ Shot LiveTracking::track(Shot shot) {
     (*stage_)(shot);
     report_carriers(shot);
     judge_tags(shot);
+    doubts_.add(shot.track);
   });
   if (!is_tracked) {
     shot.track = {};

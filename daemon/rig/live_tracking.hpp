@@ -15,6 +15,7 @@
 #include "daemon/pipeline/track_stage.hpp"
 #include "daemon/rig/cameras.hpp"
 #include "daemon/rig/controls.hpp"
+#include "daemon/rig/live_doubts.hpp"
 #include "daemon/rig/live_light.hpp"
 #include "daemon/tracking/pose_filter.hpp"
 #include "daemon/tracking/tag_trust.hpp"
@@ -53,6 +54,7 @@ class LiveTracking {
   std::optional<tracking::PoseFilter> filter_;  // absent: the set shows poses as they are found
   pipeline::AnimationClock animation_clock_;
   pipeline::StageKeeper tracking_, lighting_;
+  LiveDoubts doubts_;
 };
 
 }  // namespace previz::rig
