@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "daemon/report/report.hpp"
+#include "drivers/error.hpp"
 
 namespace previz::rig {
 
@@ -10,6 +11,9 @@ using pipeline::Shot;
 using report::Severity;
 
 namespace {
+
+// Half a second to a second of frames decides about a tag, and as much after it is back.
+constexpr int frames_remembered = 24, frames_decisive = 12;
 
 session::TrackRecord track_record_of(const Shot& shot) {
   session::TrackRecord record;
@@ -32,7 +36,8 @@ LiveTracking::LiveTracking(Parts parts, const ObserverCalibration& calibration)
     : parts_(std::move(parts)),
       calibration_(calibration),
       tracking_("tracking", parts_.kept, &pipeline::Patience::stage, [this] { make_stage(); }),
-      lighting_("picture lighting", parts_.kept, &pipeline::Patience::stage) {
+      lighting_("picture lighting", parts_.kept, &pipeline::Patience::stage),
+      doubts_(parts_.set.tracking, calibration_, parts_.kept.reports) {
   make_stage();
 }
 
@@ -40,6 +45,9 @@ void LiveTracking::make_stage() {
   const set::Tracking& wish = parts_.set.tracking;
   stage_.emplace(parts_.set, calibration_, parts_.cameras.recorded.track, 0, parts_.cameras.lap_ns,
                  wish.search_parts ? tracking::Search::parts : tracking::Search::whole);
+  trust_.emplace(wish, calibration_.intrinsics, frames_remembered);
+  moved_.clear();
+  parts_.kept.reports.settle("tags");
   filter_.reset();
   if (wish.enabled && (wish.smooth || wish.hold_s > 0))
     filter_.emplace(wish, calibration_.intrinsics);
@@ -59,6 +67,22 @@ void LiveTracking::report_carriers(const Shot& shot) {
   }
 }
 
+void LiveTracking::judge_tags(const Shot& shot) {
+  trust_->add(shot.track);
+  std::set<int> moved = trust_->moved(frames_decisive);
+  if (moved == moved_) return;
+  moved_ = std::move(moved);
+  stage_->leave_out(moved_);
+  doubts_.forget();  // the poses will be others
+  std::string text;
+  for (const int id : moved_)
+    add_to_list(text, "tag " + std::to_string(id) + " " + trust_->words(id), "; ");
+  if (text.empty()) return parts_.kept.reports.settle("tags");
+  report::Report report{Severity::warning, "tracking", text};
+  report.notice = report::Notice{Severity::warning, "tags", text, true};
+  parts_.kept.reports(report::once(std::move(report)));
+}
+
 Shot LiveTracking::track(Shot shot) {
   const std::shared_ptr<const Look> look = parts_.look.get();
   const double animation_s =
@@ -70,6 +94,8 @@ Shot LiveTracking::track(Shot shot) {
   const bool is_tracked = tracking_.attempt([&] {
     (*stage_)(shot);
     report_carriers(shot);
+    judge_tags(shot);
+    doubts_.add(shot.track);
   });
   if (!is_tracked) {
     shot.track = {};

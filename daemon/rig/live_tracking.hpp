@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <optional>
+#include <set>
 
 #include "daemon/output/recorder.hpp"
 #include "daemon/pipeline/animation_clock.hpp"
@@ -14,8 +15,10 @@
 #include "daemon/pipeline/track_stage.hpp"
 #include "daemon/rig/cameras.hpp"
 #include "daemon/rig/controls.hpp"
+#include "daemon/rig/live_doubts.hpp"
 #include "daemon/rig/live_light.hpp"
 #include "daemon/tracking/pose_filter.hpp"
+#include "daemon/tracking/tag_trust.hpp"
 
 namespace previz::rig {
 
@@ -39,14 +42,19 @@ class LiveTracking {
  private:
   void make_stage();
   void report_carriers(const pipeline::Shot& shot);
+  // Leaves out the tags that have moved, from the next frame on, until they are back.
+  void judge_tags(const pipeline::Shot& shot);
   void offer_line(pipeline::Shot& shot, const pipeline::Edits& edits);
 
   const Parts parts_;
   const ObserverCalibration calibration_;
   std::optional<pipeline::TrackStage> stage_;
+  std::optional<tracking::TagTrust> trust_;
+  std::set<int> moved_;                         // tags that are left out
   std::optional<tracking::PoseFilter> filter_;  // absent: the set shows poses as they are found
   pipeline::AnimationClock animation_clock_;
   pipeline::StageKeeper tracking_, lighting_;
+  LiveDoubts doubts_;
 };
 
 }  // namespace previz::rig

@@ -47,13 +47,16 @@ class PoseJudgement {
   //   none       No picture shows a tag of the family: what they hold instead (other_tags()).
   std::vector<std::string> doubts(const std::stop_token& stop = {}) const;
 
+  // Two of doubts(), each empty if there is none: what residuals say, and what a factor says of
+  // tags that disagree. Once `stop` is requested they are of no use.
+  std::string doubt_about_residuals(const std::stop_token& stop) const;
+  std::string doubt_about_lost(const std::stop_token& stop) const;
+
   // Returns why the corners of a tag could be used in no tracked frame ("cut by the picture's
   // border in 3 frames"); empty: they could be.
   std::string why_unusable(int id) const;
 
  private:
-  std::string doubt_about_residuals(const std::stop_token& stop) const;
-  std::string doubt_about_lost(const std::stop_token& stop) const;
   std::string doubt_about_none(const std::stop_token& stop) const;
 
   set::Tracking tracking_;
