@@ -21,9 +21,9 @@ namespace {
 // near, and the last.
 constexpr double nearly_settled = 5e-2, settled = 2e-3;
 constexpr int most_rounds = 6;  // each time
-constexpr int coarse_samples = 4, fine_samples = 64, around_samples = 8;
+constexpr int coarse_samples = 4, fine_samples = 64, around_samples = 4;
 // Pictures are so wide, as far as the camera's are: to measure colours, and to see around tags.
-constexpr calibrate::ProbeSize probe_of_colours{160, 16}, probe_around_tags{480, 4};
+constexpr calibrate::ProbeSize probe_of_colours{160, 16}, probe_around_tags{400, 2};
 constexpr int probed_frames = 3;
 constexpr int paper_samples = 64;
 // No paint reflects less or more; the round that guesses such an albedo has a wrong light or model.
