@@ -159,7 +159,8 @@ void add_bench(CLI::App& app, bench::BenchOptions& options) {
                      "Set file or session folder whose frames are measured, too");
   command
       .add_option("--seconds", options.seconds,
-                  "Time for all measurements; what would take longer is skipped")
+                  "Time for all measurements; what would take longer is skipped, but for the first "
+                  "picture, with which every page has a figure")
       ->check(CLI::Range(10, 3600))
       ->capture_default_str();
   command.add_option("--json", options.json, "File for all figures, as JSON");

@@ -179,11 +179,13 @@ int do_command(const CLI::App& app, CommandLine& said, const StopOnSignal& stop)
 // and a stop is its orderly end. A farm's machine may write down how its task ended while a disk is
 // slow; Slurm kills it after half a minute.
 int do_stoppable(const CLI::App& app, CommandLine& said) {
-  constexpr std::chrono::milliseconds of_a_command(1500), of_a_task(20'000);
+  // A model is made without looking for a stop, and would only use up the patience.
+  constexpr std::chrono::milliseconds of_a_model(0), of_a_command(1500), of_a_task(20'000);
   const bool is_rig = app.got_subcommand("run");
-  const StopOnSignal stop(is_rig                       ? std::nullopt
-                          : app.got_subcommand("farm") ? std::optional(of_a_task)
-                                                       : std::optional(of_a_command));
+  const StopOnSignal stop(is_rig                        ? std::nullopt
+                          : app.got_subcommand("farm")  ? std::optional(of_a_task)
+                          : app.got_subcommand("model") ? std::optional(of_a_model)
+                                                        : std::optional(of_a_command));
   int status = 1;
   try {
     status = do_command(app, said, stop);

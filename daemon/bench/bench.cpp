@@ -3,15 +3,22 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include <chrono>
+#include <condition_variable>
 #include <ctime>
 #include <fstream>
+#include <mutex>
+#include <optional>
 #include <ostream>
+#include <stop_token>
 #include <string>
 #include <thread>
 
 #include "daemon/bench/frames.hpp"
 #include "daemon/bench/page.hpp"
+#include "daemon/output/progress.hpp"
 #include "daemon/scene/load.hpp"
+#include "daemon/set/check.hpp"
 #include "daemon/trade/path_timer.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
@@ -22,7 +29,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int widths[] = {640, 1280, 1920, 3840};  // of pictures of 16:9
+constexpr int widths[] = {160, 320, 640, 1280, 1920, 3840};  // of pictures of 16:9
 constexpr int sample_counts[] = {2, 4, 8};
 constexpr std::size_t triangle_counts[] = {100'000, 600'000, 1'000'000};
 
@@ -35,6 +42,24 @@ std::string processor() {
   return "unknown processor";
 }
 
+// Says every few seconds that the machine is busy. Nothing else may write meanwhile.
+class Busy {
+ public:
+  Busy(const char* doing, std::ostream& out)
+      : thread_([this, doing, &out](const std::stop_token& stop) {
+          std::unique_lock lock(mutex_);
+          for (int seconds = 5; !over_.wait_for(lock, stop, std::chrono::seconds(5),
+                                                [&] { return stop.stop_requested(); });
+               seconds += 5)
+            out << "  " << doing << ": " << seconds << " s so far" << std::endl;
+        }) {}
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable_any over_;
+  std::jthread thread_;  // the last: it uses the others
+};
+
 class Bench {
  public:
   Bench(const BenchOptions& options, std::ostream& out) : options_(options), out_(out) {}
@@ -42,14 +67,23 @@ class Bench {
   BenchReport run() {
     begin();
     copies();
-    Frames frames(device_);
+    out_ << "preparing the first picture: on a new machine or driver this may take a minute"
+         << std::endl;
+    std::optional<Frames> first;
+    {
+      const Busy busy("preparing", out_);
+      first.emplace(device_);
+    }
+    Frames& frames = *first;
+    out_ << "the first picture took " << output::duration_words(frames.start_s()) << std::endl;
     report_.start_s = frames.start_s();
     render::keep_programs(*device_);
     for (const int width : widths)
       measure(frames, {.width = width, .height = width * 9 / 16}, report_.by_size);
-    // The largest size that is quick enough to be measured many times.
-    FrameWish wish{.width = 640, .height = 360};
-    if (report_.by_size.size() >= 2 && report_.by_size[1].ms < 200) wish = {};
+    // The largest size up to 1280x720 that is quick enough to be measured many times.
+    FrameWish wish{.width = widths[0], .height = widths[0] * 9 / 16};
+    for (const FrameFigures& size : report_.by_size)
+      if (size.width <= 1280 && size.ms < 200) wish = {.width = size.width, .height = size.height};
     for (const int samples : sample_counts) {
       FrameWish more = wish;
       more.samples = samples;
@@ -112,15 +146,21 @@ class Bench {
   void measure(Frames& frames, const FrameWish& wish, std::vector<FrameFigures>& to) {
     if (options_.stop.stop_requested()) return;
     const std::string what =
-        fmt::format("{}x{}, {} sample{}, {} triangles", wish.width, wish.height, wish.samples,
-                    wish.samples == 1 ? "" : "s", wish.triangles);
+        fmt::format("{}x{}, {}, {} triangles", wish.width, wish.height,
+                    set::plural(std::uint64_t(wish.samples), "sample"), wish.triangles);
     const double expected_s = frames.expected_s(wish);
-    if (since_start() + expected_s > options_.seconds) {
+    // Every page has a figure, also where the first picture took all the time.
+    const bool is_first = to.empty() && wish.width == widths[0] && &to == &report_.by_size;
+    if (!is_first && since_start() + expected_s > options_.seconds) {
       report_.left_out.push_back({what, fmt::format("it would take about {:.0f} s", expected_s)});
       return;
     }
+    out_ << what << ": about " << output::duration_words(expected_s) << std::endl;
     try {
-      to.push_back(frames.measure(wish));
+      {
+        const Busy busy("measuring", out_);
+        to.push_back(frames.measure(wish));
+      }
       out_ << fmt::format("{}: {:.1f} ms a frame", what, to.back().ms) << std::endl;
     } catch (const render::DeviceLost&) {
       throw;

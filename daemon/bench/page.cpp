@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "daemon/report/page_style.hpp"
+#include "daemon/set/check.hpp"
 #include "daemon/trade/chart.hpp"
 
 namespace previz::bench {
@@ -125,9 +126,10 @@ std::string verdict(const BenchReport& report) {
   if (report.set) {
     const SetFigures& set = *report.set;
     html += fmt::format(
-        "<p>{} takes {} ms a frame of {}x{} with {} samples: {} frames per second{}"
+        "<p>{} takes {} ms a frame of {}x{} with {}: {} frames per second{}"
         "</p>\n",
-        escaped(set.set), number(set.ms), set.width, set.height, set.samples, number(1000 / set.ms),
+        escaped(set.set), number(set.ms), set.width, set.height,
+        set::plural(std::uint64_t(set.samples), "sample"), number(1000 / set.ms),
         set.fps > 0 ? fmt::format(", and it asks for {:g}.", set.fps) : ".");
   }
   return html;

@@ -10,6 +10,7 @@
 #include "daemon/calibrate/sensor/surface_pixels.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/load.hpp"
+#include "daemon/set/check.hpp"
 #include "daemon/set/file_edit.hpp"
 #include "daemon/set/print.hpp"
 #include "drivers/error.hpp"
@@ -75,8 +76,9 @@ std::string suggestion(const SurfaceRatio& surface, const KnownSurface& known,
 }
 
 void print_balance(const SurfacePixels& seen, const Balance& balance, std::ostream& out) {
-  fmt::print(out, "{} frames, {} pixels of diffuse real surfaces\n", seen.world_from_cameras.size(),
-             seen.pixels.size());
+  fmt::print(out, "{}, {} of diffuse real surfaces\n",
+             set::plural(seen.world_from_cameras.size(), "frame"),
+             set::plural(seen.pixels.size(), "pixel"));
   for (const SurfaceRatio& surface : balance.surfaces)
     fmt::print(out, "  {}: camera / model {:.3f} {:.3f} {:.3f} (+- {}), {} pixels in {} tiles{}\n",
                seen.surfaces[surface.surface].material, surface.ratio.r, surface.ratio.g,
@@ -90,9 +92,14 @@ SurfacePixels probed(const pipeline::Take& take, const BalanceOptions& options) 
   const scene::Scene scene = scene::load_scene(take.set);
   const auto device =
       render::open_device(render::options_for(options.device, take.set.quality.hardware_rays));
-  const std::vector<ProbedShot> shots = probed_shots(take, options.frames);
-  SurfacePixels seen = SurfaceProbe(take, shots, scene, device, {}).compare(scene, options.samples);
-  append(Paper(take.set, take.observer, scene, device, options.samples).look_at(shots), seen);
+  SurfaceProbe surfaces(take, scene, device, {});
+  Paper paper(take.set, take.observer, scene, device, options.samples);
+  each_probed_shot(take, options.frames, [&](const ProbedShot& shot) {
+    surfaces.add(shot);
+    paper.look_at(shot);
+  });
+  SurfacePixels seen = surfaces.compare(scene, options.samples);
+  append(paper.seen(), seen);
   return seen;
 }
 

@@ -16,6 +16,7 @@
 #include "daemon/exchange/placed_model.hpp"
 #include "daemon/exchange/take_track.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/set/check.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
@@ -136,8 +137,8 @@ void solve_missing(pipeline::Take& take, std::ostream& out, const std::stop_toke
   for (const session::TrackRecord& record : track)
     if (record.tracked) known.insert(record.frame);
   if (known.size() == take.observer_stream->records().size()) return;
-  out << "finding the poses of " << take.observer_stream->records().size() - known.size()
-      << " frames" << std::endl;
+  out << "finding the poses of "
+      << set::plural(take.observer_stream->records().size() - known.size(), "frame") << std::endl;
   const auto is_missing = [&](std::uint64_t frame) { return !known.contains(frame); };
   const auto solved = track_frames(
       take, is_missing, [](const std::string&) {}, stop);
@@ -282,8 +283,8 @@ void export_take(const ExportOptions& options, std::ostream& out) {
     throw Error(options.directory.string() + ": cannot be created: " + code.message());
   session::replace_file(options.directory / "camera.usda", to_usda(track));
   session::replace_file(options.directory / "camera.chan", to_chan(track));
-  out << options.directory.string() << ": camera.usda, camera.chan, " << track.keys.size()
-      << " poses of " << track.frames << " frames";
+  out << options.directory.string() << ": camera.usda, camera.chan, "
+      << set::plural(track.keys.size(), "pose") << " of " << set::plural(track.frames, "frame");
   if (track.keys.size() < track.frames) out << "; the others have none (`previzd track` says why)";
   out << std::endl;
   out << "  " << session::words_of(track.rate);

@@ -11,6 +11,7 @@
 #include "daemon/exchange/import_description.hpp"
 #include "daemon/exchange/size_reason.hpp"
 #include "daemon/scene/assets.hpp"
+#include "daemon/set/check.hpp"
 #include "daemon/set/file_edit.hpp"
 #include "daemon/set/problems.hpp"
 #include "daemon/tracking/pose_judgement.hpp"
@@ -125,8 +126,8 @@ class FootageImport {
     if (frames.empty()) fail("holds no frame");
     const std::uint64_t all = frames.size() + pictures->lost();
     if (listed() > 0 && all != listed())
-      fail("has " + std::to_string(all) + " frames; " + std::to_string(listed()) +
-           " are described");
+      fail("has " + set::plural(all, "frame") + ", and not the " + std::to_string(listed()) +
+           " described");
     for (const std::string& note : pictures->notes()) notes.push_back(note);
     note_replaced_times(notes);
     Imported imported{std::move(frames), all, {}, {}, std::move(to_judge)};
@@ -178,7 +179,7 @@ class FootageImport {
 
   void check_count(std::size_t i, const Picture& picture) const {
     if (listed() > 0 && i >= listed())
-      throw Error(picture.name + ": exceeds the " + std::to_string(listed()) + " frames that " +
+      throw Error(picture.name + ": exceeds the " + set::plural(listed(), "frame") + " that " +
                   file_.string() + " describes under " + footage_.source);
   }
 

@@ -16,6 +16,7 @@
 #include "daemon/exchange/video_packets.hpp"
 #include "daemon/exchange/video_picture.hpp"
 #include "daemon/exchange/video_tags.hpp"
+#include "daemon/set/check.hpp"
 #include "drivers/av.hpp"
 #include "drivers/box/reading.hpp"
 
@@ -288,8 +289,9 @@ class VideoFile final : public Footage {
     const int error = packets_->error();
     if (error == AVERROR(EIO)) av::check(error, file_, "cannot be read to its end");
     if (error < 0)
-      end_fault_ = file_.string() + ": is damaged after " + std::to_string(shown_) +
-                   " frames; what follows cannot be read: " + av::error_text(error);
+      end_fault_ = file_.string() + ": is damaged after " +
+                   set::plural(std::uint64_t(shown_), "frame") +
+                   "; what follows cannot be read: " + av::error_text(error);
   }
 
   // All frames of the part before are decoded; no frame of the next one refers to them.

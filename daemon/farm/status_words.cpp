@@ -5,6 +5,7 @@
 
 #include "daemon/farm/status.hpp"
 #include "daemon/output/progress.hpp"
+#include "daemon/set/check.hpp"
 #include "drivers/printable.hpp"
 
 namespace previz::farm {
@@ -18,7 +19,7 @@ std::string bar(double share) {
 }
 
 std::string frames_done(const ChunkStatus& status) {
-  return std::to_string(status.done) + " of " + std::to_string(status.frames) + " frames done";
+  return std::to_string(status.done) + " of " + set::plural(status.frames, "frame") + " done";
 }
 
 // Returns where a task runs. Slurm knows it at once; the task's own word may be that of its last
@@ -101,8 +102,8 @@ void print_words(const JobFolder& folder, const Job& job, const JobStatus& statu
   const double share =
       status.frames > 0 ? static_cast<double>(status.done) / static_cast<double>(status.frames) : 1;
   if (terminal) out << bar(share) << " ";
-  out << status.done << " of " << status.frames << " frames done, " << status.running
-      << (status.running == 1 ? " task" : " tasks") << " running, ";
+  out << status.done << " of " << set::plural(status.frames, "frame") << " done, "
+      << set::plural(status.running, "task") << " running, ";
   if (const std::size_t again = status.count(TaskPhase::again); again > 0)
     out << again << " waiting again, ";
   out << status.count(TaskPhase::failed) << " failed";

@@ -105,7 +105,7 @@ previzd render takes/12A_take003 --frames 40 --spp 4096 --neighbours 0 --sample-
 previzd merge takes/12A_take003 first second --frames 40 --spp 4096 --neighbours 0 --out renders/12A_take003: Makes the picture of both halves. If both computers have the same graphics card and driver, it is the picture of one, to the last bit.
 previzd farm takes/12A_take003 --out renders/12A_take003 --nodes 3: Divides the rendering of a take between three machines, by Slurm where it is installed, and otherwise by a script to be started on each. previzd-farm(1) has the rest.
 previzd farm status renders/12A_take003.farm: Says how many frames are done, which tasks have failed, where and why, and how long the rest takes.
-previzd bench --page bench.html: Measures what this machine can do, in two minutes at most, and writes a page about it. The first thing to run on a new machine.
+previzd bench --page bench.html: Measures what this machine can do, in about two minutes, and writes a page about it. The first thing to run on a new machine.
 previzd bench --no-hardware-rays: Measures it without the hardware that a graphics card may have for rays, to see what that brings.
 previzd bench desk.toml --json bench.json: Also measures the frames of a set, whose newest take is used, and writes all figures as JSON.
 previzd trade desk.toml --axes estimator,depth: Measures the cost and benefit of the estimator and the number of bounces on this set.

@@ -21,9 +21,9 @@ namespace {
 // near, and the last.
 constexpr double nearly_settled = 5e-2, settled = 2e-3;
 constexpr int most_rounds = 6;  // each time
-constexpr int coarse_samples = 4, fine_samples = 64, around_samples = 8;
+constexpr int coarse_samples = 4, fine_samples = 64, around_samples = 4;
 // Pictures are so wide, as far as the camera's are: to measure colours, and to see around tags.
-constexpr calibrate::ProbeSize probe_of_colours{160, 16}, probe_around_tags{480, 4};
+constexpr calibrate::ProbeSize probe_of_colours{160, 16}, probe_around_tags{400, 2};
 constexpr int probed_frames = 3;
 constexpr int paper_samples = 64;
 // No paint reflects less or more; the round that guesses such an albedo has a wrong light or model.
@@ -106,6 +106,13 @@ double now_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
+std::vector<calibrate::ProbedShot> shots_of(const pipeline::Take& take) {
+  std::vector<calibrate::ProbedShot> shots;
+  calibrate::each_probed_shot(
+      take, probed_frames, [&](calibrate::ProbedShot shot) { shots.push_back(std::move(shot)); });
+  return shots;
+}
+
 double pixels_of(const pipeline::Take& take, std::size_t shots, const calibrate::ProbeSize& size) {
   const PinholeIntrinsics& lens = take.observer.intrinsics;
   const double scale = std::min(1.0, double(size.width) / lens.width);
@@ -118,7 +125,7 @@ ColourComparison::ColourComparison(pipeline::Take take, std::shared_ptr<render::
                                    bool has_tags, std::ostream& out, bool terminal)
     : take_(std::move(take)),
       device_(std::move(device)),
-      shots_(calibrate::probed_shots(take_, probed_frames)),
+      shots_(shots_of(take_)),
       rounds_work_(pixels_of(take_, shots_.size(), probe_of_colours) *
                    (probe_of_colours.identity_samples + (2 * most_rounds + 1) * coarse_samples +
                     fine_samples)),
@@ -135,10 +142,10 @@ void ColourComparison::worked(double pixel_samples) {
 }
 
 void ColourComparison::fit_to_paper(const scene::Scene& scene) {
-  const calibrate::SurfacePixels paper =
-      calibrate::Paper(take_.set, take_.observer, scene, device_, paper_samples).look_at(shots_);
-  if (paper.pixels.empty()) return;
-  const calibrate::Balance balance = calibrate::fit_balance(paper, {});
+  calibrate::Paper paper(take_.set, take_.observer, scene, device_, paper_samples);
+  for (const calibrate::ProbedShot& shot : shots_) paper.look_at(shot);
+  if (paper.seen().pixels.empty()) return;
+  const calibrate::Balance balance = calibrate::fit_balance(paper.seen(), {});
   calibrate::relight(shots_, balance.scale);
   const glm::dvec3& scale = balance.scale;
   const glm::dvec3 stops = glm::abs(glm::log2(scale));
@@ -151,18 +158,21 @@ void ColourComparison::fit_to_paper(const scene::Scene& scene) {
         scale.r, scale.g, scale.b);
 }
 
-calibrate::SurfaceProbe ColourComparison::probe(const scene::Scene& scene,
-                                                const calibrate::ProbeSize& size) {
-  return {take_, shots_, scene, device_, size, [this](double samples) { worked(samples); }};
+std::unique_ptr<calibrate::SurfaceProbe> ColourComparison::probe(const scene::Scene& scene,
+                                                                 const calibrate::ProbeSize& size) {
+  auto surfaces = std::make_unique<calibrate::SurfaceProbe>(
+      take_, scene, device_, size, [this](double samples) { worked(samples); });
+  for (const calibrate::ProbedShot& shot : shots_) surfaces->add(shot);
+  return surfaces;
 }
 
 std::map<std::string, Colour> ColourComparison::measure(const std::vector<NamedMesh>& meshes) {
   scene::Scene scene = scene_of(take_, meshes, {});
   fit_to_paper(scene);
   step_ = "colours: finding which surfaces the pictures show";
-  calibrate::SurfaceProbe surfaces = probe(scene, probe_of_colours);
+  const auto surfaces = probe(scene, probe_of_colours);
   std::map<std::string, Colour> colours;
-  const auto ratios = [&](int samples) { return ratios_of(surfaces.compare(scene, samples)); };
+  const auto ratios = [&](int samples) { return ratios_of(surfaces->compare(scene, samples)); };
   const auto begin = [&](const char* step) {
     progress_.step_done(step_, now_s());
     step_ = step;
@@ -186,7 +196,7 @@ calibrate::SurfacePixels ColourComparison::look_around(const std::vector<NamedMe
                                                        const Colours& colours) {
   step_ = "colours: looking around tags";
   const scene::Scene scene = scene_of(take_, meshes, colours);
-  calibrate::SurfacePixels seen = probe(scene, probe_around_tags).compare(scene, around_samples);
+  calibrate::SurfacePixels seen = probe(scene, probe_around_tags)->compare(scene, around_samples);
   progress_.step_done(step_, now_s(), true);
   return seen;
 }

@@ -46,7 +46,8 @@ class ColourComparison {
                                        const Colours& colours);
 
  private:
-  calibrate::SurfaceProbe probe(const scene::Scene& scene, const calibrate::ProbeSize& size);
+  std::unique_ptr<calibrate::SurfaceProbe> probe(const scene::Scene& scene,
+                                                 const calibrate::ProbeSize& size);
   void fit_to_paper(const scene::Scene& scene);
   void worked(double pixel_samples);
 

@@ -30,6 +30,7 @@
 #include "daemon/model/views.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/scene/load.hpp"
+#include "daemon/set/check.hpp"
 #include "daemon/set/file_edit.hpp"
 #include "daemon/set/load.hpp"
 #include "daemon/set/problems.hpp"
@@ -88,8 +89,8 @@ void print_fit(const Parts& parts, const Layout& layout, const Fit& fit, std::os
   std::set<std::string> pictures;
   for (const MarkResidual& mark : fit.marks) pictures.insert(mark.picture);
   if (!fit.marks.empty())
-    fmt::print(out, "{} marks in {} pictures, rms {:.2f} px\n", fit.marks.size(), pictures.size(),
-               fit.rms_px);
+    fmt::print(out, "{} in {}, rms {:.2f} px\n", set::plural(fit.marks.size(), "mark"),
+               set::plural(pictures.size(), "picture"), fit.rms_px);
   print_worst_marks(fit.marks, out);
   if (!fit.edges_off_px.empty()) {
     std::vector<double> off = fit.edges_off_px;

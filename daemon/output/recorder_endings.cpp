@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "daemon/output/recorder.hpp"
+#include "daemon/set/check.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::output {
@@ -37,7 +38,7 @@ void Recorder::end_what_is_over(bool is_last, bool at_once) {
 void Recorder::end(Take& take) {
   const std::string name = take.writer->directory().filename().string();
   // What is said is put into words before it is counted: afterwards there may be no memory for it.
-  std::string said = name + " has " + std::to_string(take.writer->observer_frames()) + " frames";
+  std::string said = name + " has " + set::plural(take.writer->observer_frames(), "frame");
   try {
     if (!take.fault.empty()) throw Error(take.fault);
     if (!take.writer->is_sound()) throw Error("a part of it could not be written");

@@ -6,6 +6,7 @@
 #include <system_error>
 
 #include "daemon/output/take_list.hpp"
+#include "daemon/set/check.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/session.hpp"
 
@@ -42,7 +43,7 @@ void Salvage::salvage(const std::filesystem::path& take, std::vector<std::string
     if (frames) session::remove_dead_drafts(take);
     if (frames)
       salvaged.push_back(take.filename().string() + " was cut off; it has " +
-                         std::to_string(*frames) + " frames");
+                         set::plural(*frames, "frame"));
   } catch (const std::exception& error) {
     note_("an earlier take cannot be read: " + std::string(error.what()));
   }

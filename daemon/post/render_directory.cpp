@@ -17,6 +17,7 @@
 #include "daemon/output/sums_exr.hpp"
 #include "daemon/output/video.hpp"
 #include "daemon/post/render_files.hpp"
+#include "daemon/set/check.hpp"
 #include "drivers/error.hpp"
 #include "drivers/session/draft.hpp"
 #include "drivers/session/files.hpp"
@@ -356,8 +357,8 @@ std::filesystem::path RenderDirectory::write_video(const std::vector<FinishedFra
     video->write(picture, frame.timestamp_ns);
   }
   std::filesystem::path written = video->close();
-  out << written.string() << ": " << frames.size() << " pictures, " << codecs.front().description
-      << std::endl;
+  out << written.string() << ": " << set::plural(frames.size(), "picture") << ", "
+      << codecs.front().description << std::endl;
   if (clock_.timecode && !session::counts_frames(clock_))
     out << "  without timecode: the take's counts " << clock_.timecode->fps
         << " frames per second (recording.timecode_fps), and it has " << clock_.fps << std::endl;

@@ -12,6 +12,7 @@
 #include <utility>
 #include <variant>
 
+#include "daemon/set/check.hpp"
 #include "daemon/set/names.hpp"
 #include "daemon/set/problems.hpp"
 
@@ -270,7 +271,7 @@ Outcome Controls::apply(const set::ChangeSamples& effect) {
     const int* const at = std::lower_bound(std::begin(sample_steps), end, look_.samples);
     if (at != std::begin(sample_steps)) look_.samples = *(at - 1);
   }
-  return {fmt::format("{} samples", look_.samples), false, {}};
+  return {set::plural(std::uint64_t(look_.samples), "sample"), false, {}};
 }
 
 Outcome Controls::apply(const set::HoldRate&) {

@@ -19,6 +19,7 @@
 #include "daemon/rig/service.hpp"
 #include "daemon/rig/set_keeper.hpp"
 #include "daemon/set/actions.hpp"
+#include "daemon/set/check.hpp"
 #include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
 
@@ -296,8 +297,8 @@ class LiveRun {
     const bool holds_rate = set.quality.fps > 0;
     reports_({report::Severity::info, "",
               "live on " + device_words(*device_) + ", set \"" + set.name + "\", " +
-                  (holds_rate ? "at most " : "") + std::to_string(set.quality.samples) +
-                  " samples per frame" +
+                  (holds_rate ? "at most " : "") +
+                  set::plural(std::uint64_t(set.quality.samples), "sample") + " per frame" +
                   (holds_rate ? ", fewer where the rate would suffer (quality.fps)" : "")});
   }
 

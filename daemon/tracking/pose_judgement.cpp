@@ -344,8 +344,8 @@ std::string PoseJudgement::doubt_about_lost(const std::stop_token& stop) const {
   const auto& cause = is_focal ? focal : size;
   if (!cause || !(cause->rms_px < kAgreesPx)) return "";
   return fmt::format(
-      "tags disagree in {} of {} frames, and agree within {:.2f} px if {}", at_odds_, frames_,
-      cause->rms_px,
+      "tags disagree in {} of {}, and agree within {:.2f} px if {}", at_odds_,
+      set::plural(frames_, "frame"), cause->rms_px,
       is_focal ? focal_words(cause->value) : size_words(lost_, tracking_.family, cause->value));
 }
 

@@ -73,6 +73,7 @@ struct Paper::Impl {
         samples(the_samples),
         renderer(device, set.estimation, the_camera),
         identity(device, set.estimation, the_camera) {
+    pixels.surfaces = {{paper_name, glm::dvec3(paper_albedo)}};
     scene::Scene the_scene = scene::real_world(scene);
     scene::Material paper;
     paper.name = paper_name;
@@ -107,12 +108,13 @@ struct Paper::Impl {
   std::optional<glm::dvec2> pixel(const glm::dvec3& in_camera) const;
   std::optional<SeenTag> seen(const Printed& tag, const glm::dmat4& world_from_camera) const;
   std::optional<glm::dvec3> rendered(const SeenTag& tag, const ProbedShot& shot);
-  void add(const ProbedShot& shot, SurfacePixels& seen);
+  void add(const ProbedShot& shot);
 
   const ObserverCalibration camera;
   const set::LightSampling sampling;
   const int samples;
   std::vector<Printed> printed;
+  SurfacePixels pixels;
   render::Renderer renderer, identity;
 };
 
@@ -189,10 +191,10 @@ std::optional<glm::dvec3> Paper::Impl::rendered(const SeenTag& tag, const Probed
   return sum / double(count);
 }
 
-void Paper::Impl::add(const ProbedShot& shot, SurfacePixels& seen) {
+void Paper::Impl::add(const ProbedShot& shot) {
   std::vector<SeenTag> tags;
   for (const Printed& one : printed)
-    if (auto tag = this->seen(one, shot.world_from_camera)) tags.push_back(*std::move(tag));
+    if (auto tag = seen(one, shot.world_from_camera)) tags.push_back(*std::move(tag));
   std::ranges::sort(tags, std::greater(), &SeenTag::cell_px);
   tags.resize(std::min(tags.size(), most_tags));
 
@@ -200,9 +202,10 @@ void Paper::Impl::add(const ProbedShot& shot, SurfacePixels& seen) {
   const lighting::Response response(camera.response, plate.bits);
   const std::uint32_t clipped = response.clipping().from;
   for (const SeenTag& tag : tags) {
-    std::vector<SurfacePixel> pixels;
+    std::vector<SurfacePixel> white;
     SurfacePixel pixel;
-    for (const SurfacePixel& other : seen.pixels) pixel.tile = std::max(pixel.tile, other.tile + 1);
+    for (const SurfacePixel& other : pixels.pixels)
+      pixel.tile = std::max(pixel.tile, other.tile + 1);
     for (const glm::dvec2& at : tag.white) {
       const auto i = std::size_t(std::lround(at.y)) * std::size_t(plate.width) +
                      std::size_t(std::lround(at.x));
@@ -212,13 +215,13 @@ void Paper::Impl::add(const ProbedShot& shot, SurfacePixels& seen) {
         continue;
       for (int c = 0; c < 3; ++c) pixel.plate[c] = response.inverse()[sample[c]] / shot.exposure;
       pixel.px = at;
-      pixels.push_back(pixel);
+      white.push_back(pixel);
     }
-    if (pixels.size() < least_cells) continue;
+    if (white.size() < least_cells) continue;
     const auto radiance = rendered(tag, shot);
     if (!radiance) continue;
-    for (SurfacePixel& one : pixels) one.rendered = *radiance;
-    seen.pixels.insert(seen.pixels.end(), pixels.begin(), pixels.end());
+    for (SurfacePixel& one : white) one.rendered = *radiance;
+    pixels.pixels.insert(pixels.pixels.end(), white.begin(), white.end());
   }
 }
 
@@ -227,11 +230,12 @@ Paper::Paper(const set::Set& set, const ObserverCalibration& camera, const scene
     : impl_(std::make_unique<Impl>(set, camera, scene, device, samples)) {}
 Paper::~Paper() = default;
 
-SurfacePixels Paper::look_at(const std::vector<ProbedShot>& shots) {
-  SurfacePixels seen;
-  seen.surfaces = {{paper_name, glm::dvec3(paper_albedo)}};
-  for (const ProbedShot& shot : shots) impl_->add(shot, seen);
-  return seen;
+void Paper::look_at(const ProbedShot& shot) {
+  impl_->add(shot);
+}
+
+const SurfacePixels& Paper::seen() const {
+  return impl_->pixels;
 }
 
 }  // namespace previz::calibrate

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
 #include "daemon/calibrate/sensor/surface_pixels.hpp"
 #include "daemon/render/gpu.hpp"
@@ -24,8 +23,9 @@ class Paper {
         const std::shared_ptr<render::Device>& device, int samples);
   ~Paper();
 
-  // Returns the white pixels of all shots; each view of a tag is a tile of its own.
-  SurfacePixels look_at(const std::vector<ProbedShot>& shots);
+  void look_at(const ProbedShot& shot);
+  // The white pixels of all shots so far; each view of a tag is a tile of its own.
+  const SurfacePixels& seen() const;
 
  private:
   struct Impl;

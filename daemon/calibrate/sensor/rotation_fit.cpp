@@ -78,7 +78,6 @@ ShadingAt shading_of(const pipeline::Take& take, const scene::Scene& scene,
                      const std::shared_ptr<render::Device>& device, int frames, int width) {
   struct Turned {
     set::Set set;
-    std::vector<ProbedShot> shots;
     std::optional<SurfaceProbe> probe;
   };
   const auto turned = std::make_shared<Turned>();
@@ -86,14 +85,12 @@ ShadingAt shading_of(const pipeline::Take& take, const scene::Scene& scene,
   turned->set.lighting.mode = set::LightMode::image;
   turned->set.captured_lamps.clear();
   for (set::Light& light : turned->set.lights) light.captured = light.measured = false;
-  turned->shots = probed_shots(take, frames);
-  turned->probe.emplace(take, turned->shots, scene, device, ProbeSize{.width = width});
+  turned->probe.emplace(take, scene, device, ProbeSize{.width = width});
+  each_probed_shot(take, frames, [&](const ProbedShot& shot) { turned->probe->add(shot); });
   return [&take, &scene, turned](double rotation_rad, int samples) {
     turned->set.lighting.environment_rotation_rad =
         take.set.lighting.environment_rotation_rad + rotation_rad;
-    const pipeline::LightPtr light =
-        pipeline::LightStage(turned->set, take.light, take.observer).light();
-    for (ProbedShot& shot : turned->shots) shot.light = light;
+    turned->probe->light_by(pipeline::LightStage(turned->set, take.light, take.observer).light());
     return shading_off(turned->probe->compare(scene, samples));
   };
 }

@@ -121,7 +121,8 @@ std::uint32_t tile_of(const Plate& plate, std::uint32_t frame, int x, int y) {
 
 }  // namespace
 
-std::vector<ProbedShot> probed_shots(const pipeline::Take& take, int count) {
+void each_probed_shot(const pipeline::Take& take, int count,
+                      const std::function<void(ProbedShot)>& visit) {
   const std::size_t frames = take.observer_stream->records().size();
   const auto shares = std::size_t(count);
   std::size_t share = 0;
@@ -132,19 +133,19 @@ std::vector<ProbedShot> probed_shots(const pipeline::Take& take, int count) {
   options.lighting = lit_by_image(take.set.lighting);
   options.whole_light = true;
   options.from_start = false;
-  std::vector<ProbedShot> shots;
+  bool found = false;
   for (pipeline::Shot& shot : pipeline::TakeShots(take, options)) {
     if (!shot.track.pose) continue;
     do ++share;
     while (share < shares && share * frames / shares <= shot.index);
     if (!shot.light) continue;
-    shots.push_back({plate_of(shot), take.set.observer.exposure.value_or(shot.frame->exposure),
-                     shot.track.pose->world_from_camera, shot.light});
+    found = true;
+    visit({plate_of(shot), take.set.observer.exposure.value_or(shot.frame->exposure),
+           shot.track.pose->world_from_camera, shot.light});
   }
-  if (shots.empty())
+  if (!found)
     throw Error(take.session.directory.string() +
                 ": no frame has both a pose and light: nothing to balance");
-  return shots;
 }
 
 void relight(std::vector<ProbedShot>& shots, const glm::dvec3& factors) {
@@ -160,27 +161,38 @@ void relight(std::vector<ProbedShot>& shots, const glm::dvec3& factors) {
   }
 }
 
-SurfaceProbe::SurfaceProbe(const pipeline::Take& take, const std::vector<ProbedShot>& shots,
-                           const scene::Scene& scene, const std::shared_ptr<render::Device>& device,
-                           const ProbeSize& size, PixelSamplesDone done)
+SurfaceProbe::SurfaceProbe(const pipeline::Take& take, const scene::Scene& scene,
+                           const std::shared_ptr<render::Device>& device, const ProbeSize& size,
+                           PixelSamplesDone done)
     : take_(take),
-      shots_(shots),
       scale_(std::min(1.0, double(size.width) / take.observer.intrinsics.width)),
       small_(pipeline::scaled(take.observer, scale_)),
-      device_(device),
+      identity_samples_(size.identity_samples),
       done_(std::move(done)),
+      identity_(device, paired(take.set), small_),
       worlds_(device, paired(take.set), small_) {
-  for (const ProbedShot& shot : shots_) {
-    const lighting::Response response(take_.observer.response, shot.plate->bits);
-    plates_.push_back(
-        std::make_shared<const Plate>(pipeline::scaled(*shot.plate, scale_, response)));
-  }
-  find_pixels(scene::real_world(scene), size.identity_samples);
+  const scene::Scene real = scene::real_world(scene);
+  seen_.surfaces = surfaces_of(real);
+  identity_.set_scene(glowing(real, seen_.surfaces));
+  identity_.set_environment(darkness(), set::LightSampling::bsdf);
 }
 
-void SurfaceProbe::render(render::Renderer& renderer, std::size_t shot, int samples) {
-  renderer.begin({plates_[shot], shots_[shot].exposure, shots_[shot].world_from_camera});
-  const double pixels = double(plates_[shot]->width) * plates_[shot]->height;
+void SurfaceProbe::add(const ProbedShot& shot) {
+  const lighting::Response response(take_.observer.response, shot.plate->bits);
+  ProbedShot small = shot;
+  small.plate = std::make_shared<const Plate>(pipeline::scaled(*shot.plate, scale_, response));
+  render(identity_, small, identity_samples_);
+  add_pixels(*shot.plate, small, identity_.layers().real);
+  shots_.push_back(std::move(small));
+}
+
+void SurfaceProbe::light_by(const pipeline::LightPtr& light) {
+  for (ProbedShot& shot : shots_) shot.light = light;
+}
+
+void SurfaceProbe::render(render::Renderer& renderer, const ProbedShot& shot, int samples) {
+  renderer.begin({shot.plate, shot.exposure, shot.world_from_camera});
+  const double pixels = double(shot.plate->width) * shot.plate->height;
   const int piece = std::max(1, int(pixel_samples_a_piece / pixels));
   for (int at = 0; at < samples; at += piece) {
     const int count = std::min(piece, samples - at);
@@ -191,27 +203,16 @@ void SurfaceProbe::render(render::Renderer& renderer, std::size_t shot, int samp
   }
 }
 
-void SurfaceProbe::find_pixels(const scene::Scene& real, int samples) {
-  seen_.surfaces = surfaces_of(real);
-  render::Renderer identity(device_, paired(take_.set), small_);
-  identity.set_scene(glowing(real, seen_.surfaces));
-  identity.set_environment(darkness(), set::LightSampling::bsdf);
-  for (std::size_t i = 0; i < shots_.size(); ++i) {
-    render(identity, i, samples);
-    add_pixels(shots_[i], *plates_[i], identity.layers().real);
-  }
-}
-
-void SurfaceProbe::add_pixels(const ProbedShot& shot, const Plate& plate,
+void SurfaceProbe::add_pixels(const Plate& full, const ProbedShot& small,
                               const std::vector<glm::vec3>& identity) {
-  const lighting::Response response(take_.observer.response, shot.plate->bits);
-  const std::vector<bool> blind = blinded(*shot.plate, plate.width, plate.height);
+  const Plate& plate = *small.plate;
+  const lighting::Response response(take_.observer.response, plate.bits);
+  const std::vector<bool> blind = blinded(full, plate.width, plate.height);
   const auto at = [&](int x, int y) {
     return std::size_t(y) * std::size_t(plate.width) + std::size_t(x);
   };
   const auto frame = static_cast<std::uint32_t>(seen_.world_from_cameras.size());
-  const glm::dvec2 pixel_size(double(shot.plate->width) / plate.width,
-                              double(shot.plate->height) / plate.height);
+  const glm::dvec2 pixel_size(double(full.width) / plate.width, double(full.height) / plate.height);
   for (int y = 1; y + 1 < plate.height; ++y)
     for (int x = 1; x + 1 < plate.width; ++x) {
       const std::uint32_t surface = surface_of(identity[at(x, y)]);
@@ -228,11 +229,11 @@ void SurfaceProbe::add_pixels(const ProbedShot& shot, const Plate& plate,
                          .px = (glm::dvec2(x, y) + 0.5) * pixel_size - 0.5};
       for (int c = 0; c < 3; ++c)
         pixel.plate[c] =
-            response.inverse()[plate.samples[3 * at(x, y) + std::size_t(c)]] / shot.exposure;
+            response.inverse()[plate.samples[3 * at(x, y) + std::size_t(c)]] / small.exposure;
       seen_.pixels.push_back(pixel);
       places_.push_back(at(x, y));
     }
-  seen_.world_from_cameras.push_back(shot.world_from_camera);
+  seen_.world_from_cameras.push_back(small.world_from_camera);
 }
 
 SurfacePixels SurfaceProbe::compare(const scene::Scene& scene, int samples) {
@@ -243,7 +244,7 @@ SurfacePixels SurfaceProbe::compare(const scene::Scene& scene, int samples) {
   std::size_t next = 0;
   for (std::size_t i = 0; i < shots_.size(); ++i) {
     worlds_.set_environment(shots_[i].light->lighting.environment, take_.set.lighting.sampling);
-    render(worlds_, i, samples);
+    render(worlds_, shots_[i], samples);
     const std::vector<glm::vec3> rendered = worlds_.layers().real;
     for (; next < places_.size() && seen.pixels[next].frame == i; ++next)
       seen.pixels[next].rendered = glm::dvec3(rendered[places_[next]]);

@@ -53,9 +53,10 @@ struct ProbedShot {
   pipeline::LightPtr light;
 };
 
-// Returns the first frame with a pose and light of each of `count` equal shares of the take. Throws
-// previz::Error if there is none.
-std::vector<ProbedShot> probed_shots(const pipeline::Take& take, int count);
+// Visits the first frame with a pose and light of each of `count` equal shares of the take, and
+// holds no plate beyond its visit. Throws previz::Error if there is none.
+void each_probed_shot(const pipeline::Take& take, int count,
+                      const std::function<void(ProbedShot)>& visit);
 
 // Multiplies the light around the set by a factor for each channel.
 void relight(std::vector<ProbedShot>& shots, const glm::dvec3& factors);
@@ -79,28 +80,31 @@ using PixelSamplesDone = std::function<void(double)>;
 // surface.
 class SurfaceProbe {
  public:
-  // `take` and `shots` must outlive this.
-  SurfaceProbe(const pipeline::Take& take, const std::vector<ProbedShot>& shots,
-               const scene::Scene& scene, const std::shared_ptr<render::Device>& device,
-               const ProbeSize& size, PixelSamplesDone done = {});
+  // `take` must outlive this.
+  SurfaceProbe(const pipeline::Take& take, const scene::Scene& scene,
+               const std::shared_ptr<render::Device>& device, const ProbeSize& size,
+               PixelSamplesDone done = {});
 
-  // The scene is the constructor's, but for the colours of its diffuse materials.
+  // Finds the surfaces in a further shot, whose plate is not kept.
+  void add(const ProbedShot& shot);
+  // Puts another light in the place of the shots' own.
+  void light_by(const pipeline::LightPtr& light);
+  // Compares all shots. The scene is the constructor's, but for the colours of its diffuse
+  // materials.
   SurfacePixels compare(const scene::Scene& scene, int samples);
 
  private:
-  void find_pixels(const scene::Scene& real, int samples);
-  void add_pixels(const ProbedShot& shot, const Plate& plate,
+  void add_pixels(const Plate& full, const ProbedShot& small,
                   const std::vector<glm::vec3>& identity);
-  void render(render::Renderer& renderer, std::size_t shot, int samples);
+  void render(render::Renderer& renderer, const ProbedShot& shot, int samples);
 
   const pipeline::Take& take_;
-  const std::vector<ProbedShot>& shots_;
   const double scale_;
   const ObserverCalibration small_;
-  const std::shared_ptr<render::Device> device_;
+  const int identity_samples_;
   const PixelSamplesDone done_;
-  std::vector<PlatePtr> plates_;  // of each shot, scaled
-  render::Renderer worlds_;
+  std::vector<ProbedShot> shots_;  // their plates are scaled
+  render::Renderer identity_, worlds_;
   SurfacePixels seen_;               // as yet without what is rendered
   std::vector<std::size_t> places_;  // of its pixels in their rendered pictures
 };

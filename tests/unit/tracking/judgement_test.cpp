@@ -245,7 +245,7 @@ TEST(PoseJudgement, NamesASizeByTheOuterEdge) {
     for (set::Tag& tag : seen.tags) tag.size_m *= share;
     const auto doubts = doubts_about(believed, seen, 1);
     ASSERT_EQ(doubts.size(), 1u) << family;
-    EXPECT_THAT(doubts[0], HasSubstr("tags disagree in 1 of 1 frames"));
+    EXPECT_THAT(doubts[0], HasSubstr("tags disagree in 1 of 1 frame,"));
     EXPECT_THAT(doubts[0], HasSubstr("tag 0: " + fmt::format("{:.2g}", 0.08 * share))) << doubts[0];
     EXPECT_THAT(doubts[0], HasSubstr("size_m is the side of the inner square")) << doubts[0];
   }

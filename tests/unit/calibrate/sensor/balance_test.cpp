@@ -129,12 +129,23 @@ class TruthBalance : public testing::Test {
     pipeline::Take take = pipeline::open_take(session, set_file);
     if (!device_) device_ = render::open_device();
     const scene::Scene scene = scene::load_scene(take.set);
-    const std::vector<ProbedShot> shots = probed_shots(take, 1);
-    paper_ = Paper(take.set, take.observer, scene, device_, 32).look_at(shots);
-    return SurfaceProbe(take, shots, scene, device_, {.width = 80}).compare(scene, 16);
+    SurfaceProbe surfaces(take, scene, device_, {.width = 80});
+    Paper paper(take.set, take.observer, scene, device_, 32);
+    each_probed_shot(take, frames_, [&](const ProbedShot& shot) {
+      surfaces.add(shot);
+      paper.look_at(shot);
+      plates_.emplace_back(shot.plate);
+      held_.push_back(
+          std::ranges::count_if(plates_, [](const auto& plate) { return !plate.expired(); }));
+    });
+    paper_ = paper.seen();
+    return surfaces.compare(scene, 16);
   }
 
-  SurfacePixels paper_;  // of the last probe
+  SurfacePixels paper_;                             // of the last probe
+  std::vector<std::weak_ptr<const Plate>> plates_;  // of all probes
+  std::vector<std::ptrdiff_t> held_;                // of them, at each visit
+  int frames_ = 1;
   test::TemporaryDirectory directory_;
   std::shared_ptr<render::Device> device_;
   int takes_ = 0;
@@ -147,6 +158,15 @@ void print(const SurfacePixels& seen, const Balance& balance) {
                 surface.ratio.b, surface.sigma.g, surface.pixels);
   std::printf("balance %.4f %.4f %.4f +- %.4f %.4f %.4f\n", balance.scale.r, balance.scale.g,
               balance.scale.b, balance.sigma.r, balance.sigma.g, balance.sigma.b);
+}
+
+// A hundred plates of 4K would take 5 GB.
+TEST_F(TruthBalance, HoldsNoPlateBeyondItsComparison) {
+  frames_ = 2;
+  const SurfacePixels seen = probe(1);
+  EXPECT_EQ(plates_.size(), seen.world_from_cameras.size());
+  EXPECT_GT(plates_.size(), 1u);
+  EXPECT_LE(std::ranges::max(held_), 1);
 }
 
 TEST_F(TruthBalance, CamerasOfOneScaleAreFoundToBe) {
