@@ -142,7 +142,12 @@ void ColourComparison::worked(double pixel_samples) {
 }
 
 void ColourComparison::fit_to_paper(const scene::Scene& scene) {
-  calibrate::Paper paper(take_.set, take_.observer, scene, device_, paper_samples);
+  // What the set has already may take light from the tags that the new model does not take.
+  const bool has_phantom = std::ranges::find(take_.set.objects, set::Presence::phantom,
+                                             &set::Object::presence) != take_.set.objects.end();
+  calibrate::Paper paper(take_.set, take_.observer,
+                         has_phantom ? scene::load_scene(take_.set) : scene, device_,
+                         paper_samples);
   for (const calibrate::ProbedShot& shot : shots_) paper.look_at(shot);
   if (paper.seen().pixels.empty()) return;
   const calibrate::Balance balance = calibrate::fit_balance(paper.seen(), {});
