@@ -29,7 +29,11 @@ void calibrate_rotation(const LightOptions& options, std::ostream& out) {
         "is its [light_camera.pose], which --tags SET finds");
   const scene::Scene scene = scene::load_scene(take.set);
   const auto device = render::open_device(render::options_for({}, take.set.quality.hardware_rays));
-  const RotationFit fit = fit_rotation(shading_of(take, scene, device, frames, width));
+  const ShadingAt shading = shading_of(take, scene, device, frames, width);
+  const RotationFit fit = fit_rotation([&](double rotation_rad, int samples) {
+    out << fmt::format("trying {:+.0f} degrees", rotation_rad / degree) << std::endl;
+    return shading(rotation_rad, samples);
+  });
   const double rotation = std::remainder(
       take.set.lighting.environment_rotation_rad + fit.rotation_rad, 2 * std::numbers::pi);
   fmt::print(

@@ -204,12 +204,19 @@ void abandon_drafts() {
   OwnDrafts& own = own_drafts();
   if (!own.placing.try_lock_for(patience)) return;  // never unlocked
   const std::lock_guard lock(own.mutex);
-  for (const fs::path& draft : own.paths)
-    for (int tries = 0; tries < 10; ++tries) {  // other threads may still write into a folder
-      std::error_code failure;
-      fs::remove_all(draft, failure);
+  for (const fs::path& draft : own.paths) {
+    // Other threads may still write into a folder, but not by its name once it has another.
+    std::string name = draft.string();
+    char& digit = name.at(name.rfind('.') - 1);
+    digit = digit == '0' ? '1' : '0';
+    std::error_code failure;
+    fs::rename(draft, name, failure);
+    if (failure) name = draft.string();
+    for (int tries = 0; tries < 10; ++tries) {
+      fs::remove_all(name, failure);
       if (!failure) break;
     }
+  }
 }
 
 void replace_file(const std::filesystem::path& file, const std::string& content) {
