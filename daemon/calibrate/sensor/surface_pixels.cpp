@@ -254,12 +254,12 @@ SurfacePixels SurfaceProbe::compare(const scene::Scene& scene, int samples) {
 
 void append(const SurfacePixels& more, SurfacePixels& to) {
   const auto surfaces = std::uint32_t(to.surfaces.size());
-  std::uint32_t tiles = 0;
-  for (const SurfacePixel& pixel : to.pixels) tiles = std::max(tiles, pixel.tile + 1);
+  std::uint32_t free_tile = 0;
+  for (const SurfacePixel& pixel : to.pixels) free_tile = std::max(free_tile, pixel.tile + 1);
   to.surfaces.insert(to.surfaces.end(), more.surfaces.begin(), more.surfaces.end());
   for (SurfacePixel pixel : more.pixels) {
     pixel.surface += surfaces;
-    pixel.tile += tiles;
+    pixel.tile += free_tile;
     to.pixels.push_back(pixel);
   }
 }
