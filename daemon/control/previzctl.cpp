@@ -149,7 +149,7 @@ Properties print_status(bool is_raw) {
                                  "org.freedesktop.DBus.Properties", "GetAll", error.out(), &reply,
                                  "s", control::interface_name));
   const MessagePtr owned(reply);
-  const Properties properties = read_properties(reply);
+  Properties properties = read_properties(reply);
   for (const std::string& line : lines_of(properties, is_raw)) std::cout << line << "\n";
   std::cout << std::flush;
   return properties;
