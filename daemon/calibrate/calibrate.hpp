@@ -27,7 +27,8 @@ struct LightOptions : LensOptions {
   // The set file whose tags the light camera sees; the camera's pose is found from them. Without
   // `board` the lens is the set's, or else the session's.
   std::optional<std::filesystem::path> tags_set;
-  // Of lighting.environment in place of all that, by the set file, or else by the session's own.
+  // The rotation of lighting.environment is wanted in place of all that; the set is the set file's,
+  // or else the session's own.
   bool rotation = false;
 };
 

@@ -30,11 +30,11 @@ class TrackStage {
              const std::vector<session::TrackRecord>& recorded, std::int64_t start_ns,
              std::int64_t lap_ns = 0, tracking::Search search = tracking::Search::whole);
 
-  // Of a take. Tags are left out for the camera that other tags say have moved, in frames spread
+  // Tracks a take. Tags are left out that other tags say have moved, as judged in frames spread
   // over all of it, so that a picture is the same whichever part of the take is looked at.
   explicit TrackStage(const Take& take);
 
-  // As tracking::Tracker::leave_out().
+  // Uses these tags for no pose (tracking::Tracker::leave_out()).
   void leave_out(const std::set<int>& tags) { tracker_->leave_out(tags); }
 
   // Fills shot.track, shot.motion and shot.scene, and shot.recorded_light from the recorded track.

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "drivers/calibration.hpp"
+
 namespace previz::render {
 
 // A picture is shown in bands of about this many pixels (daemon/render/presenter.hpp).
@@ -26,6 +28,9 @@ std::uint64_t picture_bytes(int width, int height, bool read_back);
 // Throws previz::Error, with the picture's size, the memory it takes and the memory there is, if
 // the picture does not fit or has no pixel.
 void refuse_too_large(int width, int height, const PictureMemory& memory);
+inline void refuse_too_large(const PinholeIntrinsics& picture, const PictureMemory& memory) {
+  refuse_too_large(picture.width, picture.height, memory);
+}
 
 // Returns how many bytes of the device's memory a picture's history takes
 // (daemon/render/history.hpp), where meshes deform.

@@ -26,13 +26,6 @@
 #include "drivers/error.hpp"
 
 namespace previz::render {
-namespace {
-
-void check_size(const Device& device, const PinholeIntrinsics& picture) {
-  refuse_too_large(picture.width, picture.height, memory_of(device));
-}
-
-}  // namespace
 
 struct Renderer::Impl {
   Impl(std::shared_ptr<Device> the_device, const set::Estimation& the_estimation,
@@ -223,7 +216,7 @@ void Renderer::Impl::add_view() {
 
 Renderer::Renderer(std::shared_ptr<Device> device, const set::Estimation& estimation,
                    const ObserverCalibration& calibration) {
-  check_size(*device, calibration.intrinsics);
+  refuse_too_large(calibration.intrinsics, memory_of(*device));
   impl_ = std::make_unique<Impl>(std::move(device), estimation, calibration);
 }
 Renderer::~Renderer() = default;
@@ -238,7 +231,7 @@ void Renderer::set_scene(const scene::Scene& scene) {
 
 void Renderer::begin_set(const set::Estimation& estimation,
                          const ObserverCalibration& calibration) {
-  check_size(*impl_->device, calibration.intrinsics);
+  refuse_too_large(calibration.intrinsics, memory_of(*impl_->device));
   Impl& r = *impl_;
   const PinholeIntrinsics &before = r.calibration.intrinsics, &now = calibration.intrinsics;
   const bool has_room = r.wavefront && before.width == now.width && before.height == now.height &&
@@ -287,7 +280,7 @@ void Renderer::use(set::Estimator estimator) {
 }
 
 void Renderer::resize(const ObserverCalibration& calibration) {
-  check_size(*impl_->device, calibration.intrinsics);
+  refuse_too_large(calibration.intrinsics, memory_of(*impl_->device));
   impl_->calibration = calibration;
   impl_->wavefront->resize(calibration.intrinsics.width, calibration.intrinsics.height);
   impl_->upload_rays();

@@ -63,7 +63,7 @@ struct Outcome {
   std::optional<session::MarkEvent> mark = {};  // for the running take
 };
 
-// What is known of the take that is recorded, or was last.
+// The take that is recorded, or was last, as far as it is known.
 struct LastTake {
   std::string name;            // empty: none yet
   bool is_ending = false;      // recording has ended, and it is not whole on the disk yet

@@ -75,7 +75,8 @@ class Rig {
   // Call both on the loop's thread. `by` names who asks, for the log and the take: "button red".
   Outcome perform(const set::Action& action, const std::string& by);
   Outcome wish(Event event, const std::string& by);
-  // As perform(); what became of a snapshot is answered once it is known, on the loop's thread.
+  // Does what perform() does; what became of a snapshot is answered once it is known, on the loop's
+  // thread.
   using Answered = std::function<void(const Outcome&)>;
   void perform(const set::Action& action, const std::string& by, Answered answered);
 

@@ -18,6 +18,7 @@
 #include "daemon/tracking/tag_family.hpp"
 #include "daemon/tracking/tag_map.hpp"
 #include "drivers/error.hpp"
+#include "drivers/median.hpp"
 
 namespace previz::tracking {
 namespace {
@@ -257,12 +258,6 @@ std::string cause_words(const Frames& frames, const PinholeIntrinsics& lens,
                       : text;
 }
 
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 }  // namespace
 
 PoseJudgement::PoseJudgement(const set::Tracking& tracking, const ObserverCalibration& camera)
@@ -332,7 +327,7 @@ std::string PoseJudgement::doubt_about_residuals(const std::stop_token& stop) co
   return fmt::format(
       "corners of {} of {} tracked frames are off by {:.2f} px where {:.2f} px is to be expected "
       "(medians): {}",
-      doubtful_, tracked_, median_of(rms_px_), median_of(expected_px_),
+      doubtful_, tracked_, median(rms_px_), median(expected_px_),
       cause_words(worst_, camera_.intrinsics, tracking_.family, stop));
 }
 

@@ -71,8 +71,8 @@ struct Paper::Impl {
       : camera(the_camera),
         sampling(set.lighting.sampling),
         samples(the_samples),
-        renderer(device, set.estimation, the_camera),
-        identity(device, set.estimation, the_camera) {
+        renderer(device, paired(set), the_camera),
+        identity(device, paired(set), the_camera) {
     pixels.surfaces = {{paper_name, glm::dvec3(paper_albedo)}};
     scene::Scene the_scene = scene::real_world(scene);
     scene::Material paper;
@@ -99,10 +99,7 @@ struct Paper::Impl {
     }
     the_scene.lights.clear();
     identity.set_scene(the_scene);
-    lighting::EnvironmentMap dark;
-    dark.size = 1;
-    dark.radiance = {glm::vec3(0)};
-    identity.set_environment(dark, set::LightSampling::bsdf);
+    identity.set_environment(darkness(), set::LightSampling::bsdf);
   }
 
   std::optional<glm::dvec2> pixel(const glm::dvec3& in_camera) const;

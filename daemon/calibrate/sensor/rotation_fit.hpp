@@ -21,7 +21,7 @@ struct RotationFit {
   double sigma_rad = 0;
   double off = 0;           // root of the mean square there
   double off_unturned = 0;  // where the environment is not turned
-  // That of the best rotation at least 45 degrees away, over `off`: near 1, two rotations fit
+  // The root of the best rotation at least 45 degrees away, over `off`: near 1, two rotations fit
   // alike, or no shadow tells them apart.
   double second = 1;
   bool is_certain() const { return second > 1.1; }

@@ -65,13 +65,6 @@ scene::Scene glowing(scene::Scene scene, const std::vector<KnownSurface>& surfac
   return scene;
 }
 
-lighting::EnvironmentMap darkness() {
-  lighting::EnvironmentMap map;
-  map.size = 1;
-  map.radiance = {glm::vec3(0)};
-  return map;
-}
-
 // Returns the number of the one surface that all samples of a pixel met, or no_surface.
 std::uint32_t surface_of(const glm::vec3& mean) {
   constexpr float rounding = 1e-3f;
@@ -106,20 +99,26 @@ set::Lighting lit_by_image(set::Lighting lighting) {
   return lighting;
 }
 
-// Both worlds are the same, so that one estimate is of both.
-set::Estimation paired(const set::Set& set) {
-  set::Estimation estimation = set.estimation;
-  estimation.estimator = set::Estimator::paired;
-  estimation.composite = set::Composite::additive;
-  return estimation;
-}
-
 std::uint32_t tile_of(const Plate& plate, std::uint32_t frame, int x, int y) {
   const int column = x * tiles_a_side / plate.width, row = y * tiles_a_side / plate.height;
   return (frame * tiles_a_side + std::uint32_t(row)) * tiles_a_side + std::uint32_t(column);
 }
 
 }  // namespace
+
+lighting::EnvironmentMap darkness() {
+  lighting::EnvironmentMap map;
+  map.size = 1;
+  map.radiance = {glm::vec3(0)};
+  return map;
+}
+
+set::Estimation paired(const set::Set& set) {
+  set::Estimation estimation = set.estimation;
+  estimation.estimator = set::Estimator::paired;
+  estimation.composite = set::Composite::additive;
+  return estimation;
+}
 
 void each_probed_shot(const pipeline::Take& take, int count,
                       const std::function<void(ProbedShot)>& visit) {

@@ -58,6 +58,10 @@ struct ProbedShot {
 void each_probed_shot(const pipeline::Take& take, int count,
                       const std::function<void(ProbedShot)>& visit);
 
+// Returns the set's estimation by which the real world is rendered whole, and no light at all.
+set::Estimation paired(const set::Set& set);
+lighting::EnvironmentMap darkness();
+
 // Multiplies the light around the set by a factor for each channel.
 void relight(std::vector<ProbedShot>& shots, const glm::dvec3& factors);
 

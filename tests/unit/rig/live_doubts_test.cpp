@@ -71,6 +71,7 @@ TEST_F(LiveDoubtsTest, SaysNothingOfWhatIsRightOrOfFewFrames) {
   for (int i = 0; i < 3; ++i) add_frames(doubts, right);
   doubts.forget();
   add_frames(doubts, wrong, LiveDoubts::frames_judged - 1);
+  // Five times as long as until the next judgement, which must find nothing to say.
   std::this_thread::sleep_for(50ms);
   doubts.forget();
   add_frames(doubts, right);

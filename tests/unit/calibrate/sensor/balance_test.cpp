@@ -116,12 +116,14 @@ TEST(BalanceTables, AreWhatASetFileTakes) {
 // more in its set file.
 class TruthBalance : public testing::Test {
  protected:
-  SurfacePixels probe(double light_factor, const std::string& more = "") {
+  SurfacePixels probe(double light_factor, const std::string& more = "",
+                      const std::vector<std::string>& estimator = {}) {
     truth::TruthSet set =
         truth::load_truth_set(fs::path(PREVIZ_SOURCE_DIR) / "tests/truth/data/glass");
     for (truth::LightFrame& frame : set.light_frames) frame.exposure *= light_factor;
     truth::TakeOptions options;
     options.light = truth::LightFrom::captured;
+    options.estimator = estimator;
     const fs::path session = directory_ / ("take" + std::to_string(takes_++));
     truth::write_take(set, options, session);
     const fs::path set_file = session / "changed.toml";
@@ -227,6 +229,14 @@ TEST_F(TruthBalance, ThePaperOfTagsIsAGreyCard) {
     EXPECT_EQ(surface.reference, seen.surfaces[surface.surface].material == paper_name);
   const Balance by_red = fit_balance(seen, {"red"});
   EXPECT_GT(std::abs(std::log(by_red.scale.g / 2)), 0.5) << "a named reference goes before paper";
+}
+
+// A set that traces differences alone has the same paper.
+TEST_F(TruthBalance, ThePaperIsRenderedWholeByEitherEstimator) {
+  probe(1, "", {"kind = \"difference\""});
+  ASSERT_FALSE(paper_.pixels.empty());
+  const Balance balance = fit_balance(paper_, {});
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(balance.scale[c], 1, 0.04);
 }
 
 // An environment that is turned, by the shadows of the set's cubes, whose colours are guessed, at a
