@@ -7,6 +7,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
 
+#include "shaders/lib/dither.glsl"
 #include "shaders/lib/show.glsl"
 
 layout(scalar) readonly buffer Composites { vec4 composites[]; };  // as composite.comp writes them
@@ -15,20 +16,11 @@ layout(scalar) readonly buffer Uncovered { vec4 uncovered[]; };
 layout(scalar) readonly buffer Reals { vec4 reals[]; };
 layout(scalar) readonly buffer Highlights { uint highlights[]; };
 layout(scalar) readonly buffer Caustics { vec4 caustics[]; };    // what the signals are without
-// DITHER_SIDE^2 thresholds between 0 and 1, of blue noise (daemon/render/blue_noise.hpp).
-layout(scalar) readonly buffer Thresholds { float thresholds[]; };
 layout(scalar) buffer Control { GpuControl control; };
 layout(scalar) writeonly buffer Picture { uint picture[]; };     // samples, as the plate's
-
-// Returns the code below or above `signal`, so that the mean over the pattern's pixels is the signal
-// itself. Each channel has the pattern at another place, so that they are not raised together.
-uint dithered_code_of(float signal, uvec2 at, uint channel) {
-  const uint code = code_of(signal, show.most, false);
-  if (code == show.most || !(signal > 0.0)) return code;
-  const float share = (signal - signal_of[code]) / (signal_of[code + 1u] - signal_of[code]);
-  const uvec2 in_pattern = (at + channel * uvec2(23u, 41u)) % DITHER_SIDE;
-  return share > thresholds[in_pattern.y * DITHER_SIDE + in_pattern.x] ? code + 1u : code;
-}
+// Of the picture: the signal that is added to what is left of the plate, and the mask. In place of the
+// picture, with show.is_enlarged.
+layout(scalar) writeonly buffer Additions { vec4 additions[]; };
 
 // Returns the composite without noise. A channel that was white stays as it was where it is a
 // highlight, or comes out above NEARLY_WHITE and was not cut by the denoiser.
@@ -42,33 +34,53 @@ vec3 without_noise(vec3 composite, vec3 clean, uint highlight) {
   return composite;
 }
 
+// Returns the radiance of a pixel that something virtual touches.
+vec3 radiance_of_pixel(uint index) {
+  const vec4 shown = composites[index];
+  if (show.is_denoised == 0u) return shown.rgb;
+  const Estimate estimate = Estimate(show.white * signals[index].rgb, shown.w,
+                                     show.white * uncovered[index].rgb, show.white * reals[index].rgb);
+  return without_noise(shown.rgb, compose(measured_at(index), estimate), highlights[index]);
+}
+
+bool is_untouched(uint index) {
+  const vec3 rest = show.has_caustics != 0u ? caustics[index].rgb : vec3(0.0);
+  return show.has_plate != 0u && composites[index].w == 0.0 && signals[index].rgb == vec3(0.0) &&
+         rest == vec3(0.0);
+}
+
+vec3 counted(vec3 radiance) {
+  if (any(lessThan(radiance, vec3(0.0)))) atomicAdd(control.below_zero, 1u);
+  return radiance;
+}
+
 uvec3 codes_of(uint pixel) {
   const uint index = show.in_band + pixel;
-  const vec4 shown = composites[index];
-  const float mask = shown.w;
-  const vec3 signal = signals[index].rgb;
-  const vec3 rest = show.has_caustics != 0u ? caustics[index].rgb : vec3(0.0);
-  if (show.has_plate != 0u && mask == 0.0 && signal == vec3(0.0) && rest == vec3(0.0))
-    return plate_codes(show.in_picture + index);
-  vec3 radiance = shown.rgb;
-  if (show.is_denoised != 0u) {
-    const Estimate estimate = Estimate(show.white * signal, mask, show.white * uncovered[index].rgb,
-                                       show.white * reals[index].rgb);
-    radiance = without_noise(radiance, compose(measured_at(index), estimate), highlights[index]);
-  }
-  if (any(lessThan(radiance, vec3(0.0)))) atomicAdd(control.below_zero, 1u);
-  const vec3 exposed = show.exposure * radiance;
-  if (show.is_dithered == 0u)
-    return uvec3(code_of(exposed.r, show.most, true), code_of(exposed.g, show.most, true), code_of(exposed.b, show.most, true));
   const uint in_picture = show.in_picture + index;
+  if (is_untouched(index)) return plate_codes(in_picture);
   const uvec2 at = uvec2(in_picture % show.width, in_picture / show.width);
-  return uvec3(dithered_code_of(exposed.r, at, 0u), dithered_code_of(exposed.g, at, 1u),
-               dithered_code_of(exposed.b, at, 2u));
+  return shown_codes_of(show.exposure * counted(radiance_of_pixel(index)), show.most, at,
+                        show.is_dithered != 0u);
+}
+
+void add(uint pixel) {
+  const uint index = show.in_band + pixel;
+  const uint in_picture = show.in_picture + index;
+  const float mask = composites[index].w;
+  vec3 radiance = vec3(0.0);
+  if (!is_untouched(index))
+    radiance = counted(radiance_of_pixel(index)) - (1.0 - mask) * radiance_of(plate_codes(in_picture));
+  additions[in_picture] = vec4(show.exposure * radiance, mask);
 }
 
 void main() {
   const uint first = 2u * gl_GlobalInvocationID.x;
   if (first >= show.count) return;
+  if (show.is_enlarged != 0u) {
+    add(first);
+    if (first + 1u < show.count) add(first + 1u);
+    return;
+  }
   const uvec3 a = codes_of(first);
   const uvec3 b = first + 1u < show.count ? codes_of(first + 1u) : uvec3(0u);
   const uint word = 3u * gl_GlobalInvocationID.x;

@@ -1,5 +1,4 @@
-// Scales the observer's calibration and plates to the size that a preview renders and shows
-// (quality.scale).
+// Scales the observer's calibration and plates to the size that a preview renders (quality.scale).
 #pragma once
 
 #include "daemon/lighting/response.hpp"

@@ -209,7 +209,8 @@ bool RenderStage::begin(Shot& shot, bool is_live) {
                     .stands_aside = is_live && set_.quality.accumulate,
                     .dithers = is_shown_live,
                     .camera = camera_frame(shot),
-                    .is_scaled = is_scaled});
+                    .is_scaled = is_scaled,
+                    .is_shown_whole = is_scaled && options_.is_live});
   return true;
 }
 
@@ -304,9 +305,9 @@ std::optional<std::string> RenderStage::why_other_size(const Frame& frame) const
          std::to_string(lens.width) + "x" + std::to_string(lens.height);
 }
 
-// Returns the shot's plate at the size that shots get.
+// Returns the shot's plate at the size that pictures get.
 PlatePtr RenderStage::sized(Shot& shot) const {
-  if (options_.scale == 1) return plate_of(shot);
+  if (options_.scale == 1 || options_.is_live) return plate_of(shot);
   if (const std::optional<std::string> why = why_other_size(*shot.frame)) throw Error(*why);
   return std::make_shared<const Plate>(scaled(*plate_of(shot), options_.scale, *response_));
 }

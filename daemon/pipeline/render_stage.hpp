@@ -31,7 +31,10 @@ struct RenderStageOptions {
   // Every shot has random numbers of its own, by the set's seed and its index in the take, so that
   // it can be averaged with its neighbours (keep()); otherwise all have the same.
   bool seeds_shots = false;
-  double scale = 1;  // size of everything a shot gets, over the observer's size (preview_size.hpp)
+  // Size of what is rendered over the observer's size (preview_size.hpp). So large are a shot's
+  // layers and, unless it is live, its picture. The composite that is shown live has the observer's
+  // size, and the plate in it is as sharp as it was.
+  double scale = 1;
   // A frame of another size than the calibration's passes through untouched, as from a camera that
   // was exchanged; otherwise it is an error, as in a take, all of whose frames would be like it.
   bool passes_other_sizes = false;

@@ -13,6 +13,7 @@ struct CodeTables {
 
   int bits;                    // of a code
   Buffer signal_of, least_of;  // float[]: one for each code
+  Buffer codes_near;           // uint[CODE_BINS]
 };
 
 }  // namespace previz::render

@@ -28,6 +28,8 @@ class DevicePlate {
 
   // Returns the codes of the whole picture as shaders/lib/plate.glsl reads them.
   const Buffer& codes() const { return codes_; }
+  // Returns likewise those of the picture that the last one was made of by making it smaller.
+  const Buffer& whole() const { return whole_; }
 
  private:
   Purpose for_plate() const;

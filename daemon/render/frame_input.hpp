@@ -30,6 +30,9 @@ struct FrameInput {
   // `camera` is larger than the calibration's picture, and is made smaller: every pixel has the
   // mean of the linear signal over its area.
   bool is_scaled = false;
+  // What show() and show_later() return has the size of `camera`, whose picture stays as sharp as
+  // it is: only what is added comes from the smaller rendering (daemon/render/enlarge.hpp).
+  bool is_shown_whole = false;
 };
 
 // Returns the bits of a sample of the frame's plate, 8 where it has none. Throws previz::Error if

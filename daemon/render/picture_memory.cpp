@@ -27,8 +27,9 @@ constexpr std::uint64_t sum_bytes = sizeof(gpu::GpuPixel) + 4 * sizeof(float);
 constexpr std::uint64_t plate_bytes = 3 * sizeof(std::uint16_t);
 
 // The camera gives a pixel no more bytes than this, where they are not the plate's codes. A smaller
-// preview keeps the whole plate's codes as well, and from 0.97 of the camera's size on it takes
-// less altogether all the same.
+// preview also keeps the codes of the whole plate and of what is shown, and 32 bytes a pixel of
+// what it adds (presenter.hpp): below 0.95 of the camera's size it takes less altogether all the
+// same.
 constexpr std::uint64_t camera_bytes = 3;
 
 // A pixel of a band takes twelve arrays of four floats and one of four halves in the denoiser,

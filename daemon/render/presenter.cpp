@@ -6,8 +6,10 @@
 
 #include "daemon/render/blue_noise.hpp"
 #include "shaders/composite.spv.h"
+#include "shaders/enlarge.spv.h"
 #include "shaders/present.spv.h"
 #include "shaders/scan_out.spv.h"
+#include "shaders/sides.spv.h"
 
 namespace previz::render {
 namespace {
@@ -50,6 +52,7 @@ gpu::GpuShow constants_of(const ToPresent& what, int bits, const lighting::Clipp
   constants.is_denoised = what.denoise ? 1 : 0;
   constants.is_dithered = what.dither ? 1 : 0;
   constants.width = static_cast<std::uint32_t>(what.width);
+  constants.is_enlarged = what.whole ? 1 : 0;
   return constants;
 }
 
@@ -60,15 +63,18 @@ Presenter::Presenter(Device& device, const lighting::Response& response)
       bits_(response.bits()),
       clipping_(response.clipping()),
       tables_(device, response) {
-  make_kernels({&composite_, &present_, &scan_out_}, device, passes());
+  make_kernels({&composite_, &present_, &sides_, &enlarge_, &scan_out_}, device, passes());
   static const std::vector<float> pattern = blue_noise(gpu::DITHER_SIDE);
   const Purpose purpose(device, "the dither pattern", "close other programs");
   upload_storage(device, thresholds_, pattern);
 }
 
 std::span<const Pass> Presenter::passes() {
-  static constexpr Pass all[] = {
-      {"composite", composite_spv}, {"present", present_spv}, {"scan_out", scan_out_spv}};
+  static constexpr Pass all[] = {{"composite", composite_spv},
+                                 {"present", present_spv},
+                                 {"sides", sides_spv},
+                                 {"enlarge", enlarge_spv},
+                                 {"scan_out", scan_out_spv}};
   return all;
 }
 
@@ -78,9 +84,27 @@ void Presenter::reserve(std::size_t pixels) {
   const Purpose purpose(device_, "the shown picture", "make the picture smaller");
   composites_ = create_storage_buffer(device_, pixels * sizeof(gpu::vec4));
   highlights_ = create_storage_buffer(device_, pixels * sizeof(std::uint32_t));
+  pixels_ = pixels;
+}
+
+// Makes room for so many pixels on their way out.
+void Presenter::reserve_shown(std::size_t pixels) {
+  if (pixels <= shown_pixels_) return;
+  shown_pixels_ = 0;  // likewise
+  const Purpose purpose(device_, "the shown picture", "make the picture smaller");
   picture_ = create_storage_buffer(device_, words_of(pixels) * sizeof(std::uint32_t));
   if (device_.card()) screen_ = create_storage_buffer(device_, pixels * sizeof(std::uint32_t));
-  pixels_ = pixels;
+  shown_pixels_ = pixels;
+}
+
+// Makes room for what a rendering adds to a whole picture.
+void Presenter::reserve_additions(const ToPresent& what) {
+  const vk::DeviceSize size = sizeof(gpu::vec4) * static_cast<std::size_t>(what.width) *
+                              static_cast<std::size_t>(what.height);
+  if (!what.whole || size <= additions_.size) return;
+  const Purpose purpose(device_, "the shown picture", "make the picture smaller");
+  additions_ = create_storage_buffer(device_, size);
+  sides_of_ = create_storage_buffer(device_, size);
 }
 
 // Composites the rows of the band that each tile holds.
@@ -135,6 +159,7 @@ gpu::GpuShow Presenter::start(const ToPresent& what, const Denoiser::Band& band,
   const bool has_caustics = what.tiles.front().caustics;
   denoiser.reserve(pixels, what.denoise && needs_companions(what), has_caustics);
   reserve(pixels);
+  reserve_shown(what.whole ? 1 : pixels);
   gpu::GpuShow constants = constants_of(what, bits_, clipping_);
   constants.in_picture = static_cast<std::uint32_t>(static_cast<std::size_t>(band.top) * width);
   constants.has_caustics = has_caustics ? 1 : 0;
@@ -162,20 +187,21 @@ void Presenter::read(const Denoiser::Band& band, Layers& layers) const {
 
 Plate Presenter::present(const ToPresent& what, Denoiser& denoiser,
                          const std::function<void(const Denoiser::Band&)>& after_band) {
-  Plate picture{what.width, what.height, bits_,
-                std::vector<std::uint16_t>(std::size_t{3} * static_cast<std::size_t>(what.width) *
-                                           static_cast<std::size_t>(what.height))};
+  const int width = what.shown_width(), height = what.shown_height();
+  Plate picture{width, height, bits_,
+                std::vector<std::uint16_t>(std::size_t{3} * static_cast<std::size_t>(width) *
+                                           static_cast<std::size_t>(height))};
   Downloads down;
   present_later(what, denoiser, {.down = down, .plate = &picture, .on_card = {}}, after_band);
   down.finish();
   return picture;
 }
 
-// Copies the rows of the band into an image that a display reads as well. Whoever holds the picture
-// knows that its last reader is done; what was in it is forgotten with the first rows.
-void Presenter::scan_out(int width, const Denoiser::Band& band, vk::Image image, bool is_last) {
+// Copies the rows into an image that a display reads as well. Whoever holds the picture knows that
+// its last reader is done; what was in it is forgotten with the first rows.
+void Presenter::scan_out(int width, const Rows& shown, vk::Image image) {
   const auto columns = static_cast<std::uint32_t>(width);
-  const auto rows = static_cast<std::uint32_t>(band.last - band.first);
+  const auto rows = static_cast<std::uint32_t>(shown.last - shown.first);
   const gpu::GpuScanOut constants{columns * rows, bits_ > 8 ? 1u : 0u};
   const Buffers buffers{{"picture", &picture_}, {"screen", &screen_}};
   device_.record([&](const vk::raii::CommandBuffer& commands) {
@@ -187,14 +213,14 @@ void Presenter::scan_out(int width, const Denoiser::Band& band, vk::Image image,
                                   vk::AccessFlagBits2::eTransferWrite, Layout::eUndefined,
                                   Layout::eGeneral, VK_QUEUE_FAMILY_IGNORED,
                                   VK_QUEUE_FAMILY_IGNORED, image, whole);
-    if (band.first == 0) commands.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, order));
+    if (shown.first == 0) commands.pipelineBarrier2(vk::DependencyInfo({}, {}, {}, order));
     device_.clock().start(commands, "copy to the screen's memory");
     commands.copyBufferToImage(
         *screen_.parts->buffer, image, Layout::eGeneral,
-        vk::BufferImageCopy(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1}, {0, band.first, 0},
-                            {columns, rows, 1}));
+        vk::BufferImageCopy(0, 0, 0, {vk::ImageAspectFlagBits::eColor, 0, 0, 1},
+                            {0, shown.first, 0}, {columns, rows, 1}));
     device_.clock().stop(commands);
-    if (is_last) {
+    if (shown.are_last) {
       order.oldLayout = Layout::eGeneral;
       order.srcQueueFamilyIndex = device_.queue_family();
       order.dstQueueFamilyIndex = VK_QUEUE_FAMILY_EXTERNAL;
@@ -209,6 +235,7 @@ void Presenter::scan_out(int width, const Denoiser::Band& band, vk::Image image,
 void Presenter::present_later(const ToPresent& what, Denoiser& denoiser, const Destination& to,
                               const std::function<void(const Denoiser::Band&)>& after_band) {
   const auto width = static_cast<std::size_t>(what.width);
+  reserve_additions(what);
   for (const Denoiser::Band& band : denoiser.bands(what.width, what.height)) {
     const std::size_t top = static_cast<std::size_t>(band.top) * width;
     const std::size_t first = static_cast<std::size_t>(band.first) * width;
@@ -221,6 +248,7 @@ void Presenter::present_later(const ToPresent& what, Denoiser& denoiser, const D
         {"plate_samples", &what.plate},
         {"signal_of", &tables_.signal_of},
         {"least_of", &tables_.least_of},
+        {"codes_near", &tables_.codes_near},
         {"thresholds", &thresholds_},
         {"caustics", &denoiser.caustic()},
         {"composites", &composites_},
@@ -229,19 +257,66 @@ void Presenter::present_later(const ToPresent& what, Denoiser& denoiser, const D
         {"reals", &denoiser.denoised_real()},
         {"control", &what.control},
         {"signals", what.denoise ? &denoiser.denoised_signal() : &denoiser.signal()},
-        {"picture", &picture_}};
+        {"picture", &picture_},
+        {"additions", what.whole ? &additions_ : &composites_}};
     device_.record([&](const vk::raii::CommandBuffer& commands) {
       if (what.denoise)
         denoiser.record(commands, what.width, band.bottom - band.top, what.samples < 2,
                         what.history != nullptr);
       present_.dispatch({commands, constants, buffers}, (constants.count + 1) / 2);
     });
-    if (to.plate)
-      to.down.add(
-          device_, picture_,
-          std::as_writable_bytes(std::span(to.plate->samples).subspan(3 * first, 3 * count)));
-    if (to.on_card) scan_out(what.width, band, to.on_card, band.last == what.height);
+    if (!what.whole) hand_over(what.width, {band.first, band.last, band.last == what.height}, to);
     if (what.denoise && after_band) after_band(band);
+  }
+  if (what.whole) enlarge(what, to);
+}
+
+// Sends the rows of the picture that is in `picture_` on their way.
+void Presenter::hand_over(int width, const Rows& rows, const Destination& to) {
+  const std::size_t first = static_cast<std::size_t>(rows.first) * static_cast<std::size_t>(width);
+  const std::size_t last = static_cast<std::size_t>(rows.last) * static_cast<std::size_t>(width);
+  if (to.plate)
+    to.down.add(device_, picture_,
+                std::as_writable_bytes(
+                    std::span(to.plate->samples).subspan(3 * first, 3 * (last - first))));
+  if (to.on_card) scan_out(width, rows, to.on_card);
+}
+
+// Puts what the rendering adds onto the camera's whole picture, as many rows at a time as a band
+// has pixels.
+void Presenter::enlarge(const ToPresent& what, const Destination& to) {
+  const int width = what.whole_width, height = what.whole_height;
+  const int at_once = std::clamp(static_cast<int>(most_band_pixels) / width, 1, height);
+  reserve_shown(static_cast<std::size_t>(at_once) * static_cast<std::size_t>(width));
+  gpu::GpuEnlarge constants{};
+  constants.width = static_cast<std::uint32_t>(width);
+  constants.from_width = static_cast<std::uint32_t>(what.width);
+  constants.from_height = static_cast<std::uint32_t>(what.height);
+  constants.most = (1u << bits_) - 1;
+  constants.is_dithered = what.dither ? 1 : 0;
+  constants.sharpness = static_cast<float>(width) / static_cast<float>(what.width);
+  constants.step = {static_cast<float>(what.width) / static_cast<float>(width),
+                    static_cast<float>(what.height) / static_cast<float>(height)};
+  const Buffers buffers{{"plate_samples", what.whole},   {"signal_of", &tables_.signal_of},
+                        {"least_of", &tables_.least_of}, {"codes_near", &tables_.codes_near},
+                        {"thresholds", &thresholds_},    {"sides", &sides_of_},
+                        {"picture", &picture_}};
+  const std::uint32_t small = constants.from_width * constants.from_height;
+  device_.record([&](const vk::raii::CommandBuffer& commands) {
+    sides_.dispatch(
+        {commands,
+         constants,
+         {{"plate_samples", &what.plate}, {"additions", &additions_}, {"sides", &sides_of_}}},
+        small);
+  });
+  for (int first = 0; first < height; first += at_once) {
+    const int last = std::min(first + at_once, height);
+    constants.first = static_cast<std::uint32_t>(first) * constants.width;
+    constants.count = static_cast<std::uint32_t>(last - first) * constants.width;
+    device_.record([&](const vk::raii::CommandBuffer& commands) {
+      enlarge_.dispatch({commands, constants, buffers}, (constants.count + 1) / 2);
+    });
+    hand_over(width, {first, last, last == height}, to);
   }
 }
 

@@ -32,6 +32,18 @@ struct ToPresent {
   bool denoise;
   bool dither = false;         // the picture is to be looked at, and its codes may be off by one
   History* history = nullptr;  // what the frame is added to; null: it stands alone
+  // The camera's whole picture, and its size, onto which a smaller rendering is put; null: the
+  // picture has the size of the rendering.
+  const Buffer* whole = nullptr;
+  int whole_width = 0, whole_height = 0;
+
+  void put_onto(const Buffer& plate_codes, const Frame& camera) {
+    whole = &plate_codes;
+    whole_width = camera.width;
+    whole_height = camera.height;
+  }
+  int shown_width() const { return whole ? whole_width : width; }
+  int shown_height() const { return whole ? whole_height : height; }
 };
 
 // Says where a finished picture goes.
@@ -49,7 +61,8 @@ class Presenter {
   static std::span<const Pass> passes();  // of all its kernels
 
   const CodeTables& tables() const { return tables_; }
-  // Works band by band, with 30 bytes of device memory per pixel beside the denoiser's.
+  // Works band by band, with 30 bytes of device memory per pixel beside the denoiser's, and 32 per
+  // pixel of a rendering that is put onto a whole picture.
   // `after_band` is called with each band that the denoiser's passes have run over.
   Plate present(const ToPresent& what, Denoiser& denoiser,
                 const std::function<void(const Denoiser::Band&)>& after_band = {});
@@ -63,21 +76,30 @@ class Presenter {
   void read(const Denoiser::Band& band, Layers& layers) const;
 
  private:
+  struct Rows {  // of the shown picture
+    int first, last;
+    bool are_last;
+  };
+
   gpu::GpuShow start(const ToPresent& what, const Denoiser::Band& band, Denoiser& denoiser);
   void reserve(std::size_t pixels);
   void composite(const ToPresent& what, const Denoiser::Band& band, gpu::GpuShow constants,
                  Denoiser& denoiser);
-  void scan_out(int width, const Denoiser::Band& band, vk::Image image, bool is_last);
+  void reserve_shown(std::size_t pixels);
+  void reserve_additions(const ToPresent& what);
+  void enlarge(const ToPresent& what, const Destination& to);
+  void hand_over(int width, const Rows& rows, const Destination& to);
+  void scan_out(int width, const Rows& shown, vk::Image image);
   void accumulate(const ToPresent& what, const Denoiser::Band& band, const gpu::GpuShow& constants,
                   Denoiser& denoiser);
 
   Device& device_;
   int bits_;
   lighting::Clipping clipping_;
-  Kernel composite_, present_, scan_out_;
-  std::size_t pixels_ = 0;
+  Kernel composite_, present_, sides_, enlarge_, scan_out_;
+  std::size_t pixels_ = 0, shown_pixels_ = 0;
   CodeTables tables_;
-  Buffer thresholds_, composites_, highlights_, picture_, screen_;
+  Buffer thresholds_, composites_, highlights_, additions_, sides_of_, picture_, screen_;
 };
 
 }  // namespace previz::render

@@ -162,9 +162,6 @@ void Renderer::Impl::upload_plate() {
   const std::uint32_t clipped = response->clipping().from;
   is_clipped =
       frame.camera ? has_at_least(*frame.camera, clipped) : has_at_least(*frame.plate, clipped);
-  // A processor makes a plate in a twentieth of the time if it does so by itself.
-  if (frame.camera && !frame.is_scaled && device->shares_host_memory() && !frame.plate)
-    frame.plate = std::make_shared<const Plate>(to_plate(*frame.camera));
   const PinholeIntrinsics& lens = calibration.intrinsics;
   if (frame.is_scaled)
     plate.take(*frame.camera, lens.width, lens.height, shown_by().tables());
@@ -439,18 +436,20 @@ ToPresent Renderer::Impl::to_present(bool denoise) {
   if (!denoiser) denoiser.emplace(*device);
   shown_by();
   const PinholeIntrinsics& lens = calibration.intrinsics;
-  return {wavefront->sums(),
-          lens.width,
-          lens.height,
-          wavefront->control_buffer(),
-          plate.codes(),
-          has_plate(),
-          is_clipped,
-          frame.exposure,
-          rule(),
-          sampled(),
-          denoise,
-          frame.dithers};
+  ToPresent what{wavefront->sums(),
+                 lens.width,
+                 lens.height,
+                 wavefront->control_buffer(),
+                 plate.codes(),
+                 has_plate(),
+                 is_clipped,
+                 frame.exposure,
+                 rule(),
+                 sampled(),
+                 denoise,
+                 frame.dithers};
+  if (frame.is_shown_whole) what.put_onto(plate.whole(), *frame.camera);
+  return what;
 }
 
 Plate Renderer::show(bool denoise, Layers* layers) {
@@ -531,8 +530,7 @@ Plate Renderer::show_among(const std::vector<KeptFramePtr>& frames, bool denoise
   }
   const ToPresent what = add(*frames.back());
   const bool fills = denoise && layers;
-  PlateRadiance plate;
-  if (fills) plate = r.plate_radiance();
+  const PlateRadiance plate = fills ? r.plate_radiance() : PlateRadiance{};
   Plate picture = r.presenter->present(what, *r.denoiser, [&](const Denoiser::Band& band) {
     if (!fills) return;
     r.presenter->read(band, *layers);
@@ -583,10 +581,10 @@ Showing Renderer::show_later(bool denoise, const ShowTo& to) {
     what.history = &*r.history;
   }
   CardPictures::Lent lent;
-  if (to.card) lent = r.on_card.lend(what.width, what.height);
+  if (to.card) lent = r.on_card.lend(what.shown_width(), what.shown_height());
   state->on_card = std::move(lent.picture);
   if (to.computer || !state->on_card)
-    state->picture = r.pictures.lend(what.width, what.height, r.response->bits());
+    state->picture = r.pictures.lend(what.shown_width(), what.shown_height(), r.response->bits());
   r.presenter->present_later(
       what, *r.denoiser,
       {.down = state->down, .plate = state->picture.get(), .on_card = lent.image});

@@ -302,7 +302,7 @@ Keys quality_keys(Quality& q) {
       {"neighbours", &q.neighbours, plain.within(0, 4), "With denoise, `previzd render` averages what is added to the plate over this many frames of the take on each side, where they show the same surfaces in the same light. Composite, mask and variance of an EXR file then belong to the averaged picture, which is the same whatever part of the take is rendered. With 2 it needs 1.3 GB of memory per megapixel, 2 GB without a graphics card; 0: every frame stands alone, as in a snapshot. Live, in review and in snapshots the key is unused."},
       {"error", &q.error, plain.within(0, 1), "Adds samples wherever the estimated error is above this fraction of the picture's brightness; 0: a fixed number of samples."},
       {"seconds", &q.seconds, plain.within(0, 86'400), "Adds samples for this long, where the picture needs them most; 0: a fixed number of samples."},
-      {"scale", &q.scale, plain.within(0.01, 1), "Size of the preview, relative to the camera's picture; offline rendering is always full size."},
+      {"scale", &q.scale, plain.within(0.01, 1), "Size of what the preview renders, relative to the camera's picture. The picture itself is always full size, and as sharp as the camera's: what is rendered smaller is what virtual things add to it. Offline rendering is always full size."},
       {"fps", &q.fps, plain.within(0, 240), "Frame rate that the preview holds by changing its samples (1 to 50) and, if one sample is too many, its size (up to scale), or by the [[quality.preview]] tables. 0: samples and scale stay as set."},
       {"cpu_instead", &q.cpu_instead, plain, "Live, if the graphics card is gone: render on the CPU, slowly, as long as the set runs. Otherwise the plate is shown until the card is back. A rig that never had a card always renders on the CPU."},
       {"hardware_rays", &q.hardware_rays, plain, "Lets the graphics card trace rays in hardware, where its driver does so (VK_KHR_ray_query: NVIDIA RTX, AMD from the RX 6000 series on, Intel Arc). False: compute shaders trace them, as on any other card. The picture is the same but for rounding; `previzd bench` shows what it brings. Live it is read when the service starts."},
@@ -312,7 +312,7 @@ Keys quality_keys(Quality& q) {
 Keys preview_step_keys(PreviewStep& s) {
   return {
       {"samples", &s.samples, plain.within(1, 50), "Minimum samples per pixel; more are used if they fit."},
-      {"scale", &s.scale, plain.within(0.01, 1), "Size of the picture, relative to the camera's."},
+      {"scale", &s.scale, plain.within(0.01, 1), "Size of what is rendered, relative to the camera's picture, as quality.scale."},
       {"denoise", &s.denoise, plain, "Whether noise is removed. Default: quality.denoise.", optional("true")},
   };
 }

@@ -109,7 +109,7 @@ std::vector<TradeAxis> trade_axes(const TradeSettings& own, std::uint32_t needed
         {"64", [](TradeSettings& s) { s.lighting.resolution = 64; }}},
        own.lighting.resolution > 0 ? number_words(own.lighting.resolution) : "as captured"},
       {"resolution",
-       "size of the picture, which is then enlarged (the plate as well, as in a preview)",
+       "size of what is rendered, which is put onto the whole plate",
        {{"half", [](TradeSettings& s) { s.scale = 0.5; }},
         {"quarter", [](TradeSettings& s) { s.scale = 0.25; }}},
        "full"},

@@ -6,7 +6,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <opencv2/imgproc.hpp>
 #include <utility>
 
 namespace previz::trade {
@@ -40,16 +39,6 @@ TradePicture middle(const TradePicture& a, const TradePicture& b) {
   TradePicture mean{a.width, a.height, middle(a.shown, b.shown), middle(a.added, b.added), a.mask};
   for (std::size_t i = 0; i < mean.mask.size(); ++i) mean.mask[i] = 0.5f * (a.mask[i] + b.mask[i]);
   return mean;
-}
-
-std::vector<glm::vec3> enlarged_layer(const std::vector<glm::vec3>& layer, int from_width,
-                                      int from_height, int width, int height) {
-  // OpenCV reads and writes the vectors in place; it leaves `from` alone.
-  const cv::Mat from(from_height, from_width, CV_32FC3, const_cast<glm::vec3*>(layer.data()));
-  std::vector<glm::vec3> result(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  cv::Mat to(height, width, CV_32FC3, result.data());
-  cv::resize(from, to, to.size(), 0, 0, cv::INTER_LINEAR);
-  return result;
 }
 
 // Products of one pixel's differences from the set's own picture, summed over its channels.
@@ -116,15 +105,6 @@ TradePicture trade_picture(const render::Layers& layers, const std::vector<doubl
     picture.added.emplace_back(same ? glm::dvec3(0) : shown - seen);
   }
   return picture;
-}
-
-TradePicture enlarged(const TradePicture& picture, int width, int height) {
-  if (picture.width == width && picture.height == height) return picture;
-  const auto layer = [&](const std::vector<glm::vec3>& from) {
-    return enlarged_layer(from, picture.width, picture.height, width, height);
-  };
-  // The result needs no mask, because errors use the reference's.
-  return {width, height, layer(picture.shown), layer(picture.added), {}};
 }
 
 // In expectation the mean of the halves is as far from the truth as from either half.

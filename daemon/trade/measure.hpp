@@ -26,8 +26,6 @@ struct TradePicture {
 // radiance at which the sensor clips.
 TradePicture trade_picture(const render::Layers& layers, const std::vector<double>& camera,
                            double white);
-// Returns the picture enlarged bilinearly, without its mask.
-TradePicture enlarged(const TradePicture& picture, int width, int height);
 
 // Relative errors: the rms of the error over the rms of the quantity itself, over pixels and
 // channels. An error is absent if the quantity is 0 everywhere.

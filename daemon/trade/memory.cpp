@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr int version = 1;
+constexpr int version = 2;
 
 fs::path rows_file(const fs::path& directory) {
   return directory / "trade.json";

@@ -6,6 +6,7 @@
 #include "daemon/pipeline/refinement.hpp"
 #include "daemon/pipeline/relight.hpp"
 #include "daemon/render/composite.hpp"
+#include "daemon/render/enlarge.hpp"
 
 namespace previz::trade {
 namespace {
@@ -27,9 +28,12 @@ MethodRenderer::MethodRenderer(const std::shared_ptr<render::Device>& device, Tr
       adaptive_(settings.adaptive),
       denoise_(settings.denoise),
       plate_(frame.plate(sweep_scale * settings.scale)),
-      camera_(render::plate_radiance(*plate_, frame.response(), exposure_).value),
+      whole_(frame.plate(sweep_scale)),
+      camera_(render::plate_radiance(*whole_, frame.response(), exposure_).value),
       renderer_(device, settings.estimation,
                 method_calibration(frame, settings, sweep_scale * settings.scale)) {
+  for (const double signal : frame.response().inverse())
+    radiance_of_.push_back(static_cast<float>(signal / exposure_));
   renderer_.set_scene(scene);
   const pipeline::LightPtr light = frame.light(settings.lighting, scene);
   std::vector<set::Light> lamps = scene.lights;
@@ -65,14 +69,26 @@ void MethodRenderer::add(int samples) {
   layers_ = renderer_.layers();
 }
 
+// A rendering that is smaller than the sweep is put onto the whole plate, as live.
+TradePicture MethodRenderer::made(const render::Layers& layers) const {
+  if (layers.width == whole_->width) return trade_picture(layers, camera_, 1 / exposure_);
+  const auto radiance_of = [&](std::uint16_t sample) { return radiance_of_[sample]; };
+  render::Layers whole;
+  whole.width = whole_->width;
+  whole.height = whole_->height;
+  whole.composite = render::enlarged(render::additions_of(layers, *plate_, radiance_of, 1), *plate_,
+                                     *whole_, radiance_of);
+  return trade_picture(whole, camera_, 1 / exposure_);
+}
+
 TradePicture MethodRenderer::denoised_picture() {
   render::Layers denoised = layers_;
   renderer_.show(true, &denoised);
-  return trade_picture(denoised, camera_, 1 / exposure_);
+  return made(denoised);
 }
 
 TradePicture MethodRenderer::picture() const {
-  return trade_picture(layers_, camera_, 1 / exposure_);
+  return made(layers_);
 }
 
 }  // namespace previz::trade

@@ -16,7 +16,7 @@ namespace previz::trade {
 class MethodRenderer {
  public:
   // `sweep_scale` is relative to the observer's size; the settings' scale is relative to the
-  // sweep's size.
+  // sweep's size, which every picture() has.
   MethodRenderer(const std::shared_ptr<render::Device>& device, TradeFrame& frame,
                  const scene::Scene& scene, const TradeSettings& settings, double sweep_scale);
 
@@ -42,8 +42,11 @@ class MethodRenderer {
   const double exposure_;
   const glm::dmat4 world_from_camera_;
   const bool adaptive_, denoise_;
-  const PlatePtr plate_;
-  const std::vector<double> camera_;  // the plate's radiance, interleaved RGB
+  TradePicture made(const render::Layers& layers) const;
+
+  const PlatePtr plate_, whole_;      // at the size of the rendering, and of the sweep
+  const std::vector<double> camera_;  // the whole plate's radiance, interleaved RGB
+  std::vector<float> radiance_of_;    // samples
   render::Renderer renderer_;
   render::Layers layers_;
 };

@@ -29,8 +29,7 @@ SquaredError Probes::measure(const TradeSettings& settings, int samples, int rou
   }
   probing_->begin(parts_.seed(round));
   probing_->render(samples);
-  const TradePicture& like = reference_->picture();
-  return reference_->squared_error(enlarged(probing_->picture(), like.width, like.height));
+  return reference_->squared_error(probing_->picture());
 }
 
 SquaredError Probes::error(const TradeSettings& settings, const Making& making, bool stated) {

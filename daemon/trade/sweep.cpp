@@ -316,7 +316,7 @@ void Sweep::measure(std::size_t method, int round) {
     renderer.begin(seed(round));
     const double seconds = renderer.render(options_.samples[i]);
     stop_if_asked();
-    const TradePicture picture = at_sweep_size(renderer.picture());
+    const TradePicture picture = renderer.picture();
     KeptPoint& point = kept(method, i);
     if (point.errors.size() <= static_cast<std::size_t>(round)) {
       point.seconds.push_back(seconds);
@@ -418,7 +418,7 @@ TradeCorner Sweep::corner(const std::string& name, const TradeFrontPoint& at) co
   renderer.begin(seed(0));
   renderer.render(report_.point(at).samples);
   const TradePicture picture = renderer.picture();
-  TradeCorner corner{name, at, displayed(picture), displayed(at_sweep_size(picture))};
+  TradeCorner corner{name, at, displayed(picture), displayed(picture)};
   for (std::size_t i = 0; i < corner.difference.samples.size(); ++i) {
     const int off = static_cast<int>(corner.difference.samples[i]) - report_.reference.samples[i];
     corner.difference.samples[i] = static_cast<std::uint16_t>(std::clamp(128 + 5 * off, 0, 255));

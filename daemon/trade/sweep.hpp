@@ -42,9 +42,6 @@ class Sweep {
     return report_.plan.methods.front().settings.estimation.seed + 1 +
            static_cast<std::uint32_t>(round);
   }
-  TradePicture at_sweep_size(const TradePicture& picture) const {
-    return enlarged(picture, report_.width, report_.height);
-  }
   void plan();
   // The first half of the reference, when it had so many samples.
   struct OnTheWay {

@@ -40,6 +40,9 @@ PREVIZ_CONST uint DENOISE_EDGE_REACH = 2u;
 // A channel counts as white from this share of the sensor's white on, a step of 8 bits below it.
 PREVIZ_CONST float NEARLY_WHITE = 0.99f;
 
+// Codes are looked for from so many places of the response on (lib/response.glsl).
+PREVIZ_CONST uint CODE_BINS = 1024u;
+
 // How the difference is put onto the camera's picture: set::Composite.
 PREVIZ_CONST uint COMPOSITE_ADDITIVE = 0u;
 PREVIZ_CONST uint COMPOSITE_RATIO = 1u;
@@ -460,7 +463,25 @@ struct GpuShow {
   uint is_dithered;    // 1: codes are dithered where the worlds differ
   uint width;          // of the picture
   uint has_caustics;   // 1: what photons bring to the change is kept apart
+  uint is_enlarged;    // 1: what is added is written in place of the picture, for GpuEnlarge
 };
+
+// Push constants of the pass that puts a small rendering onto the camera's whole picture.
+struct GpuEnlarge {
+  uint count;                    // pixels to work on, of the whole picture
+  uint first;                    // the first of them
+  uint width;                    // of the whole picture
+  uint from_width, from_height;  // of the rendering
+  uint most;                     // the largest code
+  uint is_dithered;              // as in GpuShow
+  float sharpness;               // how many whole pixels are as wide as one of the rendering
+  vec2 step;                     // pixels of the rendering over those of the whole picture
+};
+// Small pixels whose plate is so much brighter or darker than a whole one, as a share of the largest
+// code, count half.
+PREVIZ_CONST float ENLARGE_BRIGHTNESS = 0.05f;
+// Those that are not at all like it count so much, for where there are no others.
+PREVIZ_CONST float ENLARGE_LEAST = 1e-4f;
 // The class of what is at the middle of a pixel is 0 for a real surface or nothing, 1 for a virtual
 // object, and otherwise one of these.
 PREVIZ_CONST float COVER_UNKNOWN = -1.0f;
@@ -478,7 +499,8 @@ static_assert(sizeof(GpuMotion) == 56);
 static_assert(sizeof(GpuMoved) == 44);
 static_assert(sizeof(GpuArrival) == 28);
 static_assert(sizeof(GpuHistory) == 152);
-static_assert(sizeof(GpuShow) == 72);
+static_assert(sizeof(GpuShow) == 76);
+static_assert(sizeof(GpuEnlarge) == 40);
 static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 160);

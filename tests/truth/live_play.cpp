@@ -118,6 +118,7 @@ void play_live(const std::filesystem::path& directory, const LiveSettings& setti
   device.name = settings.device;
   pipeline::RenderStageOptions options;
   options.is_live = true;
+  options.scale = settings.scale;
   pipeline::RenderStage stage(render::open_device(device), take.set, take.observer, scene, options);
   while (const std::optional<pipeline::Shot> next = shots.next())
     for (int i = 0; i < std::max(settings.still, 1); ++i) {

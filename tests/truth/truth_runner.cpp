@@ -37,6 +37,7 @@ struct Arguments {
   std::vector<int> frames;  // empty: every truth frame
   double expose = 1;        // how many times as long the camera exposes
   bool live = false, history = true;
+  double scale = 1;
   int still = 0;  // frames with the camera at rest; 0: it moves as the set says
   std::optional<int> samples;
   bool made = false;  // the phantom is made of the set's own pictures
@@ -171,6 +172,7 @@ ordered_json play(const TruthSet& set, const std::vector<int>& frames, const Arg
   for (const int frame : frames) truths[session_index(set, frame)] = frame;
   settings.last = truths.rbegin()->first;
   settings.still = arguments.still;
+  settings.scale = arguments.scale;
 
   ordered_json metrics;
   metrics["frames"] = ordered_json::object();
@@ -311,6 +313,10 @@ int main(int argc, char** argv) {
                  "with --live, show the last of the frames so many times, the camera at rest")
       ->needs(live)
       ->check(CLI::Range(1, 10000));
+  app.add_option("--scale", arguments.scale,
+                 "with --live, render so much smaller than the pictures are [1]")
+      ->needs(live)
+      ->check(CLI::Range(0.01, 1.0));
   app.add_flag("--adaptive", arguments.render.adaptive,
                "so many on average, where they bring most");
   app.add_flag("--denoise", arguments.render.denoise, "take noise out of the composite");

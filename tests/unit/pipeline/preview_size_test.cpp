@@ -162,6 +162,41 @@ TEST(RenderStageSize, AFrameOfAnotherSizePassesThroughWhereThatIsWantedAndIsAnEr
     }
 }
 
+// Also with layers, as a snapshot has them, and where the plate passes through.
+TEST(RenderStageSize, ALivePictureHasTheCamerasSize) {
+  const test::TemporaryDirectory directory;
+  test::write_small_take(directory.path());
+  Take take = open_take(directory / "session", directory / "set.toml");
+  take.set.quality.samples = 4;
+  for (const bool layers : {false, true}) {
+    RenderStageOptions options;
+    options.scale = 0.5;
+    options.is_live = true;
+    options.layers = layers;
+    RenderStage stage(render::open_device(), take.set, take.observer, scene::load_scene(take.set),
+                      options);
+    for (const bool has_pose : {true, false}) {
+      SCOPED_TRACE(std::to_string(layers) + std::to_string(has_pose));
+      Shot shot;
+      shot.frame = std::make_shared<Frame>(test::small_take_frame(1));
+      shot.light = std::make_shared<const Light>(light_from_aside());
+      if (has_pose) {
+        shot.track.pose.emplace();
+        shot.track.pose->world_from_camera = {
+            {1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}, {0, 0, 1, 1}};
+      }
+      stage(shot);
+      EXPECT_EQ(shot.untouched.empty(), has_pose);
+      const Plate plate = to_plate(*shot.frame);
+      ASSERT_EQ(shot.picture->width, 48);
+      ASSERT_EQ(shot.picture->height, 36);
+      const auto same = std::ranges::mismatch(shot.picture->samples, plate.samples).in1;
+      EXPECT_EQ(same == shot.picture->samples.end(), !has_pose) << "there is a card";
+      EXPECT_EQ(shot.layers ? shot.layers->width : 0, !layers ? 0 : has_pose ? 24 : 48);
+    }
+  }
+}
+
 render::Layers render_card(double scale) {
   return *card(scale, true).layers;
 }

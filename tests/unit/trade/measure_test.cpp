@@ -88,17 +88,6 @@ TEST(TradeMeasure, BiasIsSeenThroughNoise) {
               expected, expected / 12);
 }
 
-TEST(TradeMeasure, EnlargingKeepsAnEvenPictureAndTheSizeAskedFor) {
-  TradePicture even{3, 2, std::vector<glm::vec3>(6, glm::vec3(0.5f)),
-                    std::vector<glm::vec3>(6, glm::vec3(-0.25f)), std::vector<float>(6)};
-  const TradePicture large = enlarged(even, 7, 5);
-  ASSERT_EQ(large.shown.size(), 35u);
-  for (std::size_t i = 0; i < 35; ++i) {
-    EXPECT_EQ(large.shown[i], glm::vec3(0.5f));
-    EXPECT_EQ(large.added[i], glm::vec3(-0.25f));
-  }
-}
-
 TEST(TradeMeasure, ShownIsClippedWhereTheSensorClips) {
   render::Layers layers;
   layers.width = 2;
