@@ -96,7 +96,7 @@ struct Wanted {
   vec3 normal;
   uint thing;     // pack_thing()
   float most;     // samples that it may count as
-  bool is_loose;  // anything in the same mirror will do
+  bool is_loose;  // any place of it in the same mirror will do
 };
 
 int width() { return int(history.width); }
@@ -116,8 +116,11 @@ bool is_same_surface(int index, uint normal, Wanted wanted) {
          dot(geometric_of(normal), wanted.normal) >= LEAST_ALIKE;
 }
 
+// What comes out from behind something else that a mirror shows has no past, or that would be seen beside
+// itself.
 bool is_same_thing(uint thing, Wanted wanted) {
-  return wanted.is_loose ? are_same_mirror(thing, wanted.thing) : thing == wanted.thing;
+  if (!wanted.is_loose) return thing == wanted.thing;
+  return are_same_mirror(thing, wanted.thing) && instance_of(thing) == instance_of(wanted.thing);
 }
 
 // Returns the index of a pixel of the frame before, or -1 where its own side is not what is wanted.
