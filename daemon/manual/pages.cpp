@@ -201,6 +201,7 @@ const Chapter previzd_status{"EXIT STATUS", R"(
 0: Done.
 1: Error; one line on standard error says what is wrong.
 2: The command line cannot be understood.
+3: `previzd takes check`: a take is incomplete, because frames did not reach the disk while it was recorded, and none is damaged since (that is 1).
 75: The service ended to be restarted, outside a take: another version was installed, or the driver of a graphics card was loaded after the service started.
 128+N: Stopped by signal N, within two seconds. Files that were not complete are removed; finished frames are on disk, and the same render command continues there. (Stopping a live rig is not an error: 0.)
 )"};

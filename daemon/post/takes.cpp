@@ -189,18 +189,28 @@ void mark_takes(const Paths& takes, bool good, std::ostream& out) {
 
 namespace {
 
-// Reads a take from end to end. Returns what is damaged or missing, in words.
-std::vector<std::string> damage_of(const fs::path& take, const std::stop_token& stop) {
-  std::vector<std::string> faults;
+// What is wrong with a take, in words.
+struct Faults {
+  std::vector<std::string> damage;  // what is not as it was recorded
+  std::vector<std::string> lost;    // what the rig lost while it recorded, and nothing brings back
+};
+
+// Reads a take from end to end.
+Faults faults_of(const fs::path& take, const std::stop_token& stop) {
+  Faults faults;
   try {
     session::Session session = session::open_session(take, stop);
     for (const char* stream : {"observer", "light", "composite"})
       static_cast<void>(session::open_stream(session, stream, stop));
-    faults = session.missing;
-    for (const std::string& fault : checksum_faults(take, stop)) faults.push_back(fault);
+    faults.lost = session.lost;
+    std::ranges::copy_if(session.missing, std::back_inserter(faults.damage),
+                         [&](const std::string& what) {
+                           return std::ranges::find(faults.lost, what) == faults.lost.end();
+                         });
+    for (const std::string& fault : checksum_faults(take, stop)) faults.damage.push_back(fault);
   } catch (const Error& error) {
     if (stop.stop_requested()) throw;
-    faults.emplace_back(error.what());
+    faults.damage.emplace_back(error.what());
   }
   return faults;
 }
@@ -208,19 +218,24 @@ std::vector<std::string> damage_of(const fs::path& take, const std::stop_token& 
 }  // namespace
 
 int check_takes(const Paths& takes, std::ostream& out, const std::stop_token& stop) {
-  int result = 0;
+  bool is_damaged = false, is_incomplete = false;
   for (const ListedTake& take : takes_at_rest(takes)) {
-    std::vector<std::string> faults = damage_of(take.directory, stop);
+    Faults faults = faults_of(take.directory, stop);
     // What could not be read a moment ago, and now can, is a disk that begins to fail.
-    if (faults.empty()) faults = take.strangers;
-    if (faults.empty() && !take.fault.empty()) faults.push_back(take.fault);
-    for (const std::string& fault : faults) say(take.directory, fault, out);
-    if (faults.empty())
-      say(take.directory, "whole, " + set::plural(take.summary.frames, "frame"), out);
+    if (faults.damage.empty()) faults.damage = take.strangers;
+    if (faults.damage.empty() && !take.fault.empty()) faults.damage.push_back(take.fault);
+    for (const auto* kind : {&faults.damage, &faults.lost})
+      for (const std::string& fault : *kind) say(take.directory, fault, out);
+    const std::string frames = set::plural(take.summary.frames, "frame");
+    if (!faults.damage.empty())
+      is_damaged = true;
+    else if (!faults.lost.empty())
+      say(take.directory, "incomplete since it was recorded, and not damaged, " + frames, out);
     else
-      result = 1;
+      say(take.directory, "whole, " + frames, out);
+    is_incomplete |= !faults.lost.empty();
   }
-  return result;
+  return is_damaged ? damaged_status : is_incomplete ? incomplete_status : 0;
 }
 
 int repair_takes(const RepairOptions& options, std::ostream& out, const std::stop_token& stop) {
@@ -233,8 +248,8 @@ int repair_takes(const RepairOptions& options, std::ostream& out, const std::sto
   int result = 0;
   for (const ListedTake& take : takes) {
     if (!take.fault.empty()) throw Error(take.fault);
-    if (damage_of(take.directory, stop).empty()) {
-      say(take.directory, "whole, nothing to repair", out);
+    if (faults_of(take.directory, stop).damage.empty()) {
+      say(take.directory, "nothing to repair", out);
       continue;
     }
     session::make_folders(options.folder);
@@ -245,7 +260,7 @@ int repair_takes(const RepairOptions& options, std::ostream& out, const std::sto
         "repaired, " + set::plural(repair.frames, "frame") +
             (repair.is_complete ? ", nothing is lost" : "; what is lost is in its session.toml"),
         out);
-    for (const std::string& fault : damage_of(place, stop)) say(place, fault, out);
+    for (const std::string& fault : faults_of(place, stop).damage) say(place, fault, out);
     if (!repair.is_complete) result = 1;
   }
   return result;
@@ -260,7 +275,7 @@ int copy_takes(const CopyOptions& options, std::ostream& out, const std::stop_to
     const bool was_made = copy_take(take, copy, stop);
     say(copy, was_made ? size_words(take.bytes) + ", checked" : "already copied", out);
     // The bytes are the same; whether they are a whole take is another question.
-    for (const std::string& fault : damage_of(copy, stop)) {
+    for (const std::string& fault : faults_of(copy, stop).damage) {
       say(copy, "the take itself is damaged, not by copying: " + fault, out);
       result = 1;
     }

@@ -20,8 +20,10 @@ void list_takes(const Paths& places, std::ostream& out);
 void mark_takes(const Paths& takes, bool good, std::ostream& out);
 
 // Reads every frame and file of the takes, compares them with the checksums that are recorded, and
-// with SHA256SUMS where a copy has it. Prints what is missing or was changed. Returns 0, or 1 if
-// anything is.
+// with SHA256SUMS where a copy has it. Prints what is missing or was changed. Returns 0,
+// damaged_status if anything is, or incomplete_status if all that is missing was lost while the
+// take was recorded.
+inline constexpr int damaged_status = 1, incomplete_status = 3;
 int check_takes(const Paths& takes, std::ostream& out, const std::stop_token& stop);
 
 struct RepairOptions {

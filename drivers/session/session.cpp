@@ -76,8 +76,10 @@ void read_end(const SessionFile& file, Session& session) {
     miss(
         "the recording was not closed (power cut, crash, or still recording); all "
         "after the last complete frame, about a second at most, is lost");
-  for (const std::string& what : words_of(file.lost))
+  for (const std::string& what : words_of(file.lost)) {
     miss(what + " did not reach the disk in time");
+    session.lost.push_back(session.missing.back());
+  }
 }
 
 void read_track(Session& session) {

@@ -45,6 +45,9 @@ struct Session {
   SessionInfo info;
   std::vector<TrackRecord> track;  // empty where nothing was tracked
   std::vector<std::string> missing;
+  // What did not reach the disk while it was recorded, in words that are in `missing` as well: what
+  // is there is whole all the same.
+  std::vector<std::string> lost = {};
 };
 
 // Throws previz::Error naming the file (and line) if session.toml cannot be understood. Checks the

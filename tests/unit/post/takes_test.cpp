@@ -141,6 +141,24 @@ TEST_F(Takes, DamageIsFoundAndNamed) {
   EXPECT_THAT(said, AllOf(HasSubstr("12A_take001: observer"), HasSubstr("12A_take002: whole")));
 }
 
+// A script can tell a slow disk of that day from a take that has lost something since.
+TEST_F(Takes, WhatWasLostWhileRecordingIsNoDamage) {
+  replace_in_toml("12A_take001", "closed = true", "closed = true\nlost_frames = 3");
+  const auto [status, said] = checked({one_, two_});
+  EXPECT_EQ(status, 3);
+  EXPECT_THAT(said,
+              AllOf(HasSubstr("12A_take001: session.toml: 3 camera frames did not reach the disk"),
+                    HasSubstr("12A_take001: incomplete since it was recorded, and not "
+                              "damaged, 8 frames"),
+                    HasSubstr("12A_take002: whole")));
+  EXPECT_EQ(repair_takes({{one_}, directory_ / "repaired"}, out_, {}), 0);
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take001: nothing to repair"));
+  EXPECT_EQ(copy_takes({{one_}, directory_ / "disk"}, out_, {}), 0);
+  EXPECT_THAT(out_.str(), Not(HasSubstr("is damaged")));
+  fs::resize_file(two_ / "observer.mkv", fs::file_size(two_ / "observer.mkv") / 2);
+  EXPECT_EQ(checked({one_, two_}).first, 1);
+}
+
 TEST_F(Takes, AreCopiedWithChecksums) {
   std::ofstream(one_ / "notes.txt") << "not the take's\n";
   const fs::path disk = directory_ / "disk/day 1", copy = disk / "12A_take001";
@@ -229,7 +247,7 @@ TEST_F(Takes, ADamagedTakeIsRepairedIntoANewOne) {
   session::replace_file(film, damaged);
   EXPECT_EQ(repair_takes({{one_, two_}, disk}, out_, {}), 1);
   EXPECT_THAT(out_.str(), HasSubstr("12A_take001: repaired, 7 frames; what is lost is in its"));
-  EXPECT_THAT(out_.str(), HasSubstr("12A_take002: whole, nothing to repair"));
+  EXPECT_THAT(out_.str(), HasSubstr("12A_take002: nothing to repair"));
   EXPECT_EQ(test::content_of(film), damaged);
   EXPECT_FALSE(fs::exists(disk / "12A_take002"));
   const auto [status, said] = checked({disk / "12A_take001"});
