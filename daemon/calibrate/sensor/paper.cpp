@@ -57,6 +57,33 @@ struct SeenTag {
   double cell_px = 0;
 };
 
+// Returns the rows and columns of the white cells that have the fewest black ones around them,
+// which a lens blurs into them: what lies beside the paper counts as black.
+std::vector<glm::ivec2> whitest(const tracking::TagCells& cells) {
+  const auto is_black = [&](int row, int column) {
+    return row < 0 || column < 0 || row >= cells.total || column >= cells.total ||
+           cells.black(row, column);
+  };
+  std::vector<std::pair<int, glm::ivec2>> white;
+  for (int row = 0; row < cells.total; ++row)
+    for (int column = 0; column < cells.total; ++column) {
+      if (is_black(row, column)) continue;
+      int black = 0;
+      for (int i = 0; i < 9; ++i) {
+        const int y = i / 3 - 1, x = i % 3 - 1;
+        if (is_black(row + y, column + x)) black += x == 0 || y == 0 ? 3 : 1;
+      }
+      white.emplace_back(black, glm::ivec2(row, column));
+    }
+  std::ranges::stable_sort(white, {}, [](const auto& cell) { return cell.first; });
+  if (white.empty()) return {};
+  const std::size_t enough = std::min(2 * least_cells, white.size());
+  std::vector<glm::ivec2> result;
+  for (const auto& [black, cell] : white)
+    if (black <= white[enough - 1].first) result.push_back(cell);
+  return result;
+}
+
 }  // namespace
 
 struct Paper::Impl {
@@ -153,10 +180,8 @@ std::optional<SeenTag> Paper::Impl::seen(const Printed& tag,
   if (!middle || !right || !down) return {};
   result.cell_px = std::min(glm::distance(*middle, *right), glm::distance(*middle, *down));
   if (result.cell_px < least_cell_px) return {};
-  for (int row = 0; row < tag.cells.total; ++row)
-    for (int column = 0; column < tag.cells.total; ++column)
-      if (!tag.cells.black(row, column))
-        if (const auto centre = at(row + 0.5, column + 0.5)) result.white.push_back(*centre);
+  for (const glm::ivec2& cell : whitest(tag.cells))
+    if (const auto centre = at(cell.x + 0.5, cell.y + 0.5)) result.white.push_back(*centre);
   return result;
 }
 
