@@ -22,7 +22,7 @@ struct LiveSettings {
   int samples = 1;
   bool accumulates = true;
   bool denoise = true;
-  double scale = 1;  // quality.scale
+  double scale = 1;        // quality.scale
   std::uint64_t last = 0;  // of the frames to play
   int still = 0;  // above 0: the last frame so many times, with the camera at rest, and no other
   std::string device = {};

@@ -73,9 +73,10 @@ TEST_F(Trade, SweepsAndWritesTableAndPage) {
   EXPECT_EQ(report.corners.front().difference.width, 32);
 }
 
-// A rendering of half the size loses none of the camera's own detail, random in every pixel: a plate
-// of independent pixels of standard deviation s, averaged by fours and enlarged, would be off by about
-// s itself, a third of the brightness. What it loses is virtual detail, and no samples bring that back.
+// A rendering of half the size loses none of the camera's own detail, random in every pixel: a
+// plate of independent pixels of standard deviation s, averaged by fours and enlarged, would be off
+// by about s itself, a third of the brightness. What it loses is virtual detail, and no samples
+// bring that back.
 TEST_F(Trade, AHalfSizedRenderingStaysOffWhereThingsAreVirtual) {
   options_.axes = {"resolution"};
   const TradeReport report = trade();
