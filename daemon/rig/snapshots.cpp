@@ -21,9 +21,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::string_view snapshot_prefix = "snapshot_";
-// An EXR has 20 floats a pixel, a PNG three samples of 16 bits; either may grow by compression that
-// finds nothing to compress.
-constexpr std::uint64_t most_bytes_a_pixel = 20 * sizeof(float) + 3 * sizeof(std::uint16_t) + 1;
+// An EXR has 20 floats a pixel that was rendered, a PNG three samples of 16 bits a pixel that was
+// shown; either may grow by compression that finds nothing to compress.
+constexpr std::uint64_t most_exr_bytes = 20 * sizeof(float) + 1;
+constexpr std::uint64_t most_png_bytes = 3 * sizeof(std::uint16_t) + 1;
 
 fs::path snapshot_file(fs::path stem, const char* extension) {
   return stem += extension;
@@ -80,8 +81,9 @@ void check_space(const fs::path& folder, std::uint64_t bytes, const fs::path& ta
 fs::path write_snapshot(const pipeline::Shot& shot, const set::Set& set) {
   const fs::path& folder = set.output.directory;
   session::make_folders(folder);
-  const std::uint64_t pixels = shot.layers->mask.size();
-  check_space(folder, pixels * most_bytes_a_pixel, set.recording.directory,
+  const std::uint64_t bytes =
+      shot.layers->mask.size() * most_exr_bytes + shot.picture->samples.size() / 3 * most_png_bytes;
+  check_space(folder, bytes, set.recording.directory,
               static_cast<std::uint64_t>(set.recording.reserve_mb * 1e6));
   output::ExrMetadata metadata = output::exr_metadata(*shot.layers, *shot.frame, shot.track, set);
   if (shot.shown_pose) {

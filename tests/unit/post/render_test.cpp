@@ -501,14 +501,13 @@ TEST_F(RenderSession, LiveTakesTheSamplesItIsAskedFor) {
 }
 
 // quality.scale is of the preview only.
-TEST_F(RenderSession, LiveShowsThePreviewAtTheSetsScaleAndOfflineIsFullSize) {
+TEST_F(RenderSession, LiveKeepsThePlateAtAnyScaleAndOfflineIsFullSize) {
   write_take(false, "scale = 0.5\n");
   rig::run_live(live_options(), reports_);
   const Plate last = to_plate(small_take_frame(small_take_frames - 1));
-  const Plate half = pipeline::scaled(last, 0.5, lighting::Response(ResponseCurve{}, 8));
   const Plate shown = output::read_png(directory_ / "live/picture.png");
-  EXPECT_EQ(shown.width, 24);
-  EXPECT_EQ(shown.samples, half.samples);  // nothing is virtual: the plate, bit for bit
+  EXPECT_EQ(shown.width, 48);
+  EXPECT_EQ(shown.samples, last.samples);  // nothing is virtual: the plate, bit for bit
 
   render(of_frames(1, 1));
   EXPECT_TRUE(is_plate(directory_ / "out/0001.png", 1));

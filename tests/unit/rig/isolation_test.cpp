@@ -113,7 +113,7 @@ TEST_F(RigLive, ACameraOfAnotherSizeBeginsTheNextTakeAndIsShownAsItIs) {
         });
   };
   run([&] {
-    until([](const Shown& s) { return s.shot.samples == 2 && s.shot.picture->width == 24; });
+    until([](const Shown& s) { return s.shot.samples == 2 && s.shot.picture->width == 48; });
     begin_take();
     until_more(4);
     is_other = true;
@@ -123,7 +123,7 @@ TEST_F(RigLive, ACameraOfAnotherSizeBeginsTheNextTakeAndIsShownAsItIs) {
     EXPECT_EQ(shown.shot.untouched,
               "observer: a frame of 64x48 does not fit the calibration's 48x36");
     is_other = false;  // and back
-    until([](const Shown& s) { return s.shot.samples == 2 && s.shot.picture->width == 24; });
+    until([](const Shown& s) { return s.shot.samples == 2 && s.shot.picture->width == 48; });
     end_take("12A_take003");
   });
   for (const auto& [name, width] :
