@@ -116,8 +116,8 @@ bool is_same_surface(int index, uint normal, Wanted wanted) {
          dot(geometric_of(normal), wanted.normal) >= LEAST_ALIKE;
 }
 
-// What comes out from behind something else that a mirror shows has no past, or that would be seen beside
-// itself.
+// A thing that a mirror shows coming out from behind another has no past, or that other one would be seen
+// beside itself.
 bool is_same_thing(uint thing, Wanted wanted) {
   if (!wanted.is_loose) return thing == wanted.thing;
   return are_same_mirror(thing, wanted.thing) && instance_of(thing) == instance_of(wanted.thing);

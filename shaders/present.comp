@@ -18,8 +18,8 @@ layout(scalar) readonly buffer Highlights { uint highlights[]; };
 layout(scalar) readonly buffer Caustics { vec4 caustics[]; };    // what the signals are without
 layout(scalar) buffer Control { GpuControl control; };
 layout(scalar) writeonly buffer Picture { uint picture[]; };     // samples, as the plate's
-// Of the picture: the signal that is added to what is left of the plate, and the mask. In place of the
-// picture, with show.is_enlarged.
+// The signal that is added to what is left of the plate at each pixel of the picture, and the mask. With
+// show.is_enlarged it is written in place of the picture.
 layout(scalar) writeonly buffer Additions { vec4 additions[]; };
 
 // Returns the composite without noise. A channel that was white stays as it was where it is a

@@ -189,7 +189,7 @@ void mark_takes(const Paths& takes, bool good, std::ostream& out) {
 
 namespace {
 
-// What is wrong with a take, in words.
+// The faults of a take, in words.
 struct Faults {
   std::vector<std::string> damage;  // what is not as it was recorded
   std::vector<std::string> lost;    // what the rig lost while it recorded, and nothing brings back

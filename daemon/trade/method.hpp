@@ -39,11 +39,11 @@ class MethodRenderer {
   TradePicture denoised_picture();
 
  private:
+  TradePicture made(const render::Layers& layers) const;
+
   const double exposure_;
   const glm::dmat4 world_from_camera_;
   const bool adaptive_, denoise_;
-  TradePicture made(const render::Layers& layers) const;
-
   const PlatePtr plate_, whole_;      // at the size of the rendering, and of the sweep
   const std::vector<double> camera_;  // the whole plate's radiance, interleaved RGB
   std::vector<float> radiance_of_;    // samples

@@ -417,8 +417,8 @@ TradeCorner Sweep::corner(const std::string& name, const TradeFrontPoint& at) co
   MethodRenderer renderer = renderer_of(at.method);
   renderer.begin(seed(0));
   renderer.render(report_.point(at).samples);
-  const TradePicture picture = renderer.picture();
-  TradeCorner corner{name, at, displayed(picture), displayed(picture)};
+  const Plate shown = displayed(renderer.picture());
+  TradeCorner corner{name, at, shown, shown};
   for (std::size_t i = 0; i < corner.difference.samples.size(); ++i) {
     const int off = static_cast<int>(corner.difference.samples[i]) - report_.reference.samples[i];
     corner.difference.samples[i] = static_cast<std::uint16_t>(std::clamp(128 + 5 * off, 0, 255));

@@ -60,73 +60,70 @@ bool is_touched(const render::Layers& layers, const Plate& small, const Plate& w
   return false;
 }
 
-class Enlarged : public ::testing::TestWithParam<Size> {};
-INSTANTIATE_TEST_SUITE_P(Sizes, Enlarged,
-                         ::testing::Values(Size{24, 18}, Size{23, 17}, Size{48, 36}, Size{95, 71}));
+// A camera of 96x72 pixels, and a rendering of another size.
+class Enlarged : public ::testing::TestWithParam<std::tuple<Size, PixelFormat>> {
+ protected:
+  const Size size_ = std::get<0>(GetParam());
+  const View view_ = ball_to_the_left(size_.width, size_.height);
+  SetRenderer renderer_{view_, {.max_depth = 3}};
+  const FramePtr camera_ = random_frame(96, 72, std::get<1>(GetParam()));
+  const Plate whole_ = to_plate(*camera_);
+  const lighting::Response response_{{}, whole_.bits};
+};
+INSTANTIATE_TEST_SUITE_P(
+    Sizes, Enlarged,
+    ::testing::Combine(::testing::Values(Size{24, 18}, Size{23, 17}, Size{48, 36}, Size{95, 71}),
+                       ::testing::Values(PixelFormat::rgb8, PixelFormat::rgb16)));
 
 TEST_P(Enlarged, IsThePlateBitForBitWhereNothingVirtualTouchesIt) {
-  const View view = ball_to_the_left(GetParam().width, GetParam().height);
-  SetRenderer renderer(view, {.max_depth = 3});
-  for (const PixelFormat format : {PixelFormat::rgb8, PixelFormat::rgb16}) {
-    const FramePtr camera = random_frame(96, 72, format);
-    const Plate whole = to_plate(*camera);
-    const lighting::Response response({}, whole.bits);
-    for (const bool denoise : {false, true})
-      for (const bool dithers : {false, true}) {
-        renderer.begin(input(camera, view, dithers));
-        renderer.render(4);
-        const render::Layers layers = renderer.layers();
-        const Plate small = renderer.plate();
-        ASSERT_EQ(small.width, GetParam().width);
-        const Plate shown = renderer.show(denoise);
-        expect_clean(renderer.counters());
-        ASSERT_EQ(shown.width, 96);
-        ASSERT_EQ(shown.height, 72);
-        ASSERT_EQ(shown.samples.size(), whole.samples.size());
-        int untouched = 0, changed = 0;
-        for (int y = 0; y < 72; ++y)
-          for (int x = 0; x < 96; ++x) {
-            const auto at = static_cast<std::size_t>(3 * (y * 96 + x));
-            const bool is_same =
-                std::equal(&shown.samples[at], &shown.samples[at] + 3, &whole.samples[at]);
-            changed += is_same ? 0 : 1;
-            // Filtering carries light on to pixels nearby.
-            const bool is_far = x >= 72;
-            if (denoise ? !is_far : is_touched(layers, small, whole, x, y, response, 0.5)) continue;
-            ++untouched;
-            EXPECT_TRUE(is_same) << x << ", " << y;
-          }
-        EXPECT_GE(untouched, 96 * 72 / 4);
-        EXPECT_GT(changed, 96 * 72 / 50);
-      }
-  }
+  for (const bool denoise : {false, true})
+    for (const bool dithers : {false, true}) {
+      renderer_.begin(input(camera_, view_, dithers));
+      renderer_.render(4);
+      const render::Layers layers = renderer_.layers();
+      const Plate small = renderer_.plate();
+      ASSERT_EQ(small.width, size_.width);
+      const Plate shown = renderer_.show(denoise);
+      expect_clean(renderer_.counters());
+      ASSERT_EQ(shown.width, 96);
+      ASSERT_EQ(shown.height, 72);
+      ASSERT_EQ(shown.samples.size(), whole_.samples.size());
+      int untouched = 0, changed = 0;
+      for (int y = 0; y < 72; ++y)
+        for (int x = 0; x < 96; ++x) {
+          const auto at = static_cast<std::size_t>(3 * (y * 96 + x));
+          const bool is_same =
+              std::equal(&shown.samples[at], &shown.samples[at] + 3, &whole_.samples[at]);
+          changed += is_same ? 0 : 1;
+          // Filtering carries light on to pixels nearby.
+          const bool is_far = x >= 72;
+          if (denoise ? !is_far : is_touched(layers, small, whole_, x, y, response_, 0.5)) continue;
+          ++untouched;
+          EXPECT_TRUE(is_same) << x << ", " << y;
+        }
+      EXPECT_GE(untouched, 96 * 72 / 4);
+      EXPECT_GT(changed, 96 * 72 / 50);
+    }
 }
 
 // The device has the light in halves, whose last bit is 2^-11 of it, and light is up to twice white
 // here; a response is at most 13 times as steep as from black to white (sRGB near black).
 TEST_P(Enlarged, IsThatOfTheLayersInDoublePrecision) {
-  const View view = ball_to_the_left(GetParam().width, GetParam().height);
-  SetRenderer renderer(view, {.max_depth = 3});
-  for (const PixelFormat format : {PixelFormat::rgb8, PixelFormat::rgb16}) {
-    const FramePtr camera = random_frame(96, 72, format);
-    const Plate whole = to_plate(*camera);
-    const lighting::Response response({}, whole.bits);
-    renderer.begin(input(camera, view));
-    renderer.render(16);
-    const render::Layers layers = renderer.layers();
-    const auto signal_of = [&](std::uint16_t sample) {
-      return static_cast<float>(response.inverse()[sample]);
-    };
-    const std::vector<glm::vec3> expected =
-        render::enlarged(render::additions_of(layers, renderer.plate(), signal_of, 0.5),
-                         renderer.plate(), whole, signal_of);
-    const Plate shown = renderer.show(false);
-    const double most = (1 << whole.bits) - 1;
-    for (std::size_t i = 0; i < shown.samples.size(); ++i)
-      EXPECT_NEAR(shown.samples[i], response.forward(expected[i / 3][static_cast<int>(i % 3)]),
-                  1 + 2 * 0x1p-11 * 13 * most)
-          << i;
-  }
+  renderer_.begin(input(camera_, view_));
+  renderer_.render(16);
+  const render::Layers layers = renderer_.layers();
+  const auto signal_of = [&](std::uint16_t sample) {
+    return static_cast<float>(response_.inverse()[sample]);
+  };
+  const std::vector<glm::vec3> expected =
+      render::enlarged(render::additions_of(layers, renderer_.plate(), signal_of, 0.5),
+                       renderer_.plate(), whole_, signal_of);
+  const Plate shown = renderer_.show(false);
+  const double most = (1 << whole_.bits) - 1;
+  for (std::size_t i = 0; i < shown.samples.size(); ++i)
+    EXPECT_NEAR(shown.samples[i], response_.forward(expected[i / 3][static_cast<int>(i % 3)]),
+                1 + 2 * 0x1p-11 * 13 * most)
+        << i;
 }
 
 // A virtual board of one colour, whose edge is upright and lies between two of the rendering's
