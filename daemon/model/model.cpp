@@ -417,7 +417,7 @@ void make_model(const ModelOptions& options, std::ostream& out) {
   print_fit(parts, start.layout, fit, out);
   print_faces(fit, out);
   const std::vector<NamedMesh> scans = place_scans(parts, start.layout, fit.shape, read, out);
-  const std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape);
+  const std::vector<Solid> solids = solids_of(parts, start.layout, fit.shape, &views);
   const std::string model = coloured_model(options, set, {parts, views, start.layout, fit.shape},
                                            solids, scans, camera.response, out);
   const std::filesystem::path file = file_of(options);

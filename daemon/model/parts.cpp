@@ -92,8 +92,9 @@ Keys plane_keys(PlanePart& p) {
       {"tag_thickness_m", &p.tag_thickness_m, thin, "Thickness of their paper or board."},
       {"tag_paper_m", &p.tag_paper_m, length, tag_paper_about, optional("[0.21, 0.297]")},
       {"points", &p.points, {}, "Points that lie on it.", optional("[\"a\", \"b\", \"c\"]")},
-      {"outline", &p.outline, {}, "Points at its corners, in order around. Default: a rectangle around everything on it.", optional("[\"a\", \"b\", \"c\", \"d\"]")},
+      {"outline", &p.outline, {}, "Points at its corners, in order around. Default: a rectangle around everything on it; that of a wall goes up to the top of the pictures.", optional("[\"a\", \"b\", \"c\", \"d\"]")},
       {"margin_m", &p.margin_m, units::m.within(0, 1000), "How far that rectangle extends beyond what is on the plane."},
+      {"height_m", &p.height_m, length, "Height of an upright plane over the one that it stands on. Default of a wall: up to the top of the pictures, and the margin beyond.", optional("2.6")},
       {"edges", &p.edges, {}, "Pairs of points on its borders, where the rectangle ends.", optional("[[\"a\", \"b\"]]")},
       {"upright_on", &p.upright_on, {}, "Plane that it stands on at a right angle.", optional("\"floor\"")},
       {"foot", &p.foot, {}, "Points where it meets that plane.", optional("[\"a\", \"b\"]")},
@@ -333,6 +334,10 @@ class Checker {
       add(given, "edges", "conflicts with outline; remove one of the two");
     if (!p.foot.empty() && p.upright_on.empty())
       add(given, "foot", "needs upright_on, the plane that the foot is on");
+    if (p.height_m && p.upright_on.empty())
+      add(given, "height_m", "needs upright_on, the plane that it is the height over");
+    if (p.height_m && !p.outline.empty())
+      add(given, "height_m", "conflicts with outline; remove one of the two");
     const std::size_t on_it = marked(p.points) + marked(p.outline) + marked(p.foot);
     const std::size_t needed = p.upright_on.empty() ? 3 : 2;
     if (p.tags.empty() && on_it < needed)

@@ -36,6 +36,9 @@ struct PlanePart {
   // Points at its corners, in order around; empty: a rectangle around all that is on it.
   std::vector<std::string> outline = {};
   double margin_m = 0.3;  // of that rectangle
+  // Of that rectangle if the plane stands on another; none: of a wall up to the top of the pictures
+  // and the margin beyond.
+  std::optional<double> height_m = {};
   // Pairs of points on its borders; the rectangle ends at the line through each. Points on a
   // border lie on the plane, and one picture of each is enough.
   std::vector<std::array<std::string, 2>> edges = {};

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "daemon/tracking/camera_pose.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::model {
@@ -16,6 +17,8 @@ namespace {
 constexpr int cylinder_sides = 48;
 // A point that is farther behind a wall than this is not at its foot.
 constexpr double behind_m = 5e-3;
+// A picture's upper edge is looked along in so many steps.
+constexpr int steps_across = 256;
 // A face hides nothing that is beyond it by less than this share of the distance.
 constexpr double hidden_share = 2e-3;
 
@@ -50,8 +53,8 @@ bool hides(const Face& face, const glm::dvec3& eye, const glm::dvec3& point) {
 
 class Solids {
  public:
-  Solids(const Parts& parts, const Layout& layout, const Shape& shape)
-      : parts_(parts), layout_(layout), shape_(shape) {}
+  Solids(const Parts& parts, const Layout& layout, const Shape& shape, const Views* views)
+      : parts_(parts), layout_(layout), shape_(shape), views_(views) {}
 
   std::vector<Solid> all() const {
     std::vector<Solid> solids;
@@ -111,8 +114,28 @@ class Solids {
                                      : glm::dvec3(tag->tag->world_from_tag[0]);
   }
 
+  // Returns how high on a wall the pictures' upper edges are, above its `at` and within `low` to
+  // `high` along its first axis; below everything where they do not show it.
+  double top_seen(const Plane& wall, const glm::dmat3& axes, double low, double high) const {
+    double top = -std::numeric_limits<double>::infinity();
+    for (const MarkedView& view : views_->views)
+      for (int i = 0; i <= steps_across; ++i) {
+        const double x = double(i) * views_->lens.width / steps_across - 0.5;
+        const auto ray = tracking::ray_through(
+            views_->lens, tracking::world_from_camera(view.pose.pose), {x, -0.5});
+        if (!ray) continue;
+        const double t =
+            glm::dot(wall.at - ray->origin, wall.normal) / glm::dot(ray->direction, wall.normal);
+        if (!(t > 0 && std::isfinite(t))) continue;
+        const glm::dvec3 at = ray->origin + t * ray->direction - wall.at;
+        const double across = glm::dot(at, axes[0]);
+        if (across >= low && across <= high) top = std::max(top, glm::dot(at, axes[1]));
+      }
+    return top;
+  }
+
   // A rectangle around all that is on the plane. That of an upright plane begins at what it stands
-  // on.
+  // on; a wall's goes up to the top of the pictures, and its margin beyond.
   Points rectangle(std::size_t index) const {
     const Plane& plane = shape_.planes[index];
     const double margin = parts_.planes[index].margin_m;
@@ -123,11 +146,15 @@ class Solids {
       low = glm::min(low, at);
       high = glm::max(high, at);
     }
+    const auto on = layout_.plane_on[index];
+    if (on && views_ != nullptr && has_all_before(*on, plane))
+      high.y = std::max(high.y, top_seen(plane, axes, low.x, high.x));
     low -= margin;
     high += margin;
-    if (const auto on = layout_.plane_on[index]) {
+    if (on) {
       const Plane& below = shape_.planes[*on];
       low.y = glm::dot(below.at - plane.at, below.normal);
+      if (const auto height = parts_.planes[index].height_m) high.y = low.y + *height;
     }
     Points corners;
     for (const glm::dvec2 at : {low, glm::dvec2(high.x, low.y), high, glm::dvec2(low.x, high.y)})
@@ -288,6 +315,7 @@ class Solids {
   const Parts& parts_;
   const Layout& layout_;
   const Shape& shape_;
+  const Views* views_;
 };
 
 }  // namespace
@@ -330,8 +358,9 @@ bool is_hidden(const std::vector<Solid>& solids, const glm::dvec3& eye, const gl
   return false;
 }
 
-std::vector<Solid> solids_of(const Parts& parts, const Layout& layout, const Shape& shape) {
-  return Solids(parts, layout, shape).all();
+std::vector<Solid> solids_of(const Parts& parts, const Layout& layout, const Shape& shape,
+                             const Views* views) {
+  return Solids(parts, layout, shape, views).all();
 }
 
 }  // namespace previz::model

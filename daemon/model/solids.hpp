@@ -34,8 +34,11 @@ NamedMesh mesh_of(const Solid& solid);
 bool is_hidden(const std::vector<Solid>& solids, const glm::dvec3& eye, const glm::dvec3& point);
 
 // Returns a solid for each plane that belongs to no room, each box, cylinder and room, in this
-// order. The shape must be settled. Throws previz::Error naming a plane whose outline is not
-// convex, or of which the planes that stand on it leave nothing.
-std::vector<Solid> solids_of(const Parts& parts, const Layout& layout, const Shape& shape);
+// order. The shape must be settled. With the pictures, a wall goes up to where their upper edges
+// show it, and its margin beyond, unless an outline or a height says where it ends. Throws
+// previz::Error naming a plane whose outline is not convex, or of which the planes that stand on it
+// leave nothing.
+std::vector<Solid> solids_of(const Parts& parts, const Layout& layout, const Shape& shape,
+                             const Views* views = nullptr);
 
 }  // namespace previz::model

@@ -97,6 +97,8 @@ TEST(ModelParts, MistakesAreNamedWithTheirLine) {
       {"[[plane]]\nname = \"wall\"\npoints = [\"a\", \"b\"]\nupright_on = "
        "\"flor\"\n[[plane]]\nname = \"floor\"\ntags = [0]\n",
        "there is no plane \"flor\"; did you mean floor?"},
+      {"[[plane]]\nname = \"t\"\ntags = [0]\nheight_m = 1\n",
+       "plane.height_m: needs upright_on, the plane that it is the height over"},
       {"[[box]]\nname = \"b\"\ntop = [\"a\", \"b\", \"c\", \"\"]\n",
        "box \"b\" has one side only: nothing says how high it is"},
       {"[[box]]\nname = \"b\"\ntop = [\"a\", \"b\", \"\", \"\"]\nheight_m = 1\n",

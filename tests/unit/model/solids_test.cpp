@@ -100,6 +100,44 @@ TEST(ModelSolids, AWallEndsAtItsFloorAndTheFloorAtTheWall) {
   EXPECT_LT(glm::distance(model::normal_of(solids[1].faces[0]), glm::dvec3(0, -1, 0)), 1e-12);
 }
 
+// A camera 2 m before a wall and 1 m above the floor, which looks level, sees half the wall's
+// height above itself; of the wall's own points none is above its foot.
+TEST(ModelSolids, AWallGoesUpToThePicturesTop) {
+  Model m;
+  const std::size_t floor = m.add_plane("floor", {{0, 0, 0}, {0, 0, 1}});
+  m.add_plane("wall", {{0, 2, 0}, {0, -1, 0}}, floor);
+  m.parts.planes[0].points = {"near"};
+  m.parts.planes[1].points = {"left", "right"};
+  m.layout.places = {{"near", {}},
+                     {"left", {model::Place::Kind::free, 1, 0}},
+                     {"right", {model::Place::Kind::free, 2, 0}}};
+  m.shape.points = {{0, 1.5, 0}, {-1, 2, 0}, {1, 2, 0}};
+  model::Views views;
+  views.lens = plain_lens(640, 480, 500);
+  model::MarkedView view;
+  view.pose.pose.rotation =
+      glm::transpose(glm::dmat3(glm::dvec3(1, 0, 0), glm::dvec3(0, 0, -1), glm::dvec3(0, 1, 0)));
+  view.pose.pose.translation = -view.pose.pose.rotation * glm::dvec3(0, 0, 1);
+  views.views = {view};
+  const auto highest = [&](const model::Views* seen) {
+    double z = -1;
+    for (const auto& p : model::solids_of(m.parts, m.layout, m.shape, seen)[1].faces[0].outline)
+      z = std::max(z, p.z);
+    return z;
+  };
+  const double above = 2 * (views.lens.cy + 0.5) / views.lens.fy;
+  EXPECT_NEAR(highest(&views), 1 + above + 1, 1e-9);  // and its margin
+  EXPECT_NEAR(highest(nullptr), 1, 1e-12);
+  m.parts.planes[1].height_m = 2.6;
+  EXPECT_NEAR(highest(&views), 2.6, 1e-12);
+  m.parts.planes[1].height_m.reset();
+  // A screen that leaves some of the floor behind itself is no wall.
+  m.parts.planes[0].points.emplace_back("far");
+  m.layout.places["far"] = {model::Place::Kind::free, 3, 0};
+  m.shape.points.emplace_back(0, 3, 0);
+  EXPECT_NEAR(highest(&views), 1, 1e-12);
+}
+
 // A low screen in the middle of a table ends nothing of it.
 TEST(ModelSolids, AScreenLeavesWhatIsBehindIt) {
   Model m;
