@@ -168,10 +168,11 @@ void add_bench(CLI::App& app, bench::BenchOptions& options) {
   add_device_options(command, options.device);
 }
 
-void add_check(CLI::App& app, std::filesystem::path& set_or_session) {
+void add_check(CLI::App& app, post::CheckOptions& options) {
   CLI::App& command =
       *app.add_subcommand("check", "List the mistakes in a set file or, if none, what it needs");
-  command.add_option("set", set_or_session, "Set file or session folder")->required();
+  command.add_option("set", options.set_or_session, "Set file or session folder")->required();
+  command.add_option("--set", options.set_file, "Set file, instead of the session's own");
 }
 
 void add_devices(CLI::App& app, bool& learn, bool& rules) {

@@ -13,6 +13,7 @@
 #include "daemon/exchange/take_track.hpp"
 #include "daemon/farm/command_line.hpp"
 #include "daemon/model/model.hpp"
+#include "daemon/post/check.hpp"
 #include "daemon/post/render.hpp"
 #include "daemon/post/render_takes.hpp"
 #include "daemon/print/command_line.hpp"
@@ -27,7 +28,7 @@ struct CommandLine {
   post::RenderOptions render;
   std::optional<post::WhichTakes> render_takes;  // of the folder that is named
   rig::LiveOptions run;
-  std::filesystem::path check;
+  post::CheckOptions check;
   bool learn = false, rules = false;  // of devices
   exchange::ImportOptions import_session;
   exchange::ExportOptions export_take;

@@ -22,6 +22,7 @@
 #include "daemon/command_line.hpp"
 #include "daemon/device_rules.hpp"
 #include "daemon/devices.hpp"
+#include "daemon/output/still_working.hpp"
 #include "daemon/output/take_folders.hpp"
 #include "daemon/post/check.hpp"
 #include "daemon/post/render_takes.hpp"
@@ -187,7 +188,14 @@ int do_stoppable(const CLI::App& app, CommandLine& said) {
                           : app.got_subcommand("model") ? std::optional(of_a_model)
                                                         : std::optional(of_a_command));
   int status = 1;
+  std::vector<std::ostream*> terminals;
+  if (isatty(STDOUT_FILENO) != 0) terminals.push_back(&std::cout);
+  if (isatty(STDERR_FILENO) != 0) terminals.push_back(&std::cerr);
   try {
+    // A rig goes on until it is stopped, and `devices --learn` waits for buttons.
+    std::optional<output::StillWorking> working;
+    if (!is_rig && !said.learn && !terminals.empty())
+      working.emplace("previzd " + app.get_subcommands().front()->get_name(), terminals);
     status = do_command(app, said, stop);
   } catch (const std::exception& error) {
     report_end(error);

@@ -7,7 +7,7 @@
 #   tests/run.sh              the gate: release asan format lint
 #   tests/run.sh full         the gate, with all tests in release, and then
 #                             bench lint-all long gpu_code other_devices debian13 asan-all tsan fuzz mutations soak package
-#                             farm rig_vm
+#                             farm rig_vm first_day
 #   tests/run.sh STEP...      only the named steps
 #
 #   release    builds everything but the benchmarks and soak, and runs the tests; in the gate without
@@ -36,6 +36,8 @@
 #              (tests/farm/run.sh), and tests the checker of Open Job Description templates
 #   rig_vm     runs the drivers, then the package, on a rig in a VM, and brings faults upon it
 #              (tests/rig_vm/run.sh)
+#   first_day  the first days of a student, an operator and a director, typed on a terminal
+#              (tests/first_day/run.sh)
 # package needs root or user namespaces, rig_vm, gpu_code, debian13 and farm need root, and these five and
 # other_devices the network.
 #
@@ -49,7 +51,7 @@ steps=("$@")
 gate_only=OFF
 [[ ${#steps[@]} -gt 0 ]] || { steps=("${gate[@]}") gate_only=ON; }
 [[ ${steps[*]} != full ]] || steps=("${gate[@]}" bench lint-all long gpu_code other_devices debian13 asan-all
-  tsan fuzz mutations soak package farm rig_vm)
+  tsan fuzz mutations soak package farm rig_vm first_day)
 failures=()
 summaries=()
 costs=()
@@ -156,11 +158,11 @@ for name in "${steps[@]}"; do
     lint) check "lint" tests/lint/run.sh ;;
     lint-all) check "lint-all" tests/lint/run.sh all ;;
     bench | fuzz | soak) check "$name" "$name" ;;
-    mutations | package | rig_vm | farm | gpu_code | other_devices | debian13) check "$name" "tests/$name/run.sh" ;;
+    mutations | package | rig_vm | farm | gpu_code | other_devices | debian13 | first_day) check "$name" "tests/$name/run.sh" ;;
     *)
       echo "tests/run.sh: no step '$name'; allowed: full, or of release, asan, format, lint," \
         "bench, lint-all, long, gpu_code, other_devices, debian13, asan-all, tsan, fuzz, mutations, soak," \
-        "package, farm and rig_vm" >&2
+        "package, farm, rig_vm and first_day" >&2
       exit 2
       ;;
   esac

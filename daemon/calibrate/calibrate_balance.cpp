@@ -80,9 +80,11 @@ void print_balance(const SurfacePixels& seen, const Balance& balance, std::ostre
              set::plural(seen.world_from_cameras.size(), "frame"),
              set::plural(seen.pixels.size(), "pixel"));
   for (const SurfaceRatio& surface : balance.surfaces)
-    fmt::print(out, "  {}: camera / model {:.3f} {:.3f} {:.3f} (+- {}), {} pixels in {} tiles{}\n",
+    fmt::print(out, "  {}: camera / model {:.3f} {:.3f} {:.3f} (+- {}), {} in {}{}\n",
                seen.surfaces[surface.surface].material, surface.ratio.r, surface.ratio.g,
-               surface.ratio.b, percent(surface.sigma), surface.pixels, surface.tiles,
+               surface.ratio.b, percent(surface.sigma),
+               set::plural(std::uint64_t(surface.pixels), "pixel"),
+               set::plural(std::uint64_t(surface.tiles), "tile"),
                surface.reference ? "" : ", not a reference");
   fmt::print(out, "balance {:.4f} {:.4f} {:.4f} (+- {})\n", balance.scale.r, balance.scale.g,
              balance.scale.b, percent(balance.sigma));

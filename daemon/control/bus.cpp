@@ -151,6 +151,7 @@ constexpr Property properties[] = {
     property<&Status::set>("Set", "s"),
     property<&Status::object>("Object", "s"),
     property<&Status::light>("Light", "s"),
+    property<&Status::set_problem>("SetProblem", "s"),
     property<&Status::device>("Device", "s"),
     property<&Status::model>("Model", "s"),
     property<&Status::message>("Message", "s"),

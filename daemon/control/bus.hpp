@@ -33,6 +33,7 @@ struct Status {
   bool camera_lost = false;
   std::int32_t samples = 0;
   std::string set, object, light;  // names of the set, the selected object and the selected lamp
+  std::string set_problem;         // why a set that was asked for later is not the one in use
   std::string device;              // that draws: "NVIDIA RTX 4000", "llvmpipe (CPU)"; empty: none
   std::string model;               // how far it is from the pictures, in words; empty: not measured
   std::string message;             // the last announcement

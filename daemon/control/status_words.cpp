@@ -77,6 +77,7 @@ std::vector<std::string> status_words(const Properties& rig) {
   const std::pair<const char*, std::string> lines[] = {
       {"mode", mode_words(rig)},
       {"set", of("Set")},
+      {"the set that was asked for is not in use", of("SetProblem")},
       {"drawn by", of("Device")},
       {"picture", is_loading ? "" : picture_words(rig)},
       {"film camera", of("CameraLost").empty() ? "" : "lost, no picture comes"},

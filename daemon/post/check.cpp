@@ -30,11 +30,12 @@ namespace {
 namespace fs = std::filesystem;
 
 // `take_opened` becomes the take, if it is one.
-set::CheckedSet open(const fs::path& set_or_session, set::Findings& findings,
+set::CheckedSet open(const CheckOptions& options, set::Findings& findings,
                      std::optional<pipeline::Take>& take_opened) {
   set::CheckedSet checked;
-  if (fs::is_directory(set_or_session)) {
-    const auto& take = take_opened.emplace(pipeline::open_take(set_or_session, std::nullopt));
+  if (fs::is_directory(options.set_or_session)) {
+    const auto& take =
+        take_opened.emplace(pipeline::open_take(options.set_or_session, options.set_file));
     checked.set = take.set;
     checked.set.observer.calibration = take.observer;
     checked.set.light_camera.calibration = take.light;
@@ -45,7 +46,7 @@ set::CheckedSet open(const fs::path& set_or_session, set::Findings& findings,
     if (!take.light_stream) checked.set.light_camera.driver = set::no_driver;
     return checked;
   }
-  checked.set = set::load_set(set_or_session);
+  checked.set = set::load_set(options.set_or_session);
   auto& observer = checked.set.observer;
   auto& light = checked.set.light_camera;
   const auto replayed = [&](const std::string& camera, const std::string& driver,
@@ -110,11 +111,14 @@ void describe_light(const pipeline::Take& take, const scene::Scene& scene, set::
 
 }  // namespace
 
-int check_set(const fs::path& set_or_session, std::ostream& out) {
+int check_set(const CheckOptions& options, std::ostream& out) {
+  if (options.set_file && !fs::is_directory(options.set_or_session))
+    throw Error(options.set_or_session.string() +
+                ": is not a session; --set names the set file to check a session with");
   set::Findings findings;
   set::CheckedSet checked;
   std::optional<pipeline::Take> take;
-  findings.attempt([&] { checked = open(set_or_session, findings, take); });
+  findings.attempt([&] { checked = open(options, findings, take); });
   if (!findings.problems.empty()) return refuse(findings.problems, out);
 
   const std::optional<scene::Scene> scene = scene::check(checked, findings);
@@ -137,7 +141,8 @@ int check_set(const fs::path& set_or_session, std::ostream& out) {
     describe_light(*take, *scene, findings, details);
   }
   out << checked.set.name << " ("
-      << (checked.is_take ? "the set recorded with the take" : checked.set.file.string())
+      << (checked.is_take && !options.set_file ? "the set recorded with the take"
+                                               : checked.set.file.string())
       << ") is valid\n";
   if (!findings.remarks.empty()) out << "\nworth checking\n";
   for (const std::string& remark : findings.remarks) out << "  " << remark << '\n';

@@ -3,8 +3,14 @@
 
 #include <filesystem>
 #include <iosfwd>
+#include <optional>
 
 namespace previz::post {
+
+struct CheckOptions {
+  std::filesystem::path set_or_session;
+  std::optional<std::filesystem::path> set_file = {};  // in place of a session's own
+};
 
 // Takes a set file, or a session directory with its own set and calibrations. Opens no device: a
 // replayed session is read, but its frames are not decoded, except five of a take, by which it says
@@ -12,7 +18,8 @@ namespace previz::post {
 // pictures. Prints cameras, tags, objects
 // with their triangles, lights, estimator, the features of the renderer that the set uses and
 // leaves out, and remarks on settings that are allowed but unusual. Returns 0, or 1 after printing
-// every problem of the set file, each object's file, the environment and the tag map.
-int check_set(const std::filesystem::path& set_or_session, std::ostream& out);
+// every problem of the set file, each object's file, the environment and the tag map. Throws
+// previz::Error for a set file in place of the set of no session.
+int check_set(const CheckOptions& options, std::ostream& out);
 
 }  // namespace previz::post

@@ -56,7 +56,7 @@ class CrewScreen {
   std::filesystem::path directory_;
 };
 
-control::Status status_of(const Rig& rig, const set::Set& set, const render::Device& device,
+control::Status status_of(const Rig& rig, const SetKeeper& sets, const render::Device& device,
                           const report::Reports& reports) {
   const Look& look = rig.controls().look();
   const output::RecorderStatus recorder = rig.recorder_status();
@@ -74,9 +74,10 @@ control::Status status_of(const Rig& rig, const set::Set& set, const render::Dev
           recorder.fault,
           look.state.camera_lost,
           rig.samples(),
-          set.name,
+          sets.running().set.name,
           rig.controls().selected_object(),
           rig.controls().selected_light(),
+          sets.problem(),
           render::drawing_device(device),
           fit ? words_of(*fit) : "",
           reports.announced(),
@@ -84,14 +85,15 @@ control::Status status_of(const Rig& rig, const set::Set& set, const render::Dev
           0};
 }
 
-control::Verbs verbs_of(Rig& rig, const set::Set& set, const render::Device& device,
+control::Verbs verbs_of(Rig& rig, const SetKeeper& sets, const render::Device& device,
                         report::Reports& reports, const std::function<std::string()>& metrics) {
   const auto answer = [](const Outcome& outcome) {
     return control::Answer{outcome.said, outcome.refused};
   };
   // Whoever asks on the bus need not see the set.
-  const auto ends_a_take = [&rig, &set](bool begins) {
-    return !set.recording.end_over_bus && !begins && rig.controls().look().state.recording;
+  const auto ends_a_take = [&rig, &sets](bool begins) {
+    return !sets.running().set.recording.end_over_bus && !begins &&
+           rig.controls().look().state.recording;
   };
   const auto not_here = [] {
     return control::Answer{"the set lets only buttons end a take (recording.end_over_bus)", true};
@@ -117,7 +119,7 @@ control::Verbs verbs_of(Rig& rig, const set::Set& set, const render::Device& dev
   verbs.denied = [&reports, over_bus](const std::string& who, const std::string& verb) {
     reports(report::once({report::Severity::warning, over_bus(who), verb + " (not allowed)"}));
   };
-  verbs.status = [&] { return status_of(rig, set, device, reports); };
+  verbs.status = [&] { return status_of(rig, sets, device, reports); };
   verbs.metrics = metrics;
   return verbs;
 }
@@ -249,7 +251,7 @@ class LiveRun {
       return false;
     }
     say_live(set);
-    run_rig(loop, *rig, set);
+    run_rig(loop, *rig);
     rig.reset();
     is_last_ =
         !sets_.has_next() || end_.stop_requested();  // a stop may come with a set that was read
@@ -260,12 +262,12 @@ class LiveRun {
     return true;
   }
 
-  void run_rig(EventLoop& loop, Rig& rig, const set::Set& set) {
+  void run_rig(EventLoop& loop, Rig& rig) {
     std::optional<RecordingWatch> watch;
     if (bus_) {
       watch.emplace(loop.handle(), reports_, [this] { end_if_replaced(); });
       bus_->serve(loop,
-                  verbs_of(rig, set, *device_, reports_, [this] { return to_json(snapshot()); }));
+                  verbs_of(rig, sets_, *device_, reports_, [this] { return to_json(snapshot()); }));
       rig.on_change([&] {
         bus_->changed();
         watch->look(rig);
@@ -276,7 +278,7 @@ class LiveRun {
     const auto drivers = loop.every(std::chrono::seconds(1), [&] { end_if_barred(rig); });
     rig.run();
     if (bus_ && sets_.has_next() && !end_.stop_requested())
-      bus_->serve_alone(loading_verbs(status_of(rig, set, *device_, reports_)));
+      bus_->serve_alone(loading_verbs(status_of(rig, sets_, *device_, reports_)));
     else
       bus_.reset();
     sets_.leave(rig.controls().look().edits);

@@ -114,6 +114,7 @@ std::optional<SetKeeper::Ended> SetKeeper::finish(std::chrono::milliseconds pati
 std::string SetKeeper::drop_next(const std::string& why) {
   if (next_ && next_->set.file == running_.set.file) file_ = SetFileWatch(running_.changed);
   next_.reset();
+  problem_ = why;
   reports_({Severity::warning, "", "the old set stays in use: " + why});
   return "the old set stays in use: " + why;
 }
@@ -124,7 +125,7 @@ void SetKeeper::begin_change(int next) {
         return Read{load_whole_set(next == 0 ? file : neighbour(file, next), with), {}, {}};
       },
       [this](const std::string& what) {
-        const std::string first = what.substr(0, what.find('\n'));
+        const std::string first = problem_ = what.substr(0, what.find('\n'));
         reports_({Severity::error, "", what + "\nthe old set stays in use", "",
                   report::passing("the old set stays in use", first)});
         return "the old set stays in use: " + first;
@@ -198,6 +199,7 @@ void SetKeeper::carry_edits() {
 
 void SetKeeper::run(LoadedSet set) {
   running_ = std::move(set);
+  problem_.clear();
   file_ = SetFileWatch(running_.changed);
 }
 
@@ -215,6 +217,7 @@ bool SetKeeper::go_back(const std::string& why) {
   // The same file is not tried again until it changes again.
   if (before_->set.file == running_.set.file) before_->changed = running_.changed;
   run(*std::exchange(before_, std::nullopt));
+  problem_ = why.substr(0, why.find('\n'));
   changes_ = std::move(changes_before_);
   return true;
 }

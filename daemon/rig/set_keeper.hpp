@@ -64,6 +64,8 @@ class SetKeeper {
 
   const LoadedSet& running() const { return running_; }
   bool has_next() const { return next_.has_value(); }
+  // Returns in one line why what was asked for last is not the running set; "" if it is.
+  const std::string& problem() const { return problem_; }
 
   // Begins to read the set file `next` places on in the folder; with 0, the running one again.
   void begin_change(int next);
@@ -128,6 +130,7 @@ class SetKeeper {
   LoadedSet running_;
   SetFileWatch file_;
   std::optional<LoadedSet> next_, before_;
+  std::string problem_;
   Changes changes_, changes_before_;
   std::function<std::string(const std::string&)> refused_;  // reports why a reading has failed
   using Clock = std::chrono::steady_clock;

@@ -362,7 +362,7 @@ class SimulatedDay : public testing::Test {
     session::Session take = session::open_session(folder);
     EXPECT_TRUE(take.missing.empty());
     std::ostringstream said;
-    EXPECT_EQ(post::check_set(folder, said), 0) << said.str();
+    EXPECT_EQ(post::check_set({folder}, said), 0) << said.str();
     const auto stream = session::open_stream(take, "observer");
     ASSERT_TRUE(stream && take.info.take);
     const Recorded& recorded = takes_[index];

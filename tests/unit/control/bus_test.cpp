@@ -206,8 +206,12 @@ TEST(StatusWords, SayWhatMattersAndNothingElse) {
                           {"BehindSeconds", "1.6"},
                           {"BehindMegabytes", "40"},
                           {"Fault", "disk full"},
+                          {"Set", "demo"},
+                          {"SetProblem", "demo.toml:4:1: set.nme: unknown key"},
                           {"CameraLost", "yes"}}),
             (std::vector<std::string>{
+                "set: demo",
+                "the set that was asked for is not in use: demo.toml:4:1: set.nme: unknown key",
                 "film camera: lost, no picture comes",
                 "take: 1A_take002, still being written, 1.6 s behind the cameras, 40 MB in memory",
                 "the last take ended by itself: disk full"}));

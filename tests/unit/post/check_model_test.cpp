@@ -73,9 +73,9 @@ class CheckModel : public testing::Test {
     writer.close();
   }
 
-  std::string checked() {
+  std::string checked(const std::optional<std::filesystem::path>& set_file = {}) {
     std::ostringstream out;
-    EXPECT_EQ(check_set(take_, out), 0) << out.str();
+    EXPECT_EQ(check_set({take_, set_file}, out), 0) << out.str();
     return out.str();
   }
 
@@ -118,6 +118,21 @@ TEST_F(CheckModel, SaysWhatToDoIfItIsOff) {
   EXPECT_THAT(said, HasSubstr("the model of what is real is 4.2 px beside the pictures' edges"));
   EXPECT_THAT(said, HasSubstr("action `guides`"));
   EXPECT_THAT(said, HasSubstr("`previzd calibrate tags`"));
+}
+
+// As after `previzd model --write`, which changes the set file and not the take.
+TEST_F(CheckModel, ASetFileTakesThePlaceOfTheTakesOwn) {
+  write_take(phantom(3));
+  const auto file = directory_ / "now.toml";
+  std::ofstream(file)
+      << "[set]\nname = 'now'\n[tracking]\nenabled = false\n[[object]]\nname = 'card'\n"
+         "file = 'card.gltf'\n" +
+             phantom(0);
+  const std::string said = checked(file);
+  EXPECT_THAT(said, testing::StartsWith("now (" + file.string() + ") is valid\n"));
+  EXPECT_THAT(said, HasSubstr("pieces of edges in 5 frames are 0.0"));
+  std::ostringstream out;
+  EXPECT_THAT(test::error_of([&] { check_set({file, file}, out); }), HasSubstr("is not a session"));
 }
 
 TEST_F(CheckModel, SaysThatTheLensIsOfPicturesOfAnotherSize) {

@@ -32,7 +32,7 @@ class Check : public testing::Test {
   // Exit status; what was printed is in `said_`.
   int check_file(const std::string& name) {
     std::ostringstream out;
-    const int status = check_set(directory_ / name, out);
+    const int status = check_set({directory_ / name}, out);
     said_ = out.str();
     return status;
   }

@@ -85,6 +85,12 @@ TEST_F(SetKeeperTest, ASetWithAFaultLeavesTheOldOneAndSaysWhy) {
   EXPECT_TRUE(says("\nthe old set stays in use\n")) << log_.str();
   ASSERT_EQ(reports_.troubles().size(), 1u);
   EXPECT_EQ(line_of(reports_.troubles()[0]), *why_not);
+  EXPECT_THAT(sets.problem(), HasSubstr("b.toml:1:12: set.name: "));
+  write("b.toml", "set.name = \"good again\"\n");
+  EXPECT_EQ(change(sets, 0), std::nullopt);
+  sets.begin_next();
+  EXPECT_EQ(sets.problem(), "");
+  write("b.toml", "set.name = 3\n");
   EXPECT_THROW(keeper(), Error);
 }
 
@@ -198,6 +204,7 @@ TEST_F(SetKeeperTest, GoesBackWithItsChanges) {
   ASSERT_TRUE(sets.go_back("there is no camera"));
   EXPECT_TRUE(says("there is no camera\nback to the previous set: ")) << log_.str();
   EXPECT_EQ(sets.edits(), a_stop_down("key"));
+  EXPECT_EQ(sets.problem(), "there is no camera");
   EXPECT_FALSE(sets.go_back("nor is there one now"));
 }
 
