@@ -90,7 +90,22 @@ void print_balance(const SurfacePixels& seen, const Balance& balance, std::ostre
              balance.scale.b, percent(balance.sigma));
 }
 
-SurfacePixels probed(const pipeline::Take& take, const BalanceOptions& options) {
+// Says why the tags' paper is not what decides, where nothing else was asked for. Throws
+// previz::Error if it was.
+void report_paper(const std::string& why_not, const std::vector<std::string>& references,
+                  std::ostream& out) {
+  if (why_not.empty()) return;
+  if (std::ranges::find(references, paper_name) != references.end())
+    throw Error("the printed tags' white paper cannot be used: " + why_not);
+  if (references.empty())
+    fmt::print(
+        out,
+        "the printed tags' white paper is not used: {}. The colours that the model has decide "
+        "instead; the balance is no better than they are\n",
+        why_not);
+}
+
+SurfacePixels probed(const pipeline::Take& take, const BalanceOptions& options, std::ostream& out) {
   const scene::Scene scene = scene::load_scene(take.set);
   const auto device =
       render::open_device(render::options_for(options.device, take.set.quality.hardware_rays));
@@ -100,6 +115,7 @@ SurfacePixels probed(const pipeline::Take& take, const BalanceOptions& options) 
     surfaces.add(shot);
     paper.look_at(shot);
   });
+  report_paper(paper.why_not(), options.references, out);
   SurfacePixels seen = surfaces.compare(scene, options.samples);
   append(paper.seen(), seen);
   return seen;
@@ -111,7 +127,7 @@ void calibrate_balance(const BalanceOptions& options, std::ostream& out) {
   if (options.write && !options.set_file)
     throw Error("--write needs --set: it changes that set file");
   const pipeline::Take take = pipeline::open_take(options.session, options.set_file);
-  const SurfacePixels seen = probed(take, options);
+  const SurfacePixels seen = probed(take, options, out);
   const Balance balance = fit_balance(seen, options.references);
   print_balance(seen, balance, out);
   print_exposure(balance, !take.set.lighting.environment, out);

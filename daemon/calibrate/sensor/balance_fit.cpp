@@ -12,7 +12,6 @@
 namespace previz::calibrate {
 namespace {
 
-constexpr std::size_t least_pixels = 8;      // per tile
 constexpr double median_over_mean = 1.2533;  // of standard errors (Gaussian): sqrt(pi / 2)
 constexpr double sigma_over_mad = 1.4826;
 // What is known of a surface's albedo before anything is measured: colours that were chosen with
@@ -93,7 +92,8 @@ Logs tile_medians(const SurfacePixels& seen, std::uint32_t surface, int channel)
       by_tile[pixel.tile].push_back(std::log(pixel.plate[channel] / pixel.rendered[channel]));
   Logs medians;
   for (auto& [tile, logs] : by_tile)
-    if (logs.size() >= least_pixels) medians.push_back(median(std::move(logs)));
+    if (logs.size() >= seen.surfaces[surface].least_pixels)
+      medians.push_back(median(std::move(logs)));
   return medians;
 }
 
@@ -151,7 +151,7 @@ Balance fit_balance(const SurfacePixels& seen, const std::vector<std::string>& r
   Balance balance;
   balance.surfaces = ratios(seen);
   if (balance.surfaces.empty())
-    throw Error("no diffuse real surface covers " + std::to_string(least_pixels) +
+    throw Error("no diffuse real surface covers " + std::to_string(KnownSurface{}.least_pixels) +
                 " unclipped pixels in any 1/16 of the picture: does the set have a phantom, "
                 "and is it in the picture?");
   mark_references(seen, references, balance.surfaces);

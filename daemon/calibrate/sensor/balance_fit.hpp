@@ -13,7 +13,7 @@ namespace previz::calibrate {
 struct SurfaceRatio {
   std::uint32_t surface = 0;  // index into SurfacePixels::surfaces
   std::size_t pixels = 0;
-  std::size_t tiles = 0;  // tiles with at least 8 of the pixels
+  std::size_t tiles = 0;  // tiles with enough of the pixels
   glm::dvec3 ratio{1};    // plate over rendered: balance * true albedo / assumed albedo
   glm::dvec3 sigma{0};    // standard deviation of its logarithm
   bool reference = false;

@@ -1,5 +1,7 @@
 #include "daemon/calibrate/sensor/paper.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -21,8 +23,10 @@ namespace {
 constexpr double least_cell_px = 3;
 constexpr std::size_t least_cells = 2;
 constexpr double most_slant = 0.2;  // least cosine of a tag's normal and the way to the camera
-constexpr double above_m = 5e-4;    // the paper above what the tag lies on, which would hide it
-constexpr int rendered_px = 16;     // of a tag's picture, about
+// The paper above its tag, so that the model of what it lies on, which is off by a millimetre or
+// two, does not hide it.
+constexpr double above_m = 4e-3;
+constexpr int rendered_px = 16;            // of a tag's picture, about
 constexpr double least_seen_share = 0.25;  // share of that picture
 constexpr std::size_t most_tags = 4;       // of a shot, the largest first
 
@@ -100,7 +104,7 @@ struct Paper::Impl {
         samples(the_samples),
         renderer(device, paired(set), the_camera),
         identity(device, paired(set), the_camera) {
-    pixels.surfaces = {{paper_name, glm::dvec3(paper_albedo)}};
+    pixels.surfaces = {{paper_name, glm::dvec3(paper_albedo), least_cells}};
     scene::Scene the_scene = scene::real_world(scene);
     scene::Material paper;
     paper.name = paper_name;
@@ -139,6 +143,7 @@ struct Paper::Impl {
   const int samples;
   std::vector<Printed> printed;
   SurfacePixels pixels;
+  bool was_large = false, was_unclipped = false;  // some tag in some picture
   render::Renderer renderer, identity;
 };
 
@@ -219,10 +224,11 @@ void Paper::Impl::add(const ProbedShot& shot) {
     if (auto tag = seen(one, shot.world_from_camera)) tags.push_back(*std::move(tag));
   std::ranges::sort(tags, std::greater(), &SeenTag::cell_px);
   tags.resize(std::min(tags.size(), most_tags));
+  was_large = was_large || !tags.empty();
 
   const Plate& plate = *shot.plate;
   const lighting::Response response(camera.response, plate.bits);
-  const std::uint32_t clipped = response.clipping().from;
+  const std::uint32_t clipped = response.clipping().at;
   for (const SeenTag& tag : tags) {
     std::vector<SurfacePixel> white;
     SurfacePixel pixel;
@@ -240,6 +246,7 @@ void Paper::Impl::add(const ProbedShot& shot) {
       white.push_back(pixel);
     }
     if (white.size() < least_cells) continue;
+    was_unclipped = true;
     const auto radiance = rendered(tag, shot);
     if (!radiance) continue;
     for (SurfacePixel& one : white) one.rendered = *radiance;
@@ -258,6 +265,19 @@ void Paper::look_at(const ProbedShot& shot) {
 
 const SurfacePixels& Paper::seen() const {
   return impl_->pixels;
+}
+
+std::string Paper::why_not() const {
+  if (!impl_->pixels.pixels.empty()) return {};
+  if (impl_->printed.empty()) return "the set has no tags";
+  if (!impl_->was_large)
+    return fmt::format(
+        "no picture has a whole tag whose cells are at least {:.0f} px wide; film one from nearer",
+        least_cell_px);
+  if (!impl_->was_unclipped)
+    return "it is overexposed wherever a tag is large enough; expose less, or film it in the shade";
+  return "the model of what is real hides it wherever a tag is large enough; look whether its "
+         "surfaces lie above the tags";
 }
 
 }  // namespace previz::calibrate

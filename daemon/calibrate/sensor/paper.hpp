@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "daemon/calibrate/sensor/surface_pixels.hpp"
 #include "daemon/render/gpu.hpp"
@@ -26,6 +27,8 @@ class Paper {
   void look_at(const ProbedShot& shot);
   // The white pixels of all shots so far; each view of a tag is a tile of its own.
   const SurfacePixels& seen() const;
+  // Returns why no paper was seen, in words that say what to do; "" where it was.
+  std::string why_not() const;
 
  private:
   struct Impl;

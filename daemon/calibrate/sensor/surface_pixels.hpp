@@ -32,7 +32,8 @@ struct SurfacePixel {
 // Surfaces are materials, by the name that a set's [[surface]] gives them.
 struct KnownSurface {
   std::string material;
-  glm::dvec3 albedo{0};  // base colour factor, as the scene has it
+  glm::dvec3 albedo{0};          // base colour factor, as the scene has it
+  std::size_t least_pixels = 8;  // of a tile that counts
 };
 
 struct SurfacePixels {

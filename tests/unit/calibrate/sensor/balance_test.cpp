@@ -95,6 +95,17 @@ TEST(BalanceFit, ReferencesAloneCountWhereTheyAreNamed) {
   EXPECT_THAT(unknown, HasSubstr("surface 0, surface 1"));
 }
 
+// Four white cells of a tag are pixels that were chosen with care.
+TEST(BalanceFit, ASurfaceSaysHowManyPixelsOfATileAreEnough) {
+  auto seen = make_pixels({1, 2}, glm::dvec3(1));
+  std::size_t of_second = 0;
+  std::erase_if(seen.pixels,
+                [&](const SurfacePixel& pixel) { return pixel.surface == 1 && ++of_second > 4; });
+  EXPECT_EQ(fit_balance(seen, {}).surfaces.size(), 1u);
+  seen.surfaces[1].least_pixels = 2;
+  EXPECT_EQ(fit_balance(seen, {}).surfaces.size(), 2u);
+}
+
 TEST(BalanceFit, NothingSeenIsSaid) {
   EXPECT_THROW(fit_balance({}, {}), Error);
   auto few = make_pixels({1}, glm::dvec3(1));
@@ -132,7 +143,9 @@ class TruthBalance : public testing::Test {
     if (!device_) device_ = render::open_device();
     const scene::Scene scene = scene::load_scene(take.set);
     SurfaceProbe surfaces(take, scene, device_, {.width = 80});
-    Paper paper(take.set, take.observer, scene, device_, 32);
+    ObserverCalibration camera = take.observer;
+    camera.response.clip_share = clip_share_;
+    Paper paper(take.set, camera, scene, device_, 32);
     each_probed_shot(take, frames_, [&](const ProbedShot& shot) {
       surfaces.add(shot);
       paper.look_at(shot);
@@ -141,10 +154,13 @@ class TruthBalance : public testing::Test {
           std::ranges::count_if(plates_, [](const auto& plate) { return !plate.expired(); }));
     });
     paper_ = paper.seen();
+    why_not_ = paper.why_not();
     return surfaces.compare(scene, 16);
   }
 
-  SurfacePixels paper_;                             // of the last probe
+  SurfacePixels paper_;  // of the last probe
+  double clip_share_ = ResponseCurve{}.clip_share;
+  std::string why_not_;                             // was there no paper
   std::vector<std::weak_ptr<const Plate>> plates_;  // of all probes
   std::vector<std::ptrdiff_t> held_;                // of them, at each visit
   int frames_ = 1;
@@ -229,6 +245,15 @@ TEST_F(TruthBalance, ThePaperOfTagsIsAGreyCard) {
     EXPECT_EQ(surface.reference, seen.surfaces[surface.surface].material == paper_name);
   const Balance by_red = fit_balance(seen, {"red"});
   EXPECT_GT(std::abs(std::log(by_red.scale.g / 2)), 0.5) << "a named reference goes before paper";
+}
+
+TEST_F(TruthBalance, WhyThereIsNoPaperIsSaid) {
+  probe(1);
+  EXPECT_EQ(why_not_, "");
+  clip_share_ = 0.5;
+  probe(1);
+  EXPECT_TRUE(paper_.pixels.empty());
+  EXPECT_THAT(why_not_, HasSubstr("it is overexposed wherever a tag is large enough"));
 }
 
 // A set that traces differences alone has the same paper.
