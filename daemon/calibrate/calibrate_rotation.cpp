@@ -30,10 +30,12 @@ void calibrate_rotation(const LightOptions& options, std::ostream& out) {
   const scene::Scene scene = scene::load_scene(take.set);
   const auto device = render::open_device(render::options_for({}, take.set.quality.hardware_rays));
   const ShadingAt shading = shading_of(take, scene, device, frames, width);
+  out << "trying turns by";
   const RotationFit fit = fit_rotation([&](double rotation_rad, int samples) {
-    out << fmt::format("trying {:+.0f} degrees", rotation_rad / degree) << std::endl;
+    out << fmt::format(" {:+.0f}", rotation_rad / degree) << std::flush;
     return shading(rotation_rad, samples);
   });
+  out << " degrees\n";
   const double rotation = std::remainder(
       take.set.lighting.environment_rotation_rad + fit.rotation_rad, 2 * std::numbers::pi);
   fmt::print(

@@ -157,6 +157,26 @@ virtual object: A thing that exists only in the composite.
 )",
                                true};
 
+const Chapter clip_chapter{"FROM A CLIP TO A PICTURE", R"(
+A clip of any camera with printed tags in it, a dozen photos of a board by the same lens at the same focus, and an HDRI of the room are enough. Each command writes its result into the set file, and keeps the old one beside it. The chapters below say more of each.
+
+1. The tags and the board: `previzd print tags --ids 0-3 --size 80mm` and `previzd print board chessboard:9x6:25mm`.
+
+2. The set file, my.toml: `[set]` with a `name`, `[tracking]` with `family = "tag36h11"`, `[lighting]` with `environment = "room.exr"`, and an `[[object]]` with `name`, `file` and `presence = "virtual"` for each thing that is not there.
+
+3. The lens: `previzd calibrate observer PHOTOS --board chessboard:9x6:25mm --set my.toml --write`.
+
+4. The tags: `previzd calibrate tags CLIP --set my.toml --size 80mm --write`, if the clip walks around them. If it does not, measure their places with a ruler, and write a `[[tag]]` for each.
+
+5. The take: frames.json says `{ "name": "first", "set": "my.toml", "observer": { "video": "clip.mp4", "exposure": 1 } }`; then `previzd import frames.json take`.
+
+6. What is really there: `previzd model take --set my.toml --pictures marks`, mark corners in marks/model.toml, then `previzd model take --set my.toml --parts marks/model.toml --overlay marks --grey --write`, and look at the pictures with the model's edges in marks.
+
+7. The light: `previzd calibrate light take --rotation --set my.toml --write`, `previzd calibrate balance take --set my.toml --write`, and for the colours `previzd model take --set my.toml --parts marks/model.toml`.
+
+8. The picture: `previzd check take --set my.toml`, and if nothing is left to mend, `previzd render take --set my.toml`.
+)"};
+
 const Chapter tags_chapter{"WHERE THE TAGS ARE", R"(
 Print tags at 100 %, measure the ruler on the sheet, and glue them onto something flat and stiff. Lay one face up on the floor or table, at the origin of the set: it defines the world (or another tag does, if the set file has its position).
 Film them with the film camera, at the zoom and focus of its calibration, slowly and with a short shutter time: walk around the set, from one side to the other, near and far, so that each picture shows two tags or more, and each tag is seen from at least four places. Do not touch anything until you are done.
@@ -185,9 +205,9 @@ Printed tags can be removed from the picture, with their light, shadows and refl
 const Chapter light_chapter{"THE LIGHT", R"(
 Virtual things are lit by what is really there, and shadows on real things are as deep as the model under that light says. Light that does not fit the picture is the first thing that a viewer sees, so previzd compares the two: `previzd check TAKE`, `previzd render` and the running rig say how many times as bright as the picture the model of what is real comes out under this light, in red, green and blue, wherever nothing virtual is. A factor of 1.26, a third of a stop, is worth a word; a shadow never takes more light than the picture has.
 A fisheye on the set is best: it sees the lamps as they are in every frame, with their colours, and follows them when they change. Let it take brackets (README.md, "On a rig"), and calibrate it.
-An environment from elsewhere (`environment` in [lighting], OpenEXR or Radiance .hdr) has neither the brightness, nor the white, nor the direction of your set. Three commands with a take make it fit, in this order, each of which writes its result into the set file and keeps the old one beside it: `previzd calibrate light TAKE --rotation --set SET --write` turns it until the shadows and the shading of the model are those of the picture, or says that nothing in the picture tells; `previzd calibrate balance TAKE --set SET --write` gives it the brightness and white of the film camera; `previzd model TAKE --set SET --parts FILE` measures the colours of what is real. The first needs a model that casts a shadow or has sides, in any colours; grey will do.
+An environment from elsewhere (`environment` in [lighting], OpenEXR or Radiance .hdr) has neither the brightness, nor the white, nor the direction of your set. Three commands with a take make it fit, in this order, each of which writes its result into the set file and keeps the old one beside it: `previzd calibrate light TAKE --rotation --set SET --write` turns it until the shadows and the shading of the model are those of the picture, or says that nothing in the picture tells (shading that is then off by 4 % is what the true environment leaves, and 8 % what one of another room may); `previzd calibrate balance TAKE --set SET --write` gives it the brightness and white of the film camera; `previzd model TAKE --set SET --parts FILE` measures the colours of what is real. The first needs a model that casts a shadow or has sides, in any colours; grey will do.
 Without either, lamps of the set file alone light the set (`from = "set"`, and [[light]] with `gain_real = 1`); measure their places, and let the messages tell how bright they are to be.
-The grey card is in the picture already: the white paper of printed tags reflects 79 % of the light in all colours, so `calibrate balance` goes by it wherever a tag shows two white cells that are three pixels wide, and so does `model`, before it measures colours. A real grey card in the model, or any surface whose colour you know, is named with `--reference`. Without tags and without a reference, all colours of the model count as if as many were too dark as too bright; a model whose colours were measured under a wrong light then agrees with that light. Coloured, glossy or grey paper is not 79 % white: name another reference.
+The grey card is in the picture already: the white paper of printed tags reflects 79 % of the light in all colours, so `calibrate balance` goes by it wherever a tag shows two white cells that are three pixels wide, and so does `model`, before it measures colours. A real grey card in the model, or any surface whose colour you know, is named with `--reference`; a [[surface]] of the set file gives it the colour that you know. Without tags and without a reference, all colours of the model count as if as many were too dark as too bright; a model whose colours were measured under a wrong light then agrees with that light. Coloured, glossy or grey paper is not 79 % white: name another reference.
 What it costs, measured on two sets whose truth is known: what virtual objects change on real surfaces is off by 3.3 and 2.2 % with a fisheye, and by 3.5 and 2.4 % with an environment of the place after the commands above, whether it was 0.3, 1 or 3 times as bright as the set, tinted, and turned by 70 degrees. Before them it was off by 107 %.
 )"};
 
@@ -257,11 +277,12 @@ Chapter see_also(const std::string& pages) {
 }  // namespace
 
 std::vector<Page> man_pages() {
-  return {{"previzd.8", man_page(general_commands(), 8,
-                                 {service_chapter, security_chapter, examples_chapter, tags_chapter,
-                                  model_chapter, light_chapter, lenses_chapter, glossary_chapter,
-                                  previzd_cameras, previzd_files, previzd_formats, previzd_status,
-                                  see_also("previzctl(1), previzd-farm(1), previz-set(5)")})},
+  return {{"previzd.8",
+           man_page(general_commands(), 8,
+                    {service_chapter, security_chapter, examples_chapter, clip_chapter,
+                     tags_chapter, model_chapter, light_chapter, lenses_chapter, glossary_chapter,
+                     previzd_cameras, previzd_files, previzd_formats, previzd_status,
+                     see_also("previzctl(1), previzd-farm(1), previz-set(5)")})},
           {"previzd-farm.1", man_page(farm_commands(), 1, farm_chapters())},
           {"previzctl.1", man_page(previzctl_commands(), 1,
                                    {{"ACTIONS", actions_text()},

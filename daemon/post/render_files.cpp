@@ -59,9 +59,9 @@ std::string differences(const nlohmann::json& there, const nlohmann::json& now) 
   };
   for (const auto& [key, value] : now.items())
     if (!there.contains(key) || there[key] != value)
-      add(key, there.contains(key) ? there[key].dump() : "unknown", value.dump());
+      add(key, there.contains(key) ? there[key].dump() : "not given", value.dump());
   for (const auto& [key, value] : there.items())
-    if (!now.contains(key)) add(key, value.dump(), "unused");
+    if (!now.contains(key)) add(key, value.dump(), "not given");
   return text;
 }
 

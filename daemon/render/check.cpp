@@ -22,17 +22,17 @@ using set::plural;
 using set::words;
 
 void print_features(const Demand& demand, const scene::Size& size, std::ostream& out) {
-  std::vector<std::string> used, unused;
-  for (const Feature& feature : features()) {
-    const bool needed = is_needed(feature, demand);
-    (needed ? used : unused)
-        .push_back(words(feature.name, ": ", needed ? feature.used : feature.left_out));
-  }
+  std::vector<std::string> used;
+  std::string unused;
+  for (const Feature& feature : features())
+    if (is_needed(feature, demand))
+      used.push_back(words(feature.name, ": ", feature.used));
+    else
+      add_to_list(unused, feature.name);
   out << "\nthis set uses\n  geometry: " << plural(size.triangles, "triangle") << ", or "
       << grouped(size.instanced_triangles) << " counting every copy of an object\n";
   for (const auto& line : used) out << "  " << line << '\n';
-  out << "\nnot used by this set, so switched off\n";
-  for (const auto& line : unused) out << "  " << line << '\n';
+  out << "\nnot used by this set, so switched off\n  " << unused << '\n';
 }
 
 constexpr double mebibyte = 1024.0 * 1024.0;

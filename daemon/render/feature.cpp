@@ -111,51 +111,41 @@ constexpr Feature own_features[] = {
          },
      .used =
          "an object is virtual, removed, or a tag that can be hidden, so light is followed with "
-         "it and without it",
-     .left_out =
-         "no object is virtual, removed, or a tag that can be hidden, so light paths are the "
-         "same with or without"},
+         "it and without it"},
     {.name = "removed objects",
      .in_frame =
          [](bool, const Demand& d) {
            return std::ranges::find(d.scene.instances, scene::world_real,
                                     &scene::Instance::presence) != d.scene.instances.end();
          },
-     .used = "a real object is removed from the picture",
-     .left_out = "no real object is removed from the picture"},
+     .used = "a real object is removed from the picture"},
     {.name = "relighting",
      .in_frame =
          [](bool, const Demand& d) {
            return d.relights_captured || std::ranges::any_of(d.scene.lights, &set::Light::is_relit);
          },
-     .used = "a lamp is added, switched off, dimmed, brightened or tinted",
-     .left_out = "every lamp shines in the picture as it does on the set"},
+     .used = "a lamp is added, switched off, dimmed, brightened or tinted"},
     {.name = "lens",
      .bit = gpu::FEATURE_LENS,
      .can_be_carried = true,
      .in_frame = [](bool, const Demand& d) { return d.has_aperture; },
-     .used = "the aperture blurs what is out of focus",
-     .left_out = "everything is in focus"},
+     .used = "the aperture blurs what is out of focus"},
     {.name = "deforming objects",
      .in_frame = [](bool, const Demand& d) { return !d.scene.deformations.empty(); },
-     .used = "an animated object bends or changes its shape",
-     .left_out = "every object keeps its shape"},
+     .used = "an animated object bends or changes its shape"},
     {.name = "gloss",
      .bit = gpu::FEATURE_GLOSSY,
      .can_be_carried = true,
      .in_material = reflects,
-     .used = "a surface reflects: metal, or the sheen of paint or plastic",
-     .left_out = "every surface is matt"},
+     .used = "a surface reflects: metal, or the sheen of paint or plastic"},
     {.name = "metal",
      .in_material = [](const Material& m, const Scene&, double) { return m.metallic > 0; },
-     .used = "an object is metal",
-     .left_out = "no object in this set is metal"},
+     .used = "an object is metal"},
     {.name = "refraction",
      .bit = gpu::FEATURE_TRANSMISSION,
      .can_be_carried = true,
      .in_material = [](const Material& m, const Scene&, double) { return scene::transmits(m); },
-     .used = "light goes through glass or another clear material",
-     .left_out = "nothing is made of glass or another clear material"},
+     .used = "light goes through glass or another clear material"},
     {.name = "panes",
      .bit = gpu::FEATURE_PANES,
      .can_be_carried = true,
@@ -164,14 +154,12 @@ constexpr Feature own_features[] = {
            return m.thin_walled && can_be_bare(m) && scene::transmits(m) &&
                   scene::can_be_dirac(scene, m, alpha);
          },
-     .used = "light goes straight through thin panes of smooth glass",
-     .left_out = "no object is a thin pane of smooth glass"},
+     .used = "light goes straight through thin panes of smooth glass"},
     {.name = "coloured glass",
      .bit = gpu::FEATURE_ATTENUATION,
      .can_be_carried = true,
      .in_material = [](const Material& m, const Scene&, double) { return scene::attenuates(m); },
-     .used = "glass or a liquid tints light, the more the thicker it is",
-     .left_out = "clear materials do not tint the light"},
+     .used = "glass or a liquid tints light, the more the thicker it is"},
     {.name = "photons",
      .bit = gpu::FEATURE_PHOTONS,
      .in_material = [](const Material& m, const Scene& scene,
@@ -181,15 +169,12 @@ constexpr Feature own_features[] = {
            return throws_light_on && d.estimation.caustics == set::Caustics::photons &&
                   (d.shines_around || d.finds_lamps || d.lamps_shine);
          },
-     .used = "a mirror or clear glass throws patterns of light (caustics) onto other objects",
-     .left_out = "no mirror or clear glass throws patterns of light, or caustics are not set to "
-                 "\"photons\""},
+     .used = "a mirror or clear glass throws patterns of light (caustics) onto other objects"},
     {.name = "traced caustics",
      .bit = gpu::FEATURE_CAUSTICS,
      .in_frame = [](bool,
                     const Demand& d) { return d.estimation.caustics == set::Caustics::traced; },
-     .used = "light via mirrors and clear glass is found by chance, as the set file asks",
-     .left_out = "the set file does not ask for them"},
+     .used = "light via mirrors and clear glass is found by chance, as the set file asks"},
     {.name = "textures",
      .bit = gpu::FEATURE_TEXTURES,
      .can_be_carried = true,
@@ -198,8 +183,7 @@ constexpr Feature own_features[] = {
            return std::ranges::any_of(scene::material_textures,
                                       [&](auto texture) { return is_textured(m.*texture); });
          },
-     .used = "a surface has its colour or detail from an image",
-     .left_out = "no surface has its colour or detail from an image"},
+     .used = "a surface has its colour or detail from an image"},
     {.name = "texture mappings",
      .bit = gpu::FEATURE_MAPPINGS,
      .can_be_carried = true,
@@ -207,14 +191,12 @@ constexpr Feature own_features[] = {
          [](const Material& m, const Scene&, double) {
            return std::ranges::any_of(m.mappings, [](std::uint8_t mapping) { return mapping > 0; });
          },
-     .used = "the images of a surface lie on it in different ways",
-     .left_out = "all images of a surface lie on it in the same way"},
+     .used = "the images of a surface lie on it in different ways"},
     {.name = "vertex colours",
      .bit = gpu::FEATURE_VERTEX_COLORS,
      .can_be_carried = true,
      .in_frame = [](bool, const Demand& d) { return has_vertex_colors(d.scene); },
-     .used = "a mesh has a colour of its own in each of its corners",
-     .left_out = "no mesh has a colour of its own in each of its corners"},
+     .used = "a mesh has a colour of its own in each of its corners"},
     {.name = "filtered textures",
      .bit = gpu::FEATURE_FILTERED_TEXTURES,
      .in_material =
@@ -224,10 +206,7 @@ constexpr Feature own_features[] = {
          },
      .in_frame = [](bool textured,
                     const Demand& d) { return textured && d.estimation.filter_textures; },
-     .used = "textures are averaged over the area that a sample covers",
-     .left_out =
-         "no texture is averaged over the area that a sample covers, or the set file does not "
-         "ask for it"},
+     .used = "textures are averaged over the area that a sample covers"},
     {.name = "normal maps",
      .bit = gpu::FEATURE_NORMAL_MAPS,
      .can_be_carried = true,
@@ -235,22 +214,19 @@ constexpr Feature own_features[] = {
          [](const Material& m, const Scene&, double) {
            return is_textured(m.normal_texture) || is_textured(m.clearcoat_normal_texture);
          },
-     .used = "a surface has its bumps from an image",
-     .left_out = "no surface has its bumps from an image"},
+     .used = "a surface has its bumps from an image"},
     {.name = "tangents",
      .bit = gpu::FEATURE_TANGENTS,
      .can_be_carried = true,
      .in_material = [](const Material& m, const Scene&,
                        double) { return scene::has_directions(m); },
      .in_frame = [](bool directed, const Demand& d) { return directed && has_tangents(d.scene); },
-     .used = "a mesh states which way its bumps or its brushed metal lie",
-     .left_out = "bumps and brushed metal lie as the images of their surfaces do"},
+     .used = "a mesh states which way its bumps or its brushed metal lie"},
     {.name = "alpha",
      .bit = gpu::FEATURE_ALPHA,
      .can_be_carried = true,
      .in_material = lets_through,
-     .used = "a surface has holes or is see-through, by its material's alpha",
-     .left_out = "no surface has holes or is see-through"},
+     .used = "a surface has holes or is see-through, by its material's alpha"},
     {.name = "lamps",
      .bit = gpu::FEATURE_LIGHTS,
      .can_be_carried = true,
@@ -258,8 +234,7 @@ constexpr Feature own_features[] = {
      .in_frame = [](bool glow,
                     const Demand& d) { return glow || d.finds_lamps || !d.scene.lights.empty(); },
      .used = "the set or a model has lamps, a surface glows, or lamps are found in the environment "
-             "light",
-     .left_out = "the only light is the environment light"},
+             "light"},
     {.name = "lamps in view",
      .bit = gpu::FEATURE_VISIBLE_LIGHTS,
      .can_be_carried = true,
@@ -267,18 +242,13 @@ constexpr Feature own_features[] = {
          [](bool, const Demand& d) {
            return d.finds_lamps || std::ranges::any_of(d.scene.lights, can_be_seen);
          },
-     .used = "a lamp has a size, so it can be seen and reflected",
-     .left_out = "no lamp has a size, so none can be seen or reflected"},
+     .used = "a lamp has a size, so it can be seen and reflected"},
     {.name = "many lamps",
      .bit = gpu::FEATURE_MANY_LIGHTS,
      .can_be_carried = true,
      .in_frame = [](bool, const Demand& d) { return are_many(d.scene); },
-     .used = "of many lamps, each point uses those that are near and face it",
-     .left_out = "with so few lamps, every point considers each of them"},
-    {.name = "glowing surfaces",
-     .in_material = glows,
-     .used = "a surface gives off light",
-     .left_out = "no surface gives off light"},
+     .used = "of many lamps, each point uses those that are near and face it"},
+    {.name = "glowing surfaces", .in_material = glows, .used = "a surface gives off light"},
     {.name = "environment light",
      .bit = gpu::FEATURE_ENVIRONMENT_SAMPLING,
      .in_frame =
@@ -286,8 +256,7 @@ constexpr Feature own_features[] = {
            return d.light_sampling == set::LightSampling::importance &&
                   (d.shines_around || d.finds_lamps);
          },
-     .used = "rays are aimed at its brightest parts",
-     .left_out = "there is none, or the set file turns such rays off"},
+     .used = "rays are aimed at its brightest parts"},
     {.name = "difference only",
      .bit = gpu::FEATURE_DIFFERENCE,
      // The other composites need the real world's own radiance in every pixel.
@@ -296,20 +265,17 @@ constexpr Feature own_features[] = {
            return d.estimation.estimator == set::Estimator::difference &&
                   d.estimation.composite == set::Composite::additive;
          },
-     .used = "pixels that nothing virtual covers are rendered only for what changes in them",
-     .left_out = "every pixel is rendered in full, with and without what is virtual"},
+     .used = "pixels that nothing virtual covers are rendered only for what changes in them"},
     {.name = "camera's light",
      .bit = gpu::FEATURE_CAMERA,
      .in_frame =
          [](bool, const Demand& d) {
            return d.has_plate && d.estimation.real_radiance == set::RealRadiance::camera;
          },
-     .used = "what the camera sees of the real set lights the virtual objects",
-     .left_out = "the light that real surfaces reflect is simulated"},
+     .used = "what the camera sees of the real set lights the virtual objects"},
     {.name = "denoiser",
      .in_frame = [](bool, const Demand& d) { return d.denoises; },
-     .used = "noise is removed from the picture that is shown",
-     .left_out = "noise is left in the picture that is shown"},
+     .used = "noise is removed from the picture that is shown"},
 };
 
 Feature feature_of(const scene::MaterialFeature& feature) {
@@ -317,8 +283,7 @@ Feature feature_of(const scene::MaterialFeature& feature) {
           .bit = feature.bit,
           .can_be_carried = true,
           .of_extension = feature.is_asked_for,
-          .used = feature.used,
-          .left_out = feature.left_out};
+          .used = feature.used};
 }
 
 // Returns all features in the order in which `check` names them: those of extensions of materials

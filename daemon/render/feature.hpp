@@ -44,10 +44,7 @@ struct Feature {
   // Returns whether a frame needs the feature, given whether a material in use asks for it. Null: a
   // frame needs it exactly where a material asks for it.
   bool (*in_frame)(bool in_material, const Demand&) = nullptr;
-  // What `check` says, in words for a film crew, about a set that uses the feature and about one
-  // that does not.
-  const char* used;
-  const char* left_out;
+  const char* used;  // what `check` says, in words for a film crew, about a set that uses it
 };
 
 std::span<const Feature> features();

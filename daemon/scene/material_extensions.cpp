@@ -47,8 +47,7 @@ constexpr MaterialExtension extension_rows[] = {
      .feature = {{.name = "lacquer",
                   .bit = gpu::FEATURE_CLEARCOAT,
                   .is_asked_for = [](const Material& m) { return m.clearcoat > 0; },
-                  .used = "a surface has a clear coat above its own",
-                  .left_out = "no surface has a clear coat above its own"}}},
+                  .used = "a surface has a clear coat above its own"}}},
     {.name = "KHR_materials_sheen",
      .factors = {{{"sheenColorFactor", Packed{&Material::sheen_color, &GpuMaterial::sheen_color}},
                   {"sheenRoughnessFactor",
@@ -60,8 +59,7 @@ constexpr MaterialExtension extension_rows[] = {
      .feature = {{.name = "cloth",
                   .bit = gpu::FEATURE_SHEEN,
                   .is_asked_for = has_sheen,
-                  .used = "a surface has the soft shine of cloth where it is seen from the side",
-                  .left_out = "no surface shines as cloth does"}}},
+                  .used = "a surface has the soft shine of cloth where it is seen from the side"}}},
     {.name = "KHR_materials_specular",
      .factors = {{{"specularFactor", Packed{&Material::specular, &GpuMaterial::specular}},
                   {"specularColorFactor",
@@ -78,8 +76,7 @@ constexpr MaterialExtension extension_rows[] = {
                   .bit = gpu::FEATURE_COAT_COLOR,
                   .is_asked_for =
                       [](const Material& m) { return has_coat(m) && has_specular_color(m); },
-                  .used = "paint or plastic reflects in its own colour",
-                  .left_out = "paint and plastic reflect all colours alike"}}},
+                  .used = "paint or plastic reflects in its own colour"}}},
     {.name = "KHR_materials_anisotropy",
      .factors = {{{"anisotropyStrength", Packed{&Material::anisotropy}},
                   {"anisotropyRotation", Packed{&Material::anisotropy_rotation_rad}, -1e3, 1e3}}},
@@ -96,8 +93,8 @@ constexpr MaterialExtension extension_rows[] = {
                       [](const Material& m) {
                         return is_anisotropic(m) && (m.metallic > 0 || has_coat(m));
                       },
-                  .used = "a surface stretches highlights in one direction, as brushed metal does",
-                  .left_out = "no surface stretches highlights in one direction"}}},
+                  .used =
+                      "a surface stretches highlights in one direction, as brushed metal does"}}},
     {.name = "KHR_materials_diffuse_transmission",
      .ignored = "leaves, paper and lampshades are dark where light comes from behind them"},
     {.name = "KHR_materials_dispersion", .ignored = "glass does not split light into its colours"},
@@ -115,8 +112,7 @@ constexpr MaterialFeature layer_textures = {
             if (m.*material_textures[i] != no_texture) return true;
           return false;
         },
-    .used = "an image says where a surface is glass, glossy, lacquered, brushed or cloth",
-    .left_out = "no image says where a surface is glass, glossy, lacquered, brushed or cloth"};
+    .used = "an image says where a surface is glass, glossy, lacquered, brushed or cloth"};
 
 // The shaders know a layer's texture by its place among the material's.
 static_assert(first_layer_texture == gpu::TEXTURE_OF_LAYERS &&

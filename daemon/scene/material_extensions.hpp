@@ -62,7 +62,6 @@ struct MaterialFeature {
   std::uint32_t bit;  // FEATURE_*
   bool (*is_asked_for)(const Material&);
   const char* used;
-  const char* left_out;
 };
 
 // Up to so many entries, of which those without a key are unused.

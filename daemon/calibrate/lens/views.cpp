@@ -88,7 +88,7 @@ Views gather_views(PictureSource& source, BoardFinder& finder, const Board& boar
         taken, [&](const BoardCorners& other) { return largest_move(corners, other) < same; });
     if (corners.ids.size() < least_corners) {
       report(picture->name + ": " +
-             (corners.ids.empty() ? "no board"
+             (corners.ids.empty() ? "no board, or a part of one"
                                   : std::to_string(corners.ids.size()) + " corners only, skipped"));
     } else if (!is_new) {
       ++alike;

@@ -98,7 +98,10 @@ class Check : public testing::Test {
     const auto left_out = said_.find("not used by this set, so switched off");
     ASSERT_NE(left_out, std::string::npos) << said_;
     ASSERT_THAT(said_, HasSubstr(words));
-    EXPECT_EQ(at > left_out, is_left_out) << words;
+    if (is_left_out)
+      EXPECT_THAT(said_.substr(left_out), HasSubstr(words));
+    else
+      EXPECT_LT(at, left_out) << words;
   }
 };
 
@@ -218,10 +221,10 @@ samples = 1500
   expect_used("lamps: the set or a model has lamps");
   expect_used("relighting: a lamp is added, switched off, dimmed");
   expect_used("denoiser: noise is removed");
-  expect_left_out("refraction: nothing is made of glass");
-  expect_left_out("removed objects: no real object is removed from the picture");
-  expect_left_out("lens: everything is in focus");
-  expect_left_out("photons: no mirror or clear glass throws patterns of light");
+  expect_left_out("refraction");
+  expect_left_out("removed objects");
+  expect_left_out("lens");
+  expect_left_out("photons");
   expect_said("scene in the GPU's memory: about 1 MiB");
   expect_said("no film camera calibration here");
 }
@@ -315,7 +318,7 @@ TEST_F(Check, AgreesWithTheRendererThatSolidBlendingNeedsNoAlpha) {
            "[1, 1, 1, " + alpha + "]}";
   };
   ASSERT_EQ(check_material(material("1")), 0) << said_;
-  expect_left_out("alpha: no surface has holes or is see-through");
+  expect_left_out("alpha");
   ASSERT_EQ(check_material(material("0.5")), 0) << said_;
   expect_used("alpha: a surface has holes or is see-through");
 }
