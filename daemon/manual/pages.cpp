@@ -162,7 +162,7 @@ A clip of any camera with printed tags in it, a dozen photos of a board by the s
 
 1. The tags and the board: `previzd print tags --ids 0-3 --size 80mm` and `previzd print board chessboard:9x6:25mm`.
 
-2. The set file, my.toml: `[set]` with a `name`, `[tracking]` with `family = "tag36h11"`, `[lighting]` with `environment = "room.exr"`, and an `[[object]]` with `name`, `file` and `presence = "virtual"` for each thing that is not there.
+2. The set file, my.toml: `[set]` with a `name`, `[tracking]` with `family = "tag36h11"`, `[lighting]` with `environment = "room.exr"`, and an `[[object]]` with `name`, `file` and `presence = "virtual"` for each virtual thing.
 
 3. The lens: `previzd calibrate observer PHOTOS --board chessboard:9x6:25mm --set my.toml --write`.
 
