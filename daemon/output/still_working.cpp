@@ -40,7 +40,7 @@ StillWorking::StillWorking(std::string name, const std::vector<std::ostream*>& s
   clock_ = std::jthread([this](const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
     while (!stop.stop_requested()) {
-      wake_.wait_for(lock, stop, patience_, [] { return false; });
+      wake_.wait_for(lock, stop, patience_ / 2, [] { return false; });
       if (!stop.stop_requested() && steady_clock::now() - last_ >= patience_) show();
     }
   });

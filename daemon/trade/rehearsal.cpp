@@ -29,12 +29,14 @@ constexpr std::size_t least_pictures = 3;
 constexpr double first_picture_patience = 2;
 constexpr std::chrono::milliseconds look_delay{20};
 
-// The set with the take in the place of its cameras, without what a rehearsal must not touch.
+// The set with the take in the place of its cameras, without what a rehearsal must not touch. A
+// take without light is lit by what the set replays.
 set::Set on_take(set::Set set, const std::filesystem::path& take) {
   set.observer.driver = set::replay_driver;
   set.observer.device = take.string();
   set.observer.faults.clear();
-  if (set.light_camera.driver != set::replay_driver || set.light_camera.device.empty()) {
+  if (std::filesystem::exists(take / "light.mkv") ||
+      set.light_camera.driver != set::replay_driver || set.light_camera.device.empty()) {
     set.light_camera.driver = set::replay_driver;
     set.light_camera.device = take.string();
   }

@@ -455,8 +455,13 @@ double Sweep::gain(const TradeSettings& settings, bool is_live) const {
 Rehearsal Sweep::rehearsal_of(const set::Set& set) {
   const double left = budget_.left(TradePhase::live_rehearsal, steady_s());
   if (left < shortest_rehearsal_s) return {};
-  Rehearsal rehearsal =
-      rehearse(device_, set, scene_, frame_.take(), std::min(left, rehearsal_s), options_.stop);
+  Rehearsal rehearsal;
+  try {
+    rehearsal =
+        rehearse(device_, set, scene_, frame_.take(), std::min(left, rehearsal_s), options_.stop);
+  } catch (const Error& error) {
+    rehearsal.why_not = error.what();
+  }
   stop_if_asked();
   return rehearsal;
 }

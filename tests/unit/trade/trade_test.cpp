@@ -105,7 +105,11 @@ TEST_F(Trade, PartsThatNobodyNeedsChangeNoPixel) {
                          "parts alpha", "parts lamps", "parts lamps in view", "parts many lamps"}));
 }
 
+// The take is not where the set's cameras are played from, as one that was copied is.
 TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
+  for (int camera = 0; camera < 2; ++camera)
+    rewrite_set("device = \"session\"", "device = \"elsewhere\"");
+  options_.source = {directory_ / "session", directory_ / "set.toml"};
   options_.answers = true;
   options_.fps = 2;
   options_.error = 0.5;
@@ -121,6 +125,7 @@ TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
                                         set::read_overlay(answer.file));
     EXPECT_EQ(set.estimation.estimator, answer.settings.estimation.estimator);
     if (answer.use == "live") {
+      EXPECT_EQ(answer.not_rehearsed, "");
       EXPECT_EQ(set.quality.fps, 2);
       EXPECT_LE(answer.seconds, 0.9 / 2);
       EXPECT_FALSE(set.quality.steps.empty());
