@@ -22,7 +22,6 @@
 #include "daemon/command_line.hpp"
 #include "daemon/device_rules.hpp"
 #include "daemon/devices.hpp"
-#include "daemon/output/still_working.hpp"
 #include "daemon/output/take_folders.hpp"
 #include "daemon/post/check.hpp"
 #include "daemon/post/render_takes.hpp"
@@ -38,6 +37,7 @@
 #include "drivers/error.hpp"
 #include "drivers/printable.hpp"
 #include "drivers/standard_output.hpp"
+#include "drivers/still_working.hpp"
 
 namespace {
 
@@ -193,9 +193,10 @@ int do_stoppable(const CLI::App& app, CommandLine& said) {
   if (isatty(STDERR_FILENO) != 0) terminals.push_back(&std::cerr);
   try {
     // A rig goes on until it is stopped, and `devices --learn` waits for buttons.
-    std::optional<output::StillWorking> working;
+    std::optional<StillWorking> working;
     if (!is_rig && !said.learn && !terminals.empty())
-      working.emplace("previzd " + app.get_subcommands().front()->get_name(), terminals);
+      working.emplace("previzd " + app.get_subcommands().front()->get_name() + ": still working",
+                      terminals);
     status = do_command(app, said, stop);
   } catch (const std::exception& error) {
     report_end(error);

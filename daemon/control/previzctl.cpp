@@ -1,6 +1,7 @@
 // previzctl controls the rig from a shell. Its exit status is 0 if the request was done, 1 if it
 // was refused or there is no rig (one line says why), 2 if the command line cannot be understood.
 #include <systemd/sd-bus.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -21,6 +23,7 @@
 #include "drivers/error.hpp"
 #include "drivers/printable.hpp"
 #include "drivers/standard_output.hpp"
+#include "drivers/still_working.hpp"
 
 namespace {
 
@@ -207,6 +210,9 @@ int do_line(int argc, char** argv) {
     if (app.got_subcommand("status")) return print_status(asked.raw), 0;
     if (app.got_subcommand("watch")) return watch(asked.raw), 0;
     if (app.got_subcommand("actions")) return print_actions(asked.names_only), 0;
+    std::optional<StillWorking> waiting;
+    if (isatty(STDOUT_FILENO) != 0)
+      waiting.emplace("waiting for the rig", std::vector<std::ostream*>{&std::cout});
     std::string said;
     if (app.got_subcommand("metrics"))
       said = call("Metrics", "");

@@ -18,7 +18,7 @@ expect "is not running"
 
 "$previzd" run demo.toml --loop --bus --out live >rig.log 2>&1 &
 rig=$!
-trap 'kill "$rig" 2>/dev/null; wait "$rig" 2>/dev/null; rm -rf "$work"' EXIT
+trap 'kill "$rig" 2>/dev/null || true; wait "$rig" 2>/dev/null || true; rm -rf "$work"' EXIT
 # wait_for SECONDS WHAT COMMAND...  asks again until the command says WHAT.
 wait_for() {
   local end=$((SECONDS + $1)) what=$2

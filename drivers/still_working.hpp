@@ -12,14 +12,14 @@
 #include <thread>
 #include <vector>
 
-namespace previz::output {
+namespace previz {
 
 // While it lives, and nothing was written to its streams for `patience`, the first of them has a
-// line "NAME: still working, 3 s", or the line of progress that it has already and "(3 s)" behind
-// it. The next thing that is written takes its place. All streams must lead to the same terminal.
+// line of its words and "3 s", or the line of progress that it has already and "(3 s)" behind it.
+// The next thing that is written takes its place. All streams must lead to the same terminal.
 class StillWorking {
  public:
-  StillWorking(std::string name, const std::vector<std::ostream*>& streams,
+  StillWorking(std::string words, const std::vector<std::ostream*>& streams,
                std::chrono::milliseconds patience = std::chrono::seconds(1));
   ~StillWorking();
   StillWorking(const StillWorking&) = delete;
@@ -46,7 +46,7 @@ class StillWorking {
   void take_away();  // what was shown
   void show();
 
-  const std::string name_;
+  const std::string words_;
   const std::chrono::milliseconds patience_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
@@ -57,4 +57,4 @@ class StillWorking {
   std::jthread clock_;
 };
 
-}  // namespace previz::output
+}  // namespace previz

@@ -1,9 +1,8 @@
-#include "daemon/output/still_working.hpp"
+#include "drivers/still_working.hpp"
 
-#include "daemon/output/progress.hpp"
 #include "drivers/printable.hpp"
 
-namespace previz::output {
+namespace previz {
 
 using std::chrono::steady_clock;
 
@@ -33,9 +32,9 @@ int StillWorking::Buffer::sync() {
   return below_->pubsync();
 }
 
-StillWorking::StillWorking(std::string name, const std::vector<std::ostream*>& streams,
+StillWorking::StillWorking(std::string words, const std::vector<std::ostream*>& streams,
                            std::chrono::milliseconds patience)
-    : name_(std::move(name)), patience_(patience) {
+    : words_(std::move(words)), patience_(patience) {
   for (std::ostream* const stream : streams) buffers_.emplace_back(*this, *stream);
   clock_ = std::jthread([this](const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
@@ -61,13 +60,12 @@ void StillWorking::take_away() {
 }
 
 void StillWorking::show() {
-  const std::chrono::duration<double> silent = steady_clock::now() - last_;
+  const auto silent = std::chrono::duration_cast<std::chrono::seconds>(steady_clock::now() - last_);
+  const std::string seconds = std::to_string(silent.count()) + " s";
   buffers_.front().write(erase_line);
-  buffers_.front().write(line_.empty()
-                             ? name_ + ": still working, " + duration_words(silent.count())
-                             : line_ + " (" + duration_words(silent.count()) + ")");
+  buffers_.front().write(line_.empty() ? words_ + ", " + seconds : line_ + " (" + seconds + ")");
   buffers_.front().flush();
   is_shown_ = true;
 }
 
-}  // namespace previz::output
+}  // namespace previz

@@ -1,9 +1,9 @@
-#include "daemon/output/still_working.hpp"
+#include "drivers/still_working.hpp"
 
 #include "drivers/printable.hpp"
 #include "tests/support/test.hpp"
 
-namespace previz::output {
+namespace previz {
 namespace {
 
 using testing::HasSubstr;
@@ -44,11 +44,11 @@ TEST(StillWorking, SaysSoUntilSomethingIsWritten) {
   Terminal terminal;
   std::ostream out(&terminal), errors(&terminal);
   {
-    const StillWorking working("check", {&out, &errors}, 5ms);
-    EXPECT_THAT(terminal.text_with(" s"), StartsWith(erased + "check: still working, 0 s"));
+    const StillWorking working("at work", {&out, &errors}, 5ms);
+    EXPECT_THAT(terminal.text_with(" s"), StartsWith(erased + "at work, 0 s"));
     errors << "warning: dark\n";
     EXPECT_THAT(terminal.text(), HasSubstr(" s" + erased + "warning: dark\n"));
-    terminal.text_with("dark\n" + erased + "check: still working");
+    terminal.text_with("dark\n" + erased + "at work");
   }
   EXPECT_THAT(terminal.text(), testing::EndsWith(erased));
   out << "done\n";
@@ -58,7 +58,7 @@ TEST(StillWorking, SaysSoUntilSomethingIsWritten) {
 TEST(StillWorking, KeepsALineOfProgress) {
   Terminal terminal;
   std::ostream out(&terminal);
-  const StillWorking working("render", {&out}, 50ms);
+  const StillWorking working("at work", {&out}, 50ms);
   out << "read\n"
       << erase_line << "frame 0: 1/4"
       << " samples" << std::flush;
@@ -72,11 +72,11 @@ TEST(StillWorking, IsSilentWhereSomethingIsWrittenAllTheTime) {
   Terminal terminal;
   std::ostream out(&terminal);
   {
-    const StillWorking working("render", {&out}, 1h);
+    const StillWorking working("at work", {&out}, 1h);
     out << "a\nb\n";
   }
   EXPECT_EQ(terminal.text(), "a\nb\n");
 }
 
 }  // namespace
-}  // namespace previz::output
+}  // namespace previz
