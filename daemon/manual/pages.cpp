@@ -130,8 +130,11 @@ bracket: Several exposures of the same view, from dark to bright, which together
 carrier: A thing that is moved by hand, such as a stick or a tray, with a tag on it. Objects and lamps can be attached to it.
 composite: The finished picture: the plate with the virtual objects, their shadows and their light.
 difference: The light that the virtual objects add to the real set or take from it.
+estimator: How the change is computed: `paired` renders the real and the mixed world with the same random numbers and subtracts, `difference` follows only the light that differs; `additive` adds the change to the plate, `ratio` multiplies the plate by it.
 film camera: The camera whose picture is composited; the table [observer] of a set file.
+give or take: One standard deviation either way of the figure before it.
 keep: To write the changes made by buttons to the set file.
+knee: Of settings from fast to exact, the one from which on more time buys little.
 lamp: A light source: one that was found in the light camera's picture ("found 1"), or one that the set file declares.
 layer: One of the pictures that an EXR file consists of, such as mask or depth.
 light camera: The fisheye that looks at the lamps and measures the light on the set.
@@ -152,6 +155,7 @@ slate: The name of scene and shot, from which takes are named.
 standby: The mode in which the screen is dark and nothing is rendered; the cameras stay open.
 tag: A printed AprilTag by which the film camera is located.
 take: A recording, by default from two seconds before the button was pressed until it was pressed again.
+unseen: What of the surroundings the light camera cannot see, mostly below its horizon; a rule of the set fills it.
 variant: One of an object's looks that its file defines, with its own materials (KHR_materials_variants).
 virtual object: A thing that exists only in the composite.
 )",
