@@ -6,6 +6,9 @@ namespace previz {
 
 using std::chrono::steady_clock;
 
+// A longer line may take two rows of a terminal, of which only one can be written anew.
+constexpr std::size_t longest_line = 79;
+
 StillWorking::Buffer::Buffer(StillWorking& owner, std::ostream& stream)
     : owner_(owner), stream_(stream), below_(stream.rdbuf(this)) {}
 
@@ -52,8 +55,8 @@ StillWorking::~StillWorking() {
 }
 
 void StillWorking::take_away() {
-  if (!is_shown_) return;
-  is_shown_ = false;
+  if (shown_.empty()) return;
+  shown_.clear();
   buffers_.front().write(erase_line);
   buffers_.front().write(line_);
   buffers_.front().flush();
@@ -62,10 +65,12 @@ void StillWorking::take_away() {
 void StillWorking::show() {
   const auto silent = std::chrono::duration_cast<std::chrono::seconds>(steady_clock::now() - last_);
   const std::string seconds = std::to_string(silent.count()) + " s";
+  const std::string text = line_.empty() ? words_ + ", " + seconds : line_ + " (" + seconds + ")";
+  if (text == shown_ || text.size() > longest_line) return;
   buffers_.front().write(erase_line);
-  buffers_.front().write(line_.empty() ? words_ + ", " + seconds : line_ + " (" + seconds + ")");
+  buffers_.front().write(text);
   buffers_.front().flush();
-  is_shown_ = true;
+  shown_ = text;
 }
 
 }  // namespace previz

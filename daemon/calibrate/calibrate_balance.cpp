@@ -38,24 +38,26 @@ std::string doubt(const Balance& balance) {
       sigma);
 }
 
+// An environment from elsewhere has a unit of its own; two cameras should agree.
 void print_exposure(const Balance& balance, bool has_light_camera, std::ostream& out) {
   const double stops = exposure_error_stops(balance), sigma = exposure_error_sigma_stops(balance);
-  if (std::abs(stops) < stated_well_stops || std::abs(stops) < 3 * sigma) {
+  const char* const off = stops > 0 ? "dark" : "bright";
+  if (std::abs(stops) < stated_well_stops || std::abs(stops) < 3 * sigma)
     fmt::print(out, "{} to {:+.2f} +- {:.2f} stops\n",
                has_light_camera ? "the cameras' exposures agree"
                                 : "the environment and the camera's exposure agree",
                stops, sigma);
-    return;
-  }
-  fmt::print(out,
-             "{} by {:.2f} +- {:.2f} stops: the light of the {} comes out too {}. Check {}; the "
-             "balance below makes up for it.\n",
-             has_light_camera ? "THE CAMERAS' EXPOSURES DISAGREE"
-                              : "THE ENVIRONMENT DOES NOT FIT THE CAMERA'S EXPOSURE",
-             std::abs(stops), sigma, has_light_camera ? "light camera" : "environment",
-             stops > 0 ? "dark" : "bright",
-             has_light_camera ? "shutter, gain and responsivity of both"
-                              : "its shutter, gain and responsivity, and the environment's unit");
+  else if (has_light_camera)
+    fmt::print(out,
+               "THE CAMERAS' EXPOSURES DISAGREE by {:.2f} +- {:.2f} stops: the light of the light "
+               "camera comes out too {}. Check shutter, gain and responsivity of both; the balance "
+               "below makes up for it.\n",
+               std::abs(stops), sigma, off);
+  else
+    fmt::print(out,
+               "the environment is {:.2f} +- {:.2f} stops too {} for the camera's exposure; the "
+               "balance below makes up for it\n",
+               std::abs(stops), sigma, off);
 }
 
 // Returns the suggestion for one surface, as a table with its uncertainty, or a note if there is
@@ -139,6 +141,10 @@ void calibrate_balance(const BalanceOptions& options, std::ostream& out) {
                set::with_table(set::read_set_file(*options.set_file), "lighting", table), out);
   std::string tables = uncertain.empty() ? "" : as_comment(uncertain);
   tables += table;
+  if (options.write)
+    tables +=
+        "\n# Not written: the colours that the surfaces have in these pictures. `previzd model`\n"
+        "# measures them more closely.\n";
   for (const SurfaceRatio& surface : balance.surfaces)
     if (seen.surfaces[surface.surface].material != paper_name)
       tables += fmt::format("\n{}", suggestion(surface, seen.surfaces[surface.surface], balance));

@@ -30,8 +30,10 @@ void calibrate_rotation(const LightOptions& options, std::ostream& out) {
   const scene::Scene scene = scene::load_scene(take.set);
   const auto device = render::open_device(render::options_for({}, take.set.quality.hardware_rays));
   const ShadingAt shading = shading_of(take, scene, device, frames, width);
-  out << "trying turns by";
+  int tried = 0;
   const RotationFit fit = fit_rotation([&](double rotation_rad, int samples) {
+    constexpr int on_a_line = 8;
+    out << (tried++ % on_a_line > 0 ? "" : tried > 1 ? "\ntrying" : "trying");
     out << fmt::format(" {:+.0f}", rotation_rad / degree) << std::flush;
     return shading(rotation_rad, samples);
   });

@@ -14,7 +14,8 @@ void add_lens_options(CLI::App& command, LensOptions& options) {
   command.add_option("--board", options.board, board_grammar);
   command.add_option("--every", options.every, "Use only every Nth picture")
       ->check(CLI::Range(1, 1'000'000));
-  command.add_option("--out", options.table_file, "Write the tables to this file");
+  command.add_option("--out", options.table_file,
+                     "Write the tables to this file instead of showing them");
   command.add_option("--plot", options.residual_plot, "SVG file for the residuals");
   command.add_flag("--force", options.force, "Accept the calibration even if views are missing");
 }
@@ -137,7 +138,8 @@ void add_balance(CLI::App& calibrate, BalanceOptions& options) {
       ->check(CLI::Range(1, 1'000'000))
       ->capture_default_str();
   command.add_option("--device", options.device.name, "Vulkan device, by part of its name");
-  command.add_option("--out", options.table_file, "Write the tables to this file");
+  command.add_option("--out", options.table_file,
+                     "Write the tables to this file instead of showing them");
 }
 
 void add_tags(CLI::App& calibrate, TagsOptions& options) {
@@ -160,7 +162,8 @@ void add_tags(CLI::App& calibrate, TagsOptions& options) {
   command.add_option("--family", options.family, "Tag family (default: the set's, or tag36h11)");
   command.add_option("--every", options.every, "Use only every Nth picture")
       ->check(CLI::Range(1, 1'000'000));
-  command.add_option("--out", options.table_file, "Write the tables to this file");
+  command.add_option("--out", options.table_file,
+                     "Write the tables to this file instead of showing them");
   command.add_flag("--write", options.write,
                    "Write the tags to the set file; keeps the old file beside it");
   command.add_flag("--force", options.force, "Accept the map even if pictures are missing");

@@ -92,8 +92,9 @@ std::string warn(const std::vector<std::string>& doubts, std::ostream& out) {
 
 void write_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,
                   std::ostream& out) {
-  if (file) session::replace_file(*file, tables);
-  fmt::print(out, "\n{}", tables);
+  if (!file) return fmt::print(out, "\n{}", tables);
+  session::replace_file(*file, tables);
+  fmt::print(out, "the tables are in {}\n", file->string());
 }
 
 void write_back(const std::filesystem::path& set_file, const std::string& text, std::ostream& out) {

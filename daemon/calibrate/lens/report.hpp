@@ -35,7 +35,7 @@ std::string warn(const std::vector<std::string>& doubts, std::ostream& out);
 // Returns the lines as a comment of a set file, each of at most about 100 characters.
 std::string as_comment(const std::string& text);
 
-// Writes the set file's tables to `out`, and to `file` if there is one.
+// Writes the set file's tables to `file`, or to `out` if there is none.
 void write_tables(const std::string& tables, const std::optional<std::filesystem::path>& file,
                   std::ostream& out);
 

@@ -81,7 +81,8 @@ TagSurvey survey_tags(const TagWalk& walk, const PinholeIntrinsics& lens,
 // good enough. `wanted` are the tags that the map should have.
 //   seen      every wanted tag is in a picture, and linked to the origin by pictures of two tags.
 //   pictures  at least 4 of each tag: one alone is not checked by any other.
-//   sides     they differ by 20 degrees: from one side, depth is taken from the size alone.
+//   sides     they differ by 20 degrees: from one side, depth is taken from the size alone; not
+//             where a tag is certain to a third of what follows.
 //   certain   to 2 mm and a thousandth of the distance from the origin, and to half a degree (one
 //             standard deviation); checked where the others hold. Where three tags or more are
 //             not, and most pictures link two tags only, that is named instead: each link of a

@@ -230,6 +230,7 @@ class ClipCommand : public testing::Test {
     }
   }
   // What the command prints about the pictures, or about a session.
+  // And the tables.
   std::string printed(CameraRole role, const fs::path& session = {}) const {
     ResponseOptions options{.footage = session,
                             .camera = role,
@@ -242,7 +243,7 @@ class ClipCommand : public testing::Test {
     }
     std::ostringstream out;
     calibrate_response(options, out);
-    return out.str();
+    return out.str() + table();
   }
   std::string table() const { return session::content_of(folder() / "table.toml"); }
   fs::path folder() const { return directory_.path(); }

@@ -223,7 +223,7 @@ TEST(TagSurvey, SaysWhichPicturesAreMissing) {
     const bool wall = id >= 7 && id <= 9;
     if (wall != (seen.picture % 2 == 0)) return true;
     if (id == 20) return ++of_20 > 3;
-    return id == 4 && glm::dot(direction(81), direction(seen.picture)) < std::cos(9.5 * degree);
+    return id == 4 && glm::dot(direction(81), direction(seen.picture)) < std::cos(6 * degree);
   });
   const TagSurvey survey = survey_tags(walk, walk_lens(), {});
   EXPECT_THAT(missing_of_tags(survey, {0, 31}, 0),
@@ -434,6 +434,22 @@ TEST(TagSurvey, AChainOfPairsIsNamed) {
                         HasSubstr("tag 7, the worst, to 28 mm"))));
   survey.pictures_of_pairs = 3;
   EXPECT_EQ(missing_of_tags(survey, {}, 0).size(), 7u);
+}
+
+// A short clip past two tags that are large in the picture: 8 degrees, and noise leaves little.
+TEST(TagSurvey, FewViewsAreEnoughForATagThatIsCertain) {
+  TagSurvey survey;
+  survey.tags.resize(2);
+  SurveyedTag& tag = survey.tags[1];
+  tag.id = 1;
+  tag.pictures = 24;
+  tag.views_rad = 8 * degree;
+  tag.world_from_tag[3].x = 0.34;
+  tag.position_sigma_m = 0.39e-3;
+  tag.rotation_sigma_rad = 0.029 * degree;
+  EXPECT_THAT(missing_of_tags(survey, {}, 0), IsEmpty());
+  tag.position_sigma_m = 1e-3;
+  EXPECT_THAT(missing_of_tags(survey, {}, 0), ElementsAre(HasSubstr("its pictures span only 8")));
 }
 
 // Tag 2 lies there twice in the last pictures, which keep the others.
