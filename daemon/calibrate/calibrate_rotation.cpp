@@ -15,6 +15,9 @@ namespace previz::calibrate {
 namespace {
 
 constexpr int frames = 3, width = 80;
+// What the true environment of a set leaves (TruthBalance.ATurnedEnvironmentIsFoundByItsShadows),
+// and what is more than that.
+constexpr double own_room = 0.04, often_another_room = 0.06;
 
 }  // namespace
 
@@ -45,6 +48,13 @@ void calibrate_rotation(const LightOptions& options, std::ostream& out) {
       "shading and shadows are off by {:.1f} % with the environment as it is, and by {:.1f} % "
       "turned by {:+.1f} +- {:.1f} degrees\n",
       100 * fit.off_unturned, 100 * fit.off, fit.rotation_rad / degree, fit.sigma_rad / degree);
+  if (fit.off > often_another_room)
+    fmt::print(
+        out,
+        "the environment of a set itself leaves about {:.0f} %: this one may be of another "
+        "room, or the model lacks what casts shadows there; the direction is then off by more "
+        "than is stated\n",
+        100 * own_room);
   if (!fit.is_certain())
     throw Error(
         "the pictures do not tell how the environment is turned: no shadow and no shading of the "

@@ -80,7 +80,8 @@ std::string quality_words(const set::Quality& quality) {
     text += ", then for " + output::duration_words(quality.seconds) + " per frame at most";
   if (quality.denoise) text += ", denoised";
   if (const int neighbours = neighbours_of(quality))
-    text += ", over " + set::plural(std::uint64_t(neighbours), "frame") + " on either side";
+    text += ", over " + set::plural(std::uint64_t(neighbours), "frame") +
+            " on either side, which are rendered too";
   return text;
 }
 
