@@ -51,7 +51,7 @@ class StillWorking {
   std::mutex mutex_;
   std::condition_variable_any wake_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-  std::string line_;  // that was begun and has no end yet
+  std::string line_;   // that was begun and has no end yet
   std::string shown_;  // in place of it
   std::list<Buffer> buffers_;
   std::jthread clock_;

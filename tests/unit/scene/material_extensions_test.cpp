@@ -106,7 +106,6 @@ TEST(MaterialExtensions, BringTheirFeatures) {
     ASSERT_NE(listed, render::features().end()) << row->name;
     EXPECT_EQ(listed->name, row->feature->name);
     EXPECT_EQ(listed->used, row->feature->used);
-    EXPECT_EQ(listed->left_out, row->feature->left_out);
     EXPECT_FALSE(row->feature->is_asked_for(Material{})) << row->name;
   }
   EXPECT_EQ(count, 4u);
