@@ -121,8 +121,8 @@ TEST(ModelSolids, AWallGoesUpToThePicturesTop) {
   views.views = {view};
   const auto highest = [&](const model::Views* seen) {
     double z = -1;
-    for (const auto& p : model::solids_of(m.parts, m.layout, m.shape, seen)[1].faces[0].outline)
-      z = std::max(z, p.z);
+    const auto solids = model::solids_of(m.parts, m.layout, m.shape, seen);
+    for (const auto& p : solids[1].faces[0].outline) z = std::max(z, p.z);
     return z;
   };
   const double above = 2 * (views.lens.cy + 0.5) / views.lens.fy;
