@@ -26,7 +26,7 @@ wait_for() {
   until "$@" 2>&1 | grep -F -- "$what" >/dev/null; do
     kill -0 "$rig" || fail "the rig has ended: $(tail -5 rig.log)"
     ((SECONDS < end)) || fail "$* does not say \"$what\": $("$@" 2>&1)"
-    sleep 0.2
+    sleep 0.2  # until it is asked again
   done
 }
 wait_for 60 "live" "$previzctl" status
@@ -34,14 +34,14 @@ step 0 "$previzctl" status
 
 # A take, and "good" pressed while it is being written, and once more when the set file has been saved.
 step 0 "$previzctl" record on
-sleep 3
+sleep 3  # that is the take
 step 0 "$previzctl" record off
 step 0 "$previzctl" action mark_good
 step 0 "$previzctl" mode review
 wait_for 30 "review" "$previzctl" status
 step 0 "$previzctl" mode live
 touch demo.toml
-sleep 1
+sleep 1  # the rig looks once a second: it may be loading now
 step 0 "$previzctl" status
 wait_for 60 "live" "$previzctl" status
 step 0 "$previzctl" action mark_good

@@ -230,7 +230,7 @@ class ClipCommand : public testing::Test {
     }
   }
   // What the command prints about the pictures, or about a session.
-  // And the tables.
+  // Returns what the command says, and behind it the tables that it wrote.
   std::string printed(CameraRole role, const fs::path& session = {}) const {
     ResponseOptions options{.footage = session,
                             .camera = role,
