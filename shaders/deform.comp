@@ -1,5 +1,5 @@
 // Gives a mesh a new shape: adds its morph targets and lets its vertices follow their joints
-// (shaders/README.md, "Deforming meshes"; daemon/scene/deformation.hpp does the same in double
+// (shaders/README.md, "Deforming meshes"; daemon/core/scene/deformation.hpp does the same in double
 // precision).
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,5 +1,5 @@
 // Puts what a small rendering adds onto the camera's whole picture, which so stays as sharp as it is
-// (shaders/README.md, "A smaller rendering"; daemon/render/enlarge.cpp has it in double precision). An
+// (shaders/README.md, "A smaller rendering"; daemon/core/render/picture/enlarge.cpp has it in double precision). An
 // invocation works on two pixels, whose six codes are three words.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -16,13 +16,13 @@
 
 #include "daemon/bench/frames.hpp"
 #include "daemon/bench/page.hpp"
-#include "daemon/output/progress.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/set/check.hpp"
-#include "daemon/trade/path_timer.hpp"
+#include "daemon/core/output/progress.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/session/draft.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/core/set/check.hpp"
+#include "daemon/core/timing/path_timer.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/draft.hpp"
-#include "drivers/session/files.hpp"
 
 namespace previz::bench {
 namespace {
@@ -116,7 +116,7 @@ class Bench {
   void begin() {
     // A mistake in the set is said before anything is measured.
     if (options_.set_or_session)
-      frame_.emplace(trade::TradeSource{.set_or_session = *options_.set_or_session}, std::nullopt);
+      frame_.emplace(timing::FrameSource{.set_or_session = *options_.set_or_session}, std::nullopt);
     report_.date = fmt::format("{:%Y-%m-%d %H:%M}", fmt::localtime(std::time(nullptr)));
     report_.version = PREVIZ_VERSION;
     report_.processor = processor();
@@ -175,15 +175,15 @@ class Bench {
       report_.left_out.push_back({options_.set_or_session->string(), "there is no time left"});
       return;
     }
-    trade::TradeFrame& frame = *frame_;
+    timing::TimedFrame& frame = *frame_;
     const set::Set& set = frame.set();
     const scene::Scene scene = scene::load_scene(set);
-    trade::TradeSettings settings;
+    timing::FrameSettings settings;
     settings.estimation = set.estimation;
     settings.lighting = set.lighting;
     settings.lens = frame.calibration().lens;
     settings.denoise = set.quality.denoise;
-    trade::PathTimer timer(device_, frame, scene, settings, /*is_live=*/true);
+    timing::PathTimer timer(device_, frame, scene, settings, /*is_live=*/true);
     const PinholeIntrinsics& lens = frame.calibration().intrinsics;
     const double scale = set.quality.scale;
     report_.set = {.set = options_.set_or_session->string(),
@@ -201,7 +201,7 @@ class Bench {
   std::ostream& out_;
   const Clock::time_point start_ = Clock::now();
   std::shared_ptr<render::Device> device_;
-  std::optional<trade::TradeFrame> frame_;
+  std::optional<timing::TimedFrame> frame_;
   BenchReport report_{};
 };
 

@@ -7,7 +7,7 @@
 #include <stop_token>
 
 #include "daemon/bench/figures.hpp"
-#include "daemon/render/gpu.hpp"
+#include "daemon/core/render/device/gpu.hpp"
 
 namespace previz::bench {
 

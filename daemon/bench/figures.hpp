@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/render/gpu.hpp"
+#include "daemon/core/render/device/gpu.hpp"
 
 namespace previz::bench {
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "daemon/bench/shapes.hpp"
-#include "daemon/lighting/environment.hpp"
+#include "daemon/core/lighting/environment.hpp"
 #include "drivers/display_drivers.hpp"
 #include "drivers/error.hpp"
 #include "drivers/frame.hpp"

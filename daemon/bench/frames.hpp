@@ -7,7 +7,7 @@
 #include <string>
 
 #include "daemon/bench/figures.hpp"
-#include "daemon/render/renderer.hpp"
+#include "daemon/core/render/renderer.hpp"
 #include "drivers/display.hpp"
 
 namespace previz::bench {

@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/report/page_style.hpp"
-#include "daemon/set/check.hpp"
-#include "daemon/trade/chart.hpp"
+#include "daemon/core/output/chart.hpp"
+#include "daemon/core/output/page_style.hpp"
+#include "daemon/core/set/check.hpp"
 
 namespace previz::bench {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "drivers/calibration.hpp"
 
 namespace previz::bench {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "daemon/control/callers.hpp"
-#include "daemon/set/names.hpp"
+#include "daemon/core/set/names.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::control {

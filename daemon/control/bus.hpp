@@ -7,7 +7,7 @@
 #include <memory>
 #include <string>
 
-#include "daemon/set/actions.hpp"
+#include "daemon/core/set/actions.hpp"
 
 struct sd_event;
 

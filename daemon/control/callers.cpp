@@ -10,8 +10,8 @@
 #include <sstream>
 #include <utility>
 
+#include "daemon/core/session/files.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/files.hpp"
 
 namespace previz::control {
 namespace {

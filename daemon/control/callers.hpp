@@ -13,7 +13,7 @@ struct sd_bus_message;
 namespace previz::control {
 
 // The action of polkit that allows a call, as systemd/org.previz.Rig1.policy describes it. Its
-// detail "verb" is the name of an action (daemon/set/actions.hpp), a mode, or "record".
+// detail "verb" is the name of an action (daemon/core/set/actions.hpp), a mode, or "record".
 inline constexpr const char* operate_action = "org.previz.Rig1.operate";
 
 class Callers {

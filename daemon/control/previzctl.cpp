@@ -20,10 +20,10 @@
 #include "daemon/control/bus.hpp"
 #include "daemon/control/request.hpp"
 #include "daemon/control/status_words.hpp"
+#include "daemon/core/report/printable.hpp"
+#include "daemon/core/report/standard_output.hpp"
+#include "daemon/core/report/still_working.hpp"
 #include "drivers/error.hpp"
-#include "drivers/printable.hpp"
-#include "drivers/standard_output.hpp"
-#include "drivers/still_working.hpp"
 
 namespace {
 

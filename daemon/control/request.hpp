@@ -13,7 +13,7 @@ namespace previz::control {
 struct Request {
   std::string mode;    // "standby", "live", "refine", "review"
   std::string record;  // "on", "off"
-  std::string action;  // a name in daemon/set/actions.hpp
+  std::string action;  // a name in daemon/core/set/actions.hpp
   std::string set;     // "reload", "next", "previous"
   bool names_only = false;
   bool raw = false;  // status by the names and values of the bus

@@ -23,7 +23,7 @@ struct Option {
 };
 
 struct Command {
-  std::string path;  // "previzd calibrate lens"
+  std::string path;  // "previz calibrate lens"
   std::string about;
   std::vector<Option> options;  // positionals first
   std::vector<std::string> subcommands;

@@ -1,4 +1,4 @@
-// Has the chapters of previzd-farm(1) that were written by hand.
+// Has the chapters of previz-farm(1) that were written by hand.
 #pragma once
 
 #include <vector>

@@ -6,7 +6,7 @@
 #include <cctype>
 #include <sstream>
 
-#include "daemon/set/table.hpp"
+#include "daemon/core/set/table.hpp"
 
 namespace previz::manual {
 namespace {
@@ -42,7 +42,7 @@ std::string joined(const Words& words, const std::string& separator, Style style
   return out;
 }
 
-// "previzd farm" has the page previzd-farm.
+// "previz farm" has the page previz-farm.
 std::string page_name(std::string path) {
   std::ranges::replace(path, ' ', '-');
   return path;
@@ -79,7 +79,7 @@ void print(std::ostream& out, const Option& option) {
   entry(out, term_of(option), text);
 }
 
-// "previzd render [OPTION...] session"
+// "previz render [OPTION...] session"
 std::string usage(const Command& command) {
   std::string line = fmt::format("{} [{}...]", bold(command.path), italic("OPTION"));
   for (const Option& option : command.options)

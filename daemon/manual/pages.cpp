@@ -4,11 +4,12 @@
 
 #include "daemon/command_line.hpp"
 #include "daemon/control/request.hpp"
+#include "daemon/core/set/actions.hpp"
 #include "daemon/manual/command.hpp"
 #include "daemon/manual/completion.hpp"
 #include "daemon/manual/farm_chapters.hpp"
 #include "daemon/manual/man_page.hpp"
-#include "daemon/set/actions.hpp"
+#include "daemon/tools/command_line.hpp"
 
 namespace previz::manual {
 namespace {
@@ -20,24 +21,31 @@ std::vector<Command> previzd_commands() {
   return commands_of(app);
 }
 
-bool is_of_farm(const Command& command) {
-  return command.path == "previzd farm" || command.path.starts_with("previzd farm ");
+std::vector<Command> previz_commands() {
+  CLI::App app{"Tools for the takes and sets of a camera rig that runs previzd", "previz"};
+  tools::CommandLine said;
+  add_commands(app, said);
+  return commands_of(app);
 }
 
-// Returns the commands of previzd(8), where `farm` is one line: it has a page of its own.
+bool is_of_farm(const Command& command) {
+  return command.path == "previz farm" || command.path.starts_with("previz farm ");
+}
+
+// Returns the commands of previz(1), where `farm` is one line: it has a page of its own.
 std::vector<Command> general_commands() {
-  std::vector<Command> commands = previzd_commands();
+  std::vector<Command> commands = previz_commands();
   for (Command& command : commands)
-    if (command.path == "previzd farm")
-      command = {"previzd farm", command.about + ". See previzd-farm(1)", {}, {}};
+    if (command.path == "previz farm")
+      command = {"previz farm", command.about + ". See previz-farm(1)", {}, {}};
   std::erase_if(commands, [](const Command& command) {
-    return is_of_farm(command) && command.path != "previzd farm";
+    return is_of_farm(command) && command.path != "previz farm";
   });
   return commands;
 }
 
 std::vector<Command> farm_commands() {
-  std::vector<Command> commands = previzd_commands();
+  std::vector<Command> commands = previz_commands();
   std::erase_if(commands, [](const Command& command) { return !is_of_farm(command); });
   return commands;
 }
@@ -74,56 +82,59 @@ their words: Names and texts of others are shown with control characters as \x1b
 
 Over D-Bus the groups previz and previz-view see the state of the rig, and root and whom polkit lets operate it (THE SERVICE). Whoever is at its buttons operates it, too.
 
-What a package contains and was made of is in its SPDX list, /usr/share/doc/previzd/previzd.spdx.json (previzd-farm has its own). A department signs a package with `debsigs --sign=origin` and an Ed25519 key, and `debsig-verify` verifies it by the policy in /etc/debsig/policies.
+What a package contains and was made of is in its SPDX list, /usr/share/doc/previzd/previzd.spdx.json (previz-tools has its own). A department signs a package with `debsigs --sign=origin` and an Ed25519 key, and `debsig-verify` verifies it by the policy in /etc/debsig/policies.
 
 A fault by which a file reaches what it should not is best reported in private to whom previzd is from, with what `previzd --version` says.
 )"};
 
-const Chapter examples_chapter{"EXAMPLES",
-                               R"(
+const Chapter rig_examples{"EXAMPLES", R"(
 previzd devices: Lists the cameras, buttons and screens that are plugged in, by the names that a set file uses.
 previzd devices --learn: Prints the name of every button that is pressed.
 previzd devices --rules: Prints the rules for /etc/udev/rules.d that let the service open pads, pedals and GPIO chips.
-previzd print board charuco:7x5:30mm:22mm:5x5_100 --out board.pdf: Draws a board for the calibration of the lenses, to be printed on A4 at 100 %.
-previzd print tags --ids 0-11 --size 80mm --out tags.pdf: Draws twelve tags with crop marks, and a ruler to check the printer's scale.
-previzd calibrate observer views --board charuco:7x5:30mm:22mm:5x5_100 --out lens.toml: Measures the film camera's lens from a folder of pictures of a board, and writes the tables for the set file.
-previzd calibrate observer views --board aprilgrid:6x6:88mm:26.4mm --out lens.toml: Does the same by Kalibr's AprilGrid: 6x6 tags of 88 mm with gaps of 26.4 mm, which is its tagSpacing of 0.3. The output names the form found.
-previzd print board aprilgrid:6x6:40mm:12mm:kalibr --paper A3 --out board.pdf: Draws an AprilGrid as Kalibr prints it, which both programs find.
-previzd calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds its pose from the set's tags.
-previzd calibrate response bracket --camera observer --out response.toml: Measures the film camera's response curve, and from which code on it clips, from a folder of pictures of one view at several shutter times. The longest exposure should be two stops longer than a bright even area needs to become white.
-previzd calibrate from camchain.yaml --camera cam0 --out lens.toml: Takes a lens that Kalibr, OpenCV, ROS, COLMAP, Metashape or another program calibrated.
-previzd calibrate from cameras.txt --as observer: Turns a fisheye lens that COLMAP calibrated into the film camera's lens, and says by how many pixels the two differ at worst.
-previzd calibrate tags walk --set desk.toml --size 80mm --write: Finds the tags' positions, from a walk past all of them with the film camera, and writes them to the set file.
-previzd model takes/12A_take003 --set desk.toml --write: Makes the phantom of the boxes that were marked on the rig while this take was recorded.
-previzd model walk --set desk.toml --parts real.toml --write: Makes the phantom of the real scene from the walk's tags and the points marked in real.toml, and adds it to the set file.
 previzd check desk.toml: Lists every mistake in a set file, or what its scene asks of the renderer.
 previzd check takes/12A_take003: Does the same for a take and its own set, and measures in five of its frames how many pixels the edges of phantoms and removed objects are from those of the pictures. Where that is more than 2 px it says what to look at. It also tracks five frames, and says what does not fit of tags and lens.
 previzd run desk.toml: Composites live. The rig's buttons, or previzctl, do the rest.
-previzd render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Run again, it continues where it stopped.
-previzd render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
-previzd render takes/12A_take003 --frames 40 --spp 4096 --neighbours 0 --sample-range 1/2 --out first: Renders the first half of a heavy frame's samples, while another computer renders 2/2.
-previzd merge takes/12A_take003 first second --frames 40 --spp 4096 --neighbours 0 --out renders/12A_take003: Makes the picture of both halves. If both computers have the same graphics card and driver, it is the picture of one, to the last bit.
-previzd farm takes/12A_take003 --out renders/12A_take003 --nodes 3: Divides the rendering of a take between three machines, by Slurm where it is installed, and otherwise by a script to be started on each. previzd-farm(1) has the rest.
-previzd farm status renders/12A_take003.farm: Says how many frames are done, which tasks have failed, where and why, and how long the rest takes.
 previzd bench --page bench.html: Measures what this machine can do, in about two minutes, and writes a page about it. The first thing to run on a new machine.
 previzd bench --no-hardware-rays: Measures it without the hardware that a graphics card may have for rays, to see what that brings.
 previzd bench desk.toml --json bench.json: Also measures the frames of a set, whose newest take is used, and writes all figures as JSON.
-previzd trade desk.toml --axes estimator,depth: Measures the cost and benefit of the estimator and the number of bounces on this set.
-previzd trade takes/12A_take003 --set desk.toml --fps 25 --error 2% --out trade: Finds the settings that hold 25 frames per second with the least error, and those that reach an error of 2 % in the least time.
-previzd trade takes/12A_take003 --set desk.toml --out trade --minutes 20: Continues the previous run of `previzd trade` in that folder, with more time.
 previzd run desk.toml --with trade/live.toml: Composites live with the settings that trade found.
-previzd render takes/12A_take003 --with trade/post.toml: Renders with the settings that trade found.
-previzd import frames.json sessions/desk: Makes a take of your own pictures or video.
-previzd takes list /var/lib/previzd/takes: Lists the takes: which are good, how long they are, what is missing, and how much of each is rendered.
-previzd takes mark takes/12A_take003: Marks a take as good, as the rig's action mark_good does; --not removes the mark.
-previzd takes copy takes/12A_* --to /media/disk/day1: Copies takes, and reads the copies back. Each has its checksums in SHA256SUMS, for `previzd takes check` and for `sha256sum -c`.
-previzd takes check takes/12A_take003 --repair repaired: Reads a take from end to end; if it was cut off or damaged, writes every complete frame and line of it into the new take repaired/12A_take003, which says what is lost. The damaged one is not changed.
-previzd takes delete takes/12A_take001: Deletes a take. A good one is deleted only with --good, and foreign files in its folder are kept.
-previzd render takes --good --out renders: Renders all good takes, each into a folder named after it.
-previzd track takes/12A_take003 --out poses.jsonl: Finds the camera in every frame without rendering, and reports why it is lost where it is, and what does not fit: tags of another family, printed twice, moved or scaled, another lens, a rolling shutter.
-previzd export takes/12A_take003 camera: Writes the take's camera for USD and Nuke, and each object where it stands.
 )",
-                               true};
+                           true};
+
+const Chapter tool_examples{"EXAMPLES", R"(
+previz print board charuco:7x5:30mm:22mm:5x5_100 --out board.pdf: Draws a board for the calibration of the lenses, to be printed on A4 at 100 %.
+previz print tags --ids 0-11 --size 80mm --out tags.pdf: Draws twelve tags with crop marks, and a ruler to check the printer's scale.
+previz calibrate observer views --board charuco:7x5:30mm:22mm:5x5_100 --out lens.toml: Measures the film camera's lens from a folder of pictures of a board, and writes the tables for the set file.
+previz calibrate observer views --board aprilgrid:6x6:88mm:26.4mm --out lens.toml: Does the same by Kalibr's AprilGrid: 6x6 tags of 88 mm with gaps of 26.4 mm, which is its tagSpacing of 0.3. The output names the form found.
+previz print board aprilgrid:6x6:40mm:12mm:kalibr --paper A3 --out board.pdf: Draws an AprilGrid as Kalibr prints it, which both programs find.
+previz calibrate light views --board charuco:7x5:30mm:22mm:5x5_100 --tags desk.toml: Measures the fisheye's lens, and finds its pose from the set's tags.
+previz calibrate response bracket --camera observer --out response.toml: Measures the film camera's response curve, and from which code on it clips, from a folder of pictures of one view at several shutter times. The longest exposure should be two stops longer than a bright even area needs to become white.
+previz calibrate from camchain.yaml --camera cam0 --out lens.toml: Takes a lens that Kalibr, OpenCV, ROS, COLMAP, Metashape or another program calibrated.
+previz calibrate from cameras.txt --as observer: Turns a fisheye lens that COLMAP calibrated into the film camera's lens, and says by how many pixels the two differ at worst.
+previz calibrate tags walk --set desk.toml --size 80mm --write: Finds the tags' positions, from a walk past all of them with the film camera, and writes them to the set file.
+previz model takes/12A_take003 --set desk.toml --write: Makes the phantom of the boxes that were marked on the rig while this take was recorded.
+previz model walk --set desk.toml --parts real.toml --write: Makes the phantom of the real scene from the walk's tags and the points marked in real.toml, and adds it to the set file.
+previz render takes/12A_take003 --out renders/12A_take003: Renders a take with the settings that it was recorded with. Run again, it continues where it stopped.
+previz render takes/12A_take003 --set relit.toml --spp 512 --frames 100-150 --out renders/relit: Renders a part of a take with other settings: other lamps, other objects, more samples.
+previz render takes/12A_take003 --frames 40 --spp 4096 --neighbours 0 --sample-range 1/2 --out first: Renders the first half of a heavy frame's samples, while another computer renders 2/2.
+previz merge takes/12A_take003 first second --frames 40 --spp 4096 --neighbours 0 --out renders/12A_take003: Makes the picture of both halves. If both computers have the same graphics card and driver, it is the picture of one, to the last bit.
+previz farm takes/12A_take003 --out renders/12A_take003 --nodes 3: Divides the rendering of a take between three machines, by Slurm where it is installed, and otherwise by a script to be started on each. previz-farm(1) has the rest.
+previz farm status renders/12A_take003.farm: Says how many frames are done, which tasks have failed, where and why, and how long the rest takes.
+previz trade desk.toml --axes estimator,depth: Measures the cost and benefit of the estimator and the number of bounces on this set.
+previz trade takes/12A_take003 --set desk.toml --fps 25 --error 2% --out trade: Finds the settings that hold 25 frames per second with the least error, and those that reach an error of 2 % in the least time.
+previz trade takes/12A_take003 --set desk.toml --out trade --minutes 20: Continues the previous run of `previz trade` in that folder, with more time.
+previz render takes/12A_take003 --with trade/post.toml: Renders with the settings that trade found.
+previz import frames.json sessions/desk: Makes a take of your own pictures or video.
+previz takes list /var/lib/previzd/takes: Lists the takes: which are good, how long they are, what is missing, and how much of each is rendered.
+previz takes mark takes/12A_take003: Marks a take as good, as the rig's action mark_good does; --not removes the mark.
+previz takes copy takes/12A_* --to /media/disk/day1: Copies takes, and reads the copies back. Each has its checksums in SHA256SUMS, for `previz takes check` and for `sha256sum -c`.
+previz takes check takes/12A_take003 --repair repaired: Reads a take from end to end; if it was cut off or damaged, writes every complete frame and line of it into the new take repaired/12A_take003, which says what is lost. The damaged one is not changed.
+previz takes delete takes/12A_take001: Deletes a take. A good one is deleted only with --good, and foreign files in its folder are kept.
+previz render takes --good --out renders: Renders all good takes, each into a folder named after it.
+previz track takes/12A_take003 --out poses.jsonl: Finds the camera in every frame without rendering, and reports why it is lost where it is, and what does not fit: tags of another family, printed twice, moved or scaled, another lens, a rolling shutter.
+previz export takes/12A_take003 camera: Writes the take's camera for USD and Nuke, and each object where it stands.
+)",
+                            true};
 
 const Chapter glossary_chapter{"GLOSSARY", R"(
 bracket: Several exposures of the same view, from dark to bright, which together hold both the lamps and the room.
@@ -164,36 +175,36 @@ virtual object: A thing that exists only in the composite.
 const Chapter clip_chapter{"FROM A CLIP TO A PICTURE", R"(
 A clip of any camera with printed tags in it, a dozen photos of a board by the same lens at the same focus, and an HDRI of the room are enough. Each command writes its result into the set file, and keeps the old one beside it. The chapters below say more of each.
 
-1. The tags and the board: `previzd print tags --ids 0-3 --size 80mm` and `previzd print board chessboard:9x6:25mm`.
+1. The tags and the board: `previz print tags --ids 0-3 --size 80mm` and `previz print board chessboard:9x6:25mm`.
 
 2. The set file, my.toml: `[set]` with a `name`, `[tracking]` with `family = "tag36h11"`, `[lighting]` with `environment = "room.exr"`, and an `[[object]]` with `name`, `file` and `presence = "virtual"` for each virtual thing.
 
-3. The lens: `previzd calibrate observer PHOTOS --board chessboard:9x6:25mm --set my.toml --write`.
+3. The lens: `previz calibrate observer PHOTOS --board chessboard:9x6:25mm --set my.toml --write`.
 
-4. The tags: `previzd calibrate tags CLIP --set my.toml --size 80mm --write`, if the clip walks around them. If it does not, measure their places with a ruler, and write a `[[tag]]` for each.
+4. The tags: `previz calibrate tags CLIP --set my.toml --size 80mm --write`, if the clip walks around them. If it does not, measure their places with a ruler, and write a `[[tag]]` for each.
 
-5. The take: frames.json says `{ "name": "first", "set": "my.toml", "observer": { "video": "clip.mp4", "exposure": 1 } }`; then `previzd import frames.json take`.
+5. The take: frames.json says `{ "name": "first", "set": "my.toml", "observer": { "video": "clip.mp4", "exposure": 1 } }`; then `previz import frames.json take`.
 
-6. What is really there: `previzd model take --set my.toml --pictures marks`, mark corners in marks/model.toml, then `previzd model take --set my.toml --parts marks/model.toml --overlay marks --grey --write`, and look at the pictures with the model's edges in marks. Walls keep light from the set where nobody sees them, too: say how high they are (`height_m`), and how far they go on (`margin_m`).
+6. What is really there: `previz model take --set my.toml --pictures marks`, mark corners in marks/model.toml, then `previz model take --set my.toml --parts marks/model.toml --overlay marks --grey --write`, and look at the pictures with the model's edges in marks. Walls keep light from the set where nobody sees them, too: say how high they are (`height_m`), and how far they go on (`margin_m`).
 
-7. The light: `previzd calibrate light take --rotation --set my.toml --write`, `previzd calibrate balance take --set my.toml --write`, and for the colours `previzd model take --set my.toml --parts marks/model.toml`.
+7. The light: `previz calibrate light take --rotation --set my.toml --write`, `previz calibrate balance take --set my.toml --write`, and for the colours `previz model take --set my.toml --parts marks/model.toml`.
 
-8. The picture: `previzd check take --set my.toml`, and if nothing is left to mend, `previzd render take --set my.toml`; for a look at one frame alone, `--frames 0 --spp 8 --neighbours 0`.
+8. The picture: `previzd check take --set my.toml`, and if nothing is left to mend, `previz render take --set my.toml`; for a look at one frame alone, `--frames 0 --spp 8 --neighbours 0`.
 )"};
 
 const Chapter tags_chapter{"WHERE THE TAGS ARE", R"(
 Print tags at 100 %, measure the ruler on the sheet, and glue them onto something flat and stiff. Lay one face up on the floor or table, at the origin of the set: it defines the world (or another tag does, if the set file has its position).
 Film them with the film camera, at the zoom and focus of its calibration, slowly and with a short shutter time: walk around the set, from one side to the other, near and far, so that each picture shows two tags or more, and each tag is seen from at least four places. Do not touch anything until you are done.
-`previzd calibrate tags FOOTAGE --set SET --size 80mm` then lists each tag with the accuracy of its position. It names a tag that moved, and the pictures between which it did; measures one that is not the given size; and says what to film again. A good map is accurate to a millimetre and a tenth of a degree, with an rms below half a pixel.
+`previz calibrate tags FOOTAGE --set SET --size 80mm` then lists each tag with the accuracy of its position. It names a tag that moved, and the pictures between which it did; measures one that is not the given size; and says what to film again. A good map is accurate to a millimetre and a tenth of a degree, with an rms below half a pixel.
 Where a tag falls off or is knocked while you shoot, the display names it and its distance as soon as two others disagree with it, and it is ignored until it is back: stick it back where it was, or film a walk and calibrate the tags again. Poses whose corners are farther off than noise explains are named with the likely cause, such as the lens, the scale of the prints or a rolling shutter.
-If the set has the table `[observer.lens_fit]`, which `previzd calibrate observer` prints behind the lens, the lens is refined as well: boards and tags are adjusted together, and what the boards left open at the edges of the picture is found from tags visible there. The output gives the rms before and after and how far the lens moves in the corner of the picture, or why it stays; `--write` writes lens and tags together.
+If the set has the table `[observer.lens_fit]`, which `previz calibrate observer` prints behind the lens, the lens is refined as well: boards and tags are adjusted together, and what the boards left open at the edges of the picture is found from tags visible there. The output gives the rms before and after and how far the lens moves in the corner of the picture, or why it stays; `--write` writes lens and tags together.
 The size is that of the black border, from outer edge to outer edge, as measured on the paper. A tape measure across the whole set is more accurate: `--distance 0-7:2.345m`, between the centres of two tags, sets the scale.
 )"};
 
 const Chapter model_chapter{"THE MODEL", R"(
-The phantom is the model of what really stands on the set: it catches the shadows of virtual objects and hides them. `previzd model FOOTAGE --set SET --parts real.toml` makes it of planes, boxes, cylinders, rooms and scans. Flat tags give a plane by themselves; of everything else a few corners are marked by hand in two or more of the pictures, taken from different sides, each of which must show a tag of the set. Three pictures are usually enough: the first, the last, and one between.
-`previzd model FOOTAGE --set SET --pictures marks` begins it: the folder marks gets up to eight pictures and model.toml, a file of parts that lists them and the planes of the set's flat tags. Open the pictures in any program that enlarges them ten times and shows the coordinates of a pixel, write what you see into model.toml, and name that with `--parts`; pictures without marks may stay. `--overlay FOLDER` draws the model, but for scans, over the pictures (frame_12.model.png): its green edges must lie on those of the real things, but for the border of a plane that has neither `edges` nor an `outline`; the red crosses are your marks. Until they do, add `--grey`: colours take half a minute, all else a second.
-Boxes can be marked on the rig instead, with buttons and the film camera itself. Give the actions `mark`, `next_box`, `unmark` and `marking` (and `next_corner`) to buttons, and start a take with `record`. `mark` shows a cross in the middle of the picture, and above it which corner comes next: aim the camera at the first corner of a box's upper side, with a tag of the set in the picture, hold it still and press `mark` again; then the second and the third, in order around. Go to another side, at least a tenth of the distance, and mark the three once more; a line in the picture then shows where the corner must be. The display says how far apart the marks of a corner are; a corner that was found has a small cross and its number, and a box with three such corners is complete. `next_box` goes on to the next box, after the last to a new one, and then to the first; `unmark` withdraws the last mark, and pressed again the one before it. All marks of a box must be in one take. End the take; `previzd model TAKE --set SET --write` makes the model of it, and of the planes of tags that carry a box, without any file of parts. With `--pictures marks` those marks are in model.toml, where cylinders and walls can be added.
+The phantom is the model of what really stands on the set: it catches the shadows of virtual objects and hides them. `previz model FOOTAGE --set SET --parts real.toml` makes it of planes, boxes, cylinders, rooms and scans. Flat tags give a plane by themselves; of everything else a few corners are marked by hand in two or more of the pictures, taken from different sides, each of which must show a tag of the set. Three pictures are usually enough: the first, the last, and one between.
+`previz model FOOTAGE --set SET --pictures marks` begins it: the folder marks gets up to eight pictures and model.toml, a file of parts that lists them and the planes of the set's flat tags. Open the pictures in any program that enlarges them ten times and shows the coordinates of a pixel, write what you see into model.toml, and name that with `--parts`; pictures without marks may stay. `--overlay FOLDER` draws the model, but for scans, over the pictures (frame_12.model.png): its green edges must lie on those of the real things, but for the border of a plane that has neither `edges` nor an `outline`; the red crosses are your marks. Until they do, add `--grey`: colours take half a minute, all else a second.
+Boxes can be marked on the rig instead, with buttons and the film camera itself. Give the actions `mark`, `next_box`, `unmark` and `marking` (and `next_corner`) to buttons, and start a take with `record`. `mark` shows a cross in the middle of the picture, and above it which corner comes next: aim the camera at the first corner of a box's upper side, with a tag of the set in the picture, hold it still and press `mark` again; then the second and the third, in order around. Go to another side, at least a tenth of the distance, and mark the three once more; a line in the picture then shows where the corner must be. The display says how far apart the marks of a corner are; a corner that was found has a small cross and its number, and a box with three such corners is complete. `next_box` goes on to the next box, after the last to a new one, and then to the first; `unmark` withdraws the last mark, and pressed again the one before it. All marks of a box must be in one take. End the take; `previz model TAKE --set SET --write` makes the model of it, and of the planes of tags that carry a box, without any file of parts. With `--pictures marks` those marks are in model.toml, where cylinders and walls can be added.
 A file of parts with two pictures and a crate on a table: `[[picture]]`, `file = "frame 0"`, `[picture.points]`, `c1 = [312.4, 200.1]`, `c2 = [410.0, 195.2]`, `c3 = [398.7, 160.3]`; the same for "frame 12"; then `[[plane]]`, `name = "table"`, `tags = [0, 1]`, and `[[box]]`, `name = "crate"`, `on = "table"`, `top = ["c1", "c2", "c3", ""]`, each on a line of its own.
 In the file of parts each picture has a table, [[picture]] with its `file` ("0012.png" of a folder, "frame 12" of a session), and under it [picture.points] lists what is marked there, in pixels from the centre of the top left one. The same name in another picture must mean the same corner. Half a pixel is easily reached; [marks] with `accuracy_px` says so if your marks are better or worse than a pixel. Pictures of a folder or a video need a lens in the set, [observer.intrinsics]; a session brings its own.
 [[plane]] has a `name`, its `tags`, further `points` on it or the corners of its `outline`; without an outline it is a rectangle with `margin_m` (0.3) around all that is on it, which ends at its `edges`: `edges = [["far_1", "far_2"], ["left_1", "left_2"]]` names two points on the far border and two on the left one, each of which may be marked in one picture only. Other sides keep the margin. A wall has `upright_on = "floor"` and needs two `points`, or two at its `foot`, where it meets the floor, of which one picture is enough; where the wall leaves a picture is another point in each. To the sides it goes on by its margin: give a wall that leaves the picture a `margin_m` as long as it really goes on. It goes up to the top of the pictures and its margin beyond; where you know how high it is, say so with `height_m`, because a wall keeps light from the set, too.
@@ -203,20 +214,20 @@ In the file of parts each picture has a table, [[picture]] with its `file` ("001
 A [[scan]] without [scan.points] is placed by the printed tags that its own colours show: tags of the set that stayed where they are while it was scanned, as its texture (PNG, JPEG or WebP; of OBJ, PLY, FBX or glTF, in the file or beside it) or the colours of its vertices have them. Two or more of them, far apart, are better than one, and each needs at least 3 pixels of the texture per cell, 24 along a side of a tag36h11; `unit` and `up` are needed as above, and the output names the likely ones. A tag that is on the scan twice, is not flat there, or has another size than in the set is ignored, and the output says so. With points, the tags on the scan do not count.
 The action `guides` of a button shows on the rig's display whether a model fits the live picture, wherever it comes from: lines along its edges, the tags, the horizon, the world's axes and the boxes of virtual objects, and how far the edges are from those of the picture, in pixels. Lines that are off everywhere mean the tags' places or the lens; those of one thing, the place of that.
 All marks, tags and camera poses are adjusted together. Then the edges of boxes are looked for in the pictures, and the model follows them: they are more accurate than marks, which are needed to find them. The output lists the marks that are farthest off, how far the model is from the edges (a tenth of a pixel is good), and each face with its accuracy, one standard deviation where the face is worst; compare the sizes with a ruler. A mark that is off by more than 8 px (8 times `accuracy_px`) is refused. With a session that has light, each part gets the colour (albedo) that the plates show under that light, and the tags are part of the model, with their paper and print; pictures alone give a grey model. The model is beside the file of parts and named as it is, real.glb of real.toml, unless `--out` says otherwise; its nodes and materials are named as the parts are. `--write` adds it to the set file and keeps the old one beside it (demo.toml.1.old).
-Printed tags can be removed from the picture, with their light, shadows and reflections: by `hide = true` in the table [tags] of the set file, by the action `tags` of a button, or with `previzd render --hide-tags`. For that a phantom must have them. `previzd model` makes for each flat tag the nodes "tag 3 paper" and "tag 3 print", and from a session with light "under tag 3" as well: the surface that the tag lies on, in the colours that the plates have around it. Phantoms of other programs can have nodes of such names, too; without the last one, what is below the paper is shown as it is. To keep such a phantom, add `--tags-only --write`, for which no mark and no file of parts is needed: that puts the tags alone onto that phantom. A paper that goes on beyond the white cells of its tag needs `tag_paper_m = [width, height]` in its [[plane]] or [[box]], in metres along the tag's own edges and with the tag in the middle; a little too large does no harm. The place of a hidden tag is rendered as a virtual object is, with as much noise, and covers what the model does not have, such as a hand over the tag.
+Printed tags can be removed from the picture, with their light, shadows and reflections: by `hide = true` in the table [tags] of the set file, by the action `tags` of a button, or with `previz render --hide-tags`. For that a phantom must have them. `previz model` makes for each flat tag the nodes "tag 3 paper" and "tag 3 print", and from a session with light "under tag 3" as well: the surface that the tag lies on, in the colours that the plates have around it. Phantoms of other programs can have nodes of such names, too; without the last one, what is below the paper is shown as it is. To keep such a phantom, add `--tags-only --write`, for which no mark and no file of parts is needed: that puts the tags alone onto that phantom. A paper that goes on beyond the white cells of its tag needs `tag_paper_m = [width, height]` in its [[plane]] or [[box]], in metres along the tag's own edges and with the tag in the middle; a little too large does no harm. The place of a hidden tag is rendered as a virtual object is, with as much noise, and covers what the model does not have, such as a hand over the tag.
 )"};
 
 const Chapter light_chapter{"THE LIGHT", R"(
-Virtual things are lit by what is really there, and shadows on real things are as deep as the model under that light says. Light that does not fit the picture is the first thing that a viewer sees, so previzd compares the two: `previzd check TAKE`, `previzd render` and the running rig say how many times as bright as the picture the model of what is real comes out under this light, in red, green and blue, wherever nothing virtual is. A factor of 1.26, a third of a stop, is worth a word; a shadow never takes more light than the picture has.
+Virtual things are lit by what is really there, and shadows on real things are as deep as the model under that light says. Light that does not fit the picture is the first thing that a viewer sees, so previzd compares the two: `previzd check TAKE`, `previz render` and the running rig say how many times as bright as the picture the model of what is real comes out under this light, in red, green and blue, wherever nothing virtual is. A factor of 1.26, a third of a stop, is worth a word; a shadow never takes more light than the picture has.
 A fisheye on the set is best: it sees the lamps as they are in every frame, with their colours, and follows them when they change. Let it take brackets (README.md, "On a rig"), and calibrate it.
-An environment from elsewhere (`environment` in [lighting], OpenEXR or Radiance .hdr) has neither the brightness, nor the white, nor the direction of your set. Three commands with a take make it fit, in this order, each of which writes its result into the set file and keeps the old one beside it: `previzd calibrate light TAKE --rotation --set SET --write` turns it until the shadows and the shading of the model are those of the picture, or says that nothing in the picture tells (shading that is then off by 4 % is what the true environment leaves, and 8 % what one of another room may); `previzd calibrate balance TAKE --set SET --write` gives it the brightness and white of the film camera; `previzd model TAKE --set SET --parts FILE` measures the colours of what is real. The first needs a model that casts a shadow or has sides, in any colours; grey will do.
+An environment from elsewhere (`environment` in [lighting], OpenEXR or Radiance .hdr) has neither the brightness, nor the white, nor the direction of your set. Three commands with a take make it fit, in this order, each of which writes its result into the set file and keeps the old one beside it: `previz calibrate light TAKE --rotation --set SET --write` turns it until the shadows and the shading of the model are those of the picture, or says that nothing in the picture tells (shading that is then off by 4 % is what the true environment leaves, and 8 % what one of another room may); `previz calibrate balance TAKE --set SET --write` gives it the brightness and white of the film camera; `previz model TAKE --set SET --parts FILE` measures the colours of what is real. The first needs a model that casts a shadow or has sides, in any colours; grey will do.
 Without either, lamps of the set file alone light the set (`from = "set"`, and [[light]] with `gain_real = 1`); measure their places, and let the messages tell how bright they are to be.
 The grey card is in the picture already: the white paper of printed tags reflects 79 % of the light in all colours, so `calibrate balance` goes by it wherever a tag shows two white cells that are three pixels wide, and so does `model`, before it measures colours. A real grey card in the model, or any surface whose colour you know, is named with `--reference`; a [[surface]] of the set file gives it the colour that you know. Without tags and without a reference, all colours of the model count as if as many were too dark as too bright; a model whose colours were measured under a wrong light then agrees with that light. Coloured, glossy or grey paper is not 79 % white: name another reference.
 What it costs, measured on two sets whose truth is known: what virtual objects change on real surfaces is off by 3.3 and 2.2 % with a fisheye, and by 3.5 and 2.4 % with an environment of the place after the commands above, whether it was 0.3, 1 or 3 times as bright as the set, tinted, and turned by 70 degrees. Before them it was off by 107 %.
 )"};
 
 const Chapter lenses_chapter{"LENSES OF OTHER PROGRAMS", R"(
-`previzd calibrate from FILE` recognises by their content: OpenCV's YAML, XML and JSON (4, 5 or 8 coefficients, or a fisheye's 4), ROS's camera_info (plumb_bob, rational_polynomial, equidistant), Kalibr's camchain (pinhole with radtan, equidistant or none), COLMAP's cameras.txt (all models up to FULL_OPENCV and OPENCV_FISHEYE), Metashape's camera XML (frame cameras), transforms.json of nerfstudio and instant-ngp (OPENCV and OPENCV_FISHEYE), and RealSense's intrinsics as JSON (all but inverse models). The output says what is assumed or converted, such as COLMAP's pixel coordinates, which are counted from the corner of the first one and not from its centre.
+`previz calibrate from FILE` recognises by their content: OpenCV's YAML, XML and JSON (4, 5 or 8 coefficients, or a fisheye's 4), ROS's camera_info (plumb_bob, rational_polynomial, equidistant), Kalibr's camchain (pinhole with radtan, equidistant or none), COLMAP's cameras.txt (all models up to FULL_OPENCV and OPENCV_FISHEYE), Metashape's camera XML (frame cameras), transforms.json of nerfstudio and instant-ngp (OPENCV and OPENCV_FISHEYE), and RealSense's intrinsics as JSON (all but inverse models). The output says what is assumed or converted, such as COLMAP's pixel coordinates, which are counted from the corner of the first one and not from its centre.
 A fisheye becomes the light camera's lens and a pinhole the film camera's, unless `--as` says otherwise: then the lens is fitted with the other model, and the largest difference over the picture is reported. More than 0.1 px needs `--force`.
 Not supported are thin prisms and tilted sensors, Kalibr's omni, eucm, ds and fov, COLMAP's FOV and THIN_PRISM_FISHEYE, Metashape's fisheyes, Nuke's LensDistortion and the lenses of 3DEqualizer, PFTrack and SynthEyes: calibrate with another model, or from pictures of a board. Files of RealityCapture, Meshroom, OpenSfM, OpenMVG, Pix4D and Lensfun, profiles of Adobe and the reports of Kalibr are refused by name, with the way to convert them and what their numbers mean.
 )"};
@@ -225,9 +236,17 @@ const Chapter previzd_status{"EXIT STATUS", R"(
 0: Done.
 1: Error; one line on standard error says what is wrong.
 2: The command line cannot be understood.
-3: `previzd takes check`: a take is incomplete, because frames did not reach the disk while it was recorded, and none is damaged since (that is 1).
 75: The service ended to be restarted, outside a take: another version was installed, or the driver of a graphics card was loaded after the service started.
-128+N: Stopped by signal N, within two seconds. Files that were not complete are removed; finished frames are on disk, and the same render command continues there. (Stopping a live rig is not an error: 0.)
+128+N: Stopped by signal N, within two seconds. Files that were not complete are removed; (Stopping a live rig is not an error: 0.)
+)"};
+
+const Chapter previz_status{"EXIT STATUS", R"(
+0: Done.
+1: Error; one line on standard error says what is wrong.
+2: The command line cannot be understood.
+3: `previz takes check`: a take is incomplete, because frames did not reach the disk while it was recorded, and none is damaged since (that is 1).
+75: `previz farm task`: this machine could not do it, and another may.
+128+N: Stopped by signal N, within two seconds. Files that were not complete are removed; finished frames are on disk, and the same render command continues there.
 )"};
 
 const Chapter previzd_cameras{"NETWORK CAMERAS", R"(
@@ -247,7 +266,7 @@ const Chapter previzd_files{"FILES", R"(
 )"};
 
 // What is written beside the pictures, and what a take consists of.
-const Chapter previzd_formats{"FORMATS", R"(
+const Chapter previz_formats{"FORMATS", R"(
 session.toml: In a take: its name, slate, number and timecode, whether it is good, the calibrations, what was lost, and a verbatim copy of the set file. Versions of previzd that do not know k4, k5 and k6 of a calibration read it without them.
 observer.mkv, light.mkv, composite.mkv: In a take: the cameras' pictures, and the composite as shown; lossless (FFV1). The lines of observer.jsonl and so on give the time and exposure of each frame. They also name each picture by its checksum, by which it is found in a video whose head is torn.
 track.jsonl: In a take: the camera's pose in each frame that was tracked live, and what was moved, relit or carried; world_from_camera is 16 numbers, row by row.
@@ -255,13 +274,13 @@ events.jsonl: In a take: button presses and other events, in order.
 assets: In a take: the files that the set uses, each named by its SHA-256.
 frames.jsonl: Beside rendered pictures, one line per frame: whether it was rendered or why not, samples, seconds, the camera's pose with its error in pixels and the tags used for it, the light frames, and size and SHA-256 of its files. A render that continues checks them, and renders a frame again whose file is missing or was changed, or that has no line; it says which and why.
 0007.exr: The composite as R, G, B and A (1 everywhere), and beside it mixed, real, diff, mask, depth, normal and variance as layers: linear Rec. 709, 32-bit floats. timeCode counts at most 30 frames per second: from 31 to 60, frames are counted in pairs, and the field mark says which of the two it is (SMPTE ST 12-1: frame 47 of 48 is 23 with the mark); above 60 it is absent, and previz.timestamp_ns tells frames apart.
-0007.sums.exr: What `previzd render --sample-range 2/4` writes in place of the picture of frame 7: the sums of the second quarter of its samples. `previzd merge` needs the folders of all ranges and the options with which they were rendered. Frames of 128 samples or more can be divided, unless a target error or time decides how many they get, they are adaptive, or they are averaged with their neighbours.
+0007.sums.exr: What `previz render --sample-range 2/4` writes in place of the picture of frame 7: the sums of the second quarter of its samples. `previz merge` needs the folders of all ranges and the options with which they were rendered. Frames of 128 samples or more can be divided, unless a target error or time decides how many they get, they are adaptive, or they are averaged with their neighbours.
 render.json: Beside rendered pictures: the settings that they were rendered with.
-render.lock: Beside rendered pictures: the processes that are at work there, one line each, with the frames they have. Several `previzd render` of one take may share a folder, on several computers over NFS as well: each renders frames that no other has, and the one that finishes last makes the review video. One that ends while others still render names them and exits with 0. Use --force with the first of them only.
-poses.jsonl: Written by `previzd track --out`, one line per frame: frame, timestamp_ns, tracked; world_from_camera (4 rows of 4, metres, OpenCV axes, world Z up; as in the track of FRAMES.json), covariance, tags and reprojection_rms_px, or the reason why there is no pose; and carriers that were found.
-camera.chan: Written by `previzd export`: frame, position, rotation and vertical angle of view. The rotation order is ZXY, as in Nuke; set Blender's import to it. The angle is Nuke's, 2 atan(height / (2 fy)). It has neither the lens distortion nor the principal point; camera.usda has both, the distortion as text.
+render.lock: Beside rendered pictures: the processes that are at work there, one line each, with the frames they have. Several `previz render` of one take may share a folder, on several computers over NFS as well: each renders frames that no other has, and the one that finishes last makes the review video. One that ends while others still render names them and exits with 0. Use --force with the first of them only.
+poses.jsonl: Written by `previz track --out`, one line per frame: frame, timestamp_ns, tracked; world_from_camera (4 rows of 4, metres, OpenCV axes, world Z up; as in the track of FRAMES.json), covariance, tags and reprojection_rms_px, or the reason why there is no pose; and carriers that were found.
+camera.chan: Written by `previz export`: frame, position, rotation and vertical angle of view. The rotation order is ZXY, as in Nuke; set Blender's import to it. The angle is Nuke's, 2 atan(height / (2 fy)). It has neither the lens distortion nor the principal point; camera.usda has both, the distortion as text.
 )",
-                              true};
+                             true};
 
 const Chapter previzctl_status{"EXIT STATUS", R"(
 0: Done.
@@ -281,22 +300,26 @@ Chapter see_also(const std::string& pages) {
 }  // namespace
 
 std::vector<Page> man_pages() {
-  return {{"previzd.8",
-           man_page(general_commands(), 8,
-                    {service_chapter, security_chapter, examples_chapter, clip_chapter,
-                     tags_chapter, model_chapter, light_chapter, lenses_chapter, glossary_chapter,
-                     previzd_cameras, previzd_files, previzd_formats, previzd_status,
-                     see_also("previzctl(1), previzd-farm(1), previz-set(5)")})},
-          {"previzd-farm.1", man_page(farm_commands(), 1, farm_chapters())},
+  return {{"previzd.8", man_page(previzd_commands(), 8,
+                                 {service_chapter, security_chapter, rig_examples, glossary_chapter,
+                                  previzd_cameras, previzd_files, previzd_status,
+                                  see_also("previz(1), previzctl(1), previz-set(5)")})},
+          {"previz.1", man_page(general_commands(), 1,
+                                {tool_examples, clip_chapter, tags_chapter, model_chapter,
+                                 light_chapter, lenses_chapter, previz_formats, previz_status,
+                                 see_also("previzd(8), previz-farm(1), previz-set(5)")})},
+          {"previz-farm.1", man_page(farm_commands(), 1, farm_chapters())},
           {"previzctl.1", man_page(previzctl_commands(), 1,
                                    {{"ACTIONS", actions_text()},
                                     previzctl_status,
                                     see_also("previzd(8), previz-set(5)")})},
-          {"previz-set.5", set_man_page(set_description, see_also("previzd(8), previzctl(1)"))}};
+          {"previz-set.5",
+           set_man_page(set_description, see_also("previzd(8), previz(1), previzctl(1)"))}};
 }
 
 std::vector<Page> bash_completions() {
   return {{"previzd", bash_completion(previzd_commands())},
+          {"previz", bash_completion(previz_commands())},
           {"previzctl", bash_completion(previzctl_commands())}};
 }
 

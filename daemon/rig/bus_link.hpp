@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "daemon/control/bus.hpp"
-#include "daemon/pipeline/stage_keeper.hpp"
+#include "daemon/core/pipeline/stage_keeper.hpp"
 #include "daemon/rig/event_loop.hpp"
 
 namespace previz::rig {

@@ -77,14 +77,14 @@ void ButtonDesk::count() {
 }
 
 std::vector<ButtonDesk::Device> open_button_devices(
-    const set::Set& set, const Cameras& cameras,
+    const set::Set& set, const live::Cameras& cameras,
     const std::function<std::vector<std::unique_ptr<Buttons>>()>& more) {
   std::vector<ButtonDesk::Device> devices;
   const auto add = [&](std::vector<std::unique_ptr<Buttons>> opened, std::int64_t offset_ns) {
     for (std::unique_ptr<Buttons>& buttons : opened)
       devices.push_back({std::move(buttons), offset_ns});
   };
-  add(open_buttons(set, cameras), 0);
+  add(live::open_buttons(set, cameras), 0);
   std::vector<std::string> plugged;
   for (const set::Button& button : set.buttons)
     if (is_button_name(button.name) && std::ranges::find(plugged, button.name) == plugged.end())

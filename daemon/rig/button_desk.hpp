@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "daemon/pipeline/metrics.hpp"
-#include "daemon/report/reports.hpp"
-#include "daemon/rig/cameras.hpp"
+#include "daemon/core/live/cameras.hpp"
+#include "daemon/core/pipeline/metrics.hpp"
+#include "daemon/core/report/reports.hpp"
+#include "daemon/core/set/actions.hpp"
+#include "daemon/core/set/set.hpp"
 #include "daemon/rig/event_loop.hpp"
 #include "daemon/rig/press.hpp"
-#include "daemon/set/actions.hpp"
-#include "daemon/set/set.hpp"
 #include "drivers/buttons.hpp"
 
 namespace previz::rig {
@@ -81,7 +81,7 @@ class ButtonDesk {
 // plugged in, and `more`'s (which may be empty). Throws previz::Error naming a button that cannot
 // be understood.
 std::vector<ButtonDesk::Device> open_button_devices(
-    const set::Set& set, const Cameras& cameras,
+    const set::Set& set, const live::Cameras& cameras,
     const std::function<std::vector<std::unique_ptr<Buttons>>()>& more);
 
 }  // namespace previz::rig

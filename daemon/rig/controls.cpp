@@ -12,9 +12,9 @@
 #include <utility>
 #include <variant>
 
-#include "daemon/set/check.hpp"
-#include "daemon/set/names.hpp"
-#include "daemon/set/problems.hpp"
+#include "daemon/core/set/check.hpp"
+#include "daemon/core/set/names.hpp"
+#include "daemon/core/set/problems.hpp"
 
 namespace previz::rig {
 namespace {
@@ -50,7 +50,8 @@ Controls::Controls(const set::Set& set, pipeline::Edits edits, const scene::Scen
       has_tags_(std::ranges::find(scene.instances, scene::TagPart::printed,
                                   &scene::Instance::tag) != scene.instances.end()),
       hides_tags_(set.hides_tags),
-      has_environment_(set.lighting.environment.has_value()) {
+      has_environment_(set.lighting.environment.has_value()),
+      look_(live::first_look(set)) {
   for (const set::Object& object : set.objects)
     if (object.presence == set::Presence::virtual_object) objects_.push_back(object.name);
   for (const scene::Variants& variants : scene.variants) {
@@ -62,12 +63,6 @@ Controls::Controls(const set::Set& set, pipeline::Edits edits, const scene::Scen
   for (const set::Light& light : set.lights) set_lights_.push_back(light.name);
   for (const set::CapturedLamp& lamp : set.captured_lamps) set_lights_.push_back(lamp.name);
   look_.edits = std::move(edits);
-  look_.samples = set.quality.samples;
-  look_.governed = set.quality.fps > 0;
-  look_.accumulates = set.quality.accumulate;
-  look_.estimator = set.estimation.estimator;
-  look_.light_mode = set.lighting.mode;
-  look_.osd = set.display.osd;
 }
 
 std::string Controls::selected_object() const {
@@ -141,14 +136,14 @@ pipeline::LightEdit& Controls::light_edit() {
 
 Outcome Controls::perform(const set::Action& action, bool ended_refinement) {
   if (ended_refinement && std::holds_alternative<set::Snapshot>(action.effect))
-    return snapshot(&Look::refined_snapshots);
+    return snapshot(&live::Look::refined_snapshots);
   if (ended_refinement) aim_.reset();  // it is of the picture before the refinement
   return std::visit([this](const auto& effect) { return apply(effect); }, action.effect);
 }
 
 bool Controls::pushed() {
-  const Mode before = look_.state.mode;
-  change(Event::press);
+  const live::Mode before = look_.state.mode;
+  change(live::Event::press);
   return look_.state.mode != before;
 }
 
@@ -156,22 +151,25 @@ bool Controls::is_mode(const set::Action& action) {
   return std::holds_alternative<set::ToMode>(action.effect);
 }
 
-Outcome Controls::happened(Event event) {
+Outcome Controls::happened(live::Event event) {
   return change(event);
 }
 
-Outcome Controls::change(Event event) {
-  const State before = look_.state;
-  const bool asks_for_review = event == Event::wish_review || event == Event::toggle_review;
-  if (asks_for_review && before.mode != Mode::review && !before.recording)
+Outcome Controls::change(live::Event event) {
+  const live::State before = look_.state;
+  const bool asks_for_review =
+      event == live::Event::wish_review || event == live::Event::toggle_review;
+  if (asks_for_review && before.mode != live::Mode::review && !before.recording)
     if (auto refused = no_review()) return *refused;
-  const Step taken = step(before, event);
+  const live::Step taken = live::step(before, event);
   if (taken.refused) return {taken.refused, true, {}};
   look_.state = taken.state;
   // A refinement is of the picture that was shown before.
-  if (taken.state.mode != Mode::refine) look_.of_take = taken.state.mode == Mode::review;
-  if (event == Event::take_finished) look_.take_edits = {};
-  if (taken.state.mode == Mode::refine && before.mode != Mode::refine) ++look_.refinements;
+  if (taken.state.mode != live::Mode::refine)
+    look_.of_take = taken.state.mode == live::Mode::review;
+  if (event == live::Event::take_finished) look_.take_edits = {};
+  if (taken.state.mode == live::Mode::refine && before.mode != live::Mode::refine)
+    ++look_.refinements;
   Outcome outcome;
   if (taken.state.recording != before.recording) {
     outcome.request = taken.state.recording ? Request::start_take : Request::stop_take;
@@ -189,7 +187,7 @@ std::optional<Outcome> Controls::no_review() const {
         fmt::format("{} is still being written: {:.1f} s", take_.name, take_.behind_s), true, {}};
   if (look_.state.has_take && !take_.is_of_this_set)
     return Outcome{take_.name +
-                       " was recorded with another text of the set; previzd render shows "
+                       " was recorded with another text of the set; previz render shows "
                        "it as it was, or restore that text",
                    true,
                    {}};
@@ -198,20 +196,20 @@ std::optional<Outcome> Controls::no_review() const {
 
 Outcome Controls::apply(const set::ToMode& effect) {
   switch (effect.mode) {
-    case Mode::standby:
-      return change(Event::toggle_standby);
-    case Mode::live:
-      return change(Event::wish_live);
-    case Mode::refine:
-      return change(Event::toggle_refine);
-    case Mode::review:
-      return change(Event::toggle_review);
+    case live::Mode::standby:
+      return change(live::Event::toggle_standby);
+    case live::Mode::live:
+      return change(live::Event::wish_live);
+    case live::Mode::refine:
+      return change(live::Event::toggle_refine);
+    case live::Mode::review:
+      return change(live::Event::toggle_review);
   }
   return {};
 }
 
 Outcome Controls::apply(const set::Record&) {
-  return change(Event::record_toggle);
+  return change(live::Event::record_toggle);
 }
 
 Outcome Controls::apply(const set::MarkGood&) {
@@ -228,11 +226,12 @@ Outcome Controls::apply(const set::Acknowledge&) {
 }
 
 Outcome Controls::apply(const set::Snapshot&) {
-  return snapshot(look_.state.mode == Mode::refine ? &Look::refined_snapshots : &Look::snapshots);
+  return snapshot(look_.state.mode == live::Mode::refine ? &live::Look::refined_snapshots
+                                                         : &live::Look::snapshots);
 }
 
-Outcome Controls::snapshot(std::uint64_t Look::*of) {
-  if (look_.state.mode == Mode::standby)
+Outcome Controls::snapshot(std::uint64_t live::Look::*of) {
+  if (look_.state.mode == live::Mode::standby)
     return {"standby shows no picture; nothing to save", true, {}};
   if (!look_.state.has_good)
     return {"no frame with a pose and light yet; nothing to save", true, {}};
@@ -298,7 +297,7 @@ Outcome Controls::apply(const set::NextLightMode&) {
 
 Outcome Controls::apply(const set::TurnEnvironment& effect) {
   if (!has_environment_) return {"no environment file lights this set; nothing to turn", true, {}};
-  if (look_.state.mode != Mode::live) return only_live();
+  if (look_.state.mode != live::Mode::live) return only_live();
   double& turn = look_.edits.environment_turn_rad;
   turn = std::remainder(turn + effect.steps * control_.turn_step_rad, 2 * std::numbers::pi);
   return {fmt::format("environment turned by {:+.0f} degrees", glm::degrees(turn)), false, {}};
@@ -328,17 +327,17 @@ Outcome Controls::apply(const set::ToggleGuides&) {
 }
 
 Outcome Controls::apply(const set::ToggleMarking&) {
-  Marking& marking = look_.marking;
-  if (!marking.is_on && look_.state.mode != Mode::live) return only_live();
+  live::Marking& marking = look_.marking;
+  if (!marking.is_on && look_.state.mode != live::Mode::live) return only_live();
   marking.is_on = !marking.is_on;
   return {marking.is_on ? "aim the cross at " + marking.selected() : "marking off", false, {}};
 }
 
 // The first press shows the cross, which has to be aimed first.
 Outcome Controls::apply(const set::MarkCorner&) {
-  Marking& marking = look_.marking;
+  live::Marking& marking = look_.marking;
   if (!marking.is_on) return apply(set::ToggleMarking{});
-  if (look_.state.mode != Mode::live) return only_live();
+  if (look_.state.mode != live::Mode::live) return only_live();
   if (!look_.state.recording)
     return {"marks are kept in a take; start one with record, then mark", true, {}};
   if (!aim_) return {"not marked: the picture was not live; aim and mark again", true, {}};
@@ -350,19 +349,19 @@ Outcome Controls::apply(const set::MarkCorner&) {
   }
   marking.take = take_.name;
   Outcome outcome{"", false, {}, marking.mark(*aim_)};
-  outcome.said = before + outcome.mark->point + ": " + Marking::words_of(*marking.last());
+  outcome.said = before + outcome.mark->point + ": " + live::Marking::words_of(*marking.last());
   if (const std::string box = marking.words_of_box(); !box.empty()) outcome.said += "; " + box;
   return outcome;
 }
 
 Outcome Controls::apply(const set::Unmark&) {
-  Marking& marking = look_.marking;
+  live::Marking& marking = look_.marking;
   if (marking.last() && (!look_.state.recording || marking.take != take_.name))
     return {"the take with these marks has ended", true, {}};
   std::optional<session::MarkEvent> withdrawn = marking.withdraw();
   if (!withdrawn) return {"no corner is marked", true, {}};
   const std::string said =
-      withdrawn->point + ": mark withdrawn, " + Marking::words_of(marking.selected_corner());
+      withdrawn->point + ": mark withdrawn, " + live::Marking::words_of(marking.selected_corner());
   return {said, false, {}, std::move(withdrawn)};
 }
 
@@ -455,7 +454,7 @@ Outcome Controls::apply(const set::ResetObject&) {
 
 Outcome Controls::apply(const set::ToggleTags&) {
   if (!has_tags_)
-    return {"no phantom of this set has printed tags; previzd model makes one", true, {}};
+    return {"no phantom of this set has printed tags; previz model makes one", true, {}};
   const bool without = look_.of_take && recorded_.hides_tags ? *recorded_.hides_tags : hides_tags_;
   std::optional<bool>& hides = edits().hides_tags;
   const bool wanted = !hides.value_or(without);

@@ -8,40 +8,15 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/pipeline/edits.hpp"
-#include "daemon/pipeline/relight.hpp"
-#include "daemon/render/views.hpp"
-#include "daemon/rig/marking.hpp"
-#include "daemon/rig/mode.hpp"
-#include "daemon/scene/scene.hpp"
-#include "daemon/set/actions.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/core/live/look.hpp"
+#include "daemon/core/pipeline/edits.hpp"
+#include "daemon/core/pipeline/relight.hpp"
+#include "daemon/core/render/picture/views.hpp"
+#include "daemon/core/scene/scene.hpp"
+#include "daemon/core/set/actions.hpp"
+#include "daemon/core/set/set.hpp"
 
 namespace previz::rig {
-
-// Settings of the pipeline for the next frame. A Look is published as a whole and never changed.
-struct Look {
-  State state;
-  int samples = 16;
-  bool governed = false;     // quality.fps decides the samples until somebody asks for a number
-  bool accumulates = false;  // averages over frames, live and in review
-  set::Estimator estimator = set::Estimator::paired;
-  set::LightMode light_mode = set::LightMode::image;
-  render::View view = render::View::composite;
-  bool osd = true;
-  bool pass_times = false;     // on the overlay, while that is shown
-  bool guides = false;         // lines over the picture, with or without the overlay
-  pipeline::Edits edits;       // of the live picture
-  pipeline::Edits take_edits;  // of the take in review, on top of what was recorded with it
-  bool of_take = false;        // the picture is a take's: what is changed now are take_edits
-  std::uint64_t plays = 0;     // restarts of the animations so far
-  bool animations_held = false;
-  int exposure_steps = 0;               // requested so far, up minus down
-  std::uint64_t snapshots = 0;          // requested so far, of live pictures
-  std::uint64_t refined_snapshots = 0;  // requested so far, of refined pictures
-  std::uint64_t refinements = 0;        // begun so far
-  Marking marking;
-};
 
 // Requests that Controls cannot carry out, because they need devices or files.
 enum class Request {
@@ -80,7 +55,7 @@ class Controls {
   explicit Controls(const set::Set& set, pipeline::Edits edits = {},
                     const scene::Scene& scene = {});
 
-  const Look& look() const { return look_; }
+  const live::Look& look() const { return look_; }
   // Both return a name such as "vase", or nothing if the set has none.
   std::string selected_object() const;
   std::string selected_light() const;
@@ -93,7 +68,7 @@ class Controls {
   void use_recorded(pipeline::RecordedLook recorded) { recorded_ = std::move(recorded); }
 
   // Takes what the cross of the shown picture is on; nothing: no picture was shown yet.
-  void use_aim(const std::optional<Aim>& aim) { aim_ = aim; }
+  void use_aim(const std::optional<live::Aim>& aim) { aim_ = aim; }
 
   void use_take(LastTake take) { take_ = std::move(take); }
 
@@ -114,11 +89,11 @@ class Controls {
   bool pushed();
   static bool is_mode(const set::Action& action);
 
-  Outcome happened(Event event);
+  Outcome happened(live::Event event);
 
  private:
-  Outcome change(Event event);
-  Outcome snapshot(std::uint64_t Look::*of);
+  Outcome change(live::Event event);
+  Outcome snapshot(std::uint64_t live::Look::*of);
   Outcome apply(const set::ToMode& effect);
   Outcome apply(const set::Record& effect);
   Outcome apply(const set::MarkGood& effect);
@@ -179,7 +154,7 @@ class Controls {
   std::vector<std::string> objects_;  // names of the virtual objects
   std::map<std::string, Looks> looks_;
   pipeline::RecordedLook recorded_;
-  std::optional<Aim> aim_;
+  std::optional<live::Aim> aim_;
   LastTake take_;
   std::vector<std::string> set_lights_;
   std::vector<pipeline::FoundLamp> found_;
@@ -191,7 +166,7 @@ class Controls {
   // The selected lamp, which stays so while it is not found in the light; empty: the first there
   // is.
   std::string light_;
-  Look look_;
+  live::Look look_;
 };
 
 }  // namespace previz::rig

@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "daemon/fit/light_edge.hpp"
-#include "daemon/tracking/camera_pose.hpp"
+#include "daemon/core/fit/light_edge.hpp"
+#include "daemon/core/tracking/camera_pose.hpp"
 
 namespace previz::rig {
 

@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/fit/visible_edges.hpp"
-#include "daemon/output/guide_page.hpp"
+#include "daemon/core/fit/visible_edges.hpp"
+#include "daemon/core/output/guide_page.hpp"
 #include "drivers/calibration.hpp"
 
 namespace previz::rig {

@@ -13,7 +13,7 @@
 #include <numbers>
 #include <utility>
 
-#include "daemon/fit/visible_edges.hpp"
+#include "daemon/core/fit/visible_edges.hpp"
 #include "daemon/rig/guide_drawing.hpp"
 
 namespace previz::rig {

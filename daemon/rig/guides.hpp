@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "daemon/fit/real_model.hpp"
-#include "daemon/output/guide_page.hpp"
-#include "daemon/scene/scene.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/core/fit/real_model.hpp"
+#include "daemon/core/output/guide_page.hpp"
+#include "daemon/core/scene/scene.hpp"
+#include "daemon/core/session/session.hpp"
+#include "daemon/core/set/set.hpp"
 #include "drivers/calibration.hpp"
-#include "drivers/session/session.hpp"
 
 namespace previz::rig {
 

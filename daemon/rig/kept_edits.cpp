@@ -7,7 +7,7 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "daemon/set/file_edit.hpp"
+#include "daemon/core/set/file_edit.hpp"
 #include "drivers/keys/value.hpp"
 
 namespace previz::rig {

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "daemon/pipeline/edits.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/core/pipeline/edits.hpp"
+#include "daemon/core/set/set.hpp"
 
 namespace previz::rig {
 

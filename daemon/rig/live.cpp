@@ -10,17 +10,17 @@
 #include <variant>
 
 #include "daemon/control/inhibitor.hpp"
+#include "daemon/core/live/graphics.hpp"
+#include "daemon/core/set/actions.hpp"
+#include "daemon/core/set/check.hpp"
+#include "daemon/core/set/names.hpp"
 #include "daemon/rig/bus_link.hpp"
 #include "daemon/rig/event_loop.hpp"
-#include "daemon/rig/graphics.hpp"
 #include "daemon/rig/live_files.hpp"
 #include "daemon/rig/rig.hpp"
 #include "daemon/rig/screen.hpp"
 #include "daemon/rig/service.hpp"
 #include "daemon/rig/set_keeper.hpp"
-#include "daemon/set/actions.hpp"
-#include "daemon/set/check.hpp"
-#include "daemon/set/names.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::rig {
@@ -58,7 +58,7 @@ class CrewScreen {
 
 control::Status status_of(const Rig& rig, const SetKeeper& sets, const render::Device& device,
                           const report::Reports& reports) {
-  const Look& look = rig.controls().look();
+  const live::Look& look = rig.controls().look();
   const output::RecorderStatus recorder = rig.recorder_status();
   const std::optional<fit::Figure> fit = rig.model_fit();
   return {set::name_of(look.state.mode),
@@ -109,12 +109,12 @@ control::Verbs verbs_of(Rig& rig, const SetKeeper& sets, const render::Device& d
       reply(answer(outcome));
     });
   };
-  verbs.go = [&rig, answer, over_bus](Mode mode, const std::string& who) {
-    return answer(rig.wish(wish_for(mode), over_bus(who)));
+  verbs.go = [&rig, answer, over_bus](live::Mode mode, const std::string& who) {
+    return answer(rig.wish(live::wish_for(mode), over_bus(who)));
   };
   verbs.record = [&rig, answer, ends_a_take, not_here, over_bus](bool on, const std::string& who) {
     if (ends_a_take(on)) return not_here();
-    return answer(rig.wish(on ? Event::record_on : Event::record_off, over_bus(who)));
+    return answer(rig.wish(on ? live::Event::record_on : live::Event::record_off, over_bus(who)));
   };
   verbs.denied = [&reports, over_bus](const std::string& who, const std::string& verb) {
     reports(report::once({report::Severity::warning, over_bus(who), verb + " (not allowed)"}));
@@ -138,7 +138,7 @@ control::Verbs loading_verbs(control::Status last) {
   control::Verbs verbs;
   verbs.perform = [refusal](const set::Action&, const std::string&,
                             const control::Verbs::Reply& reply) { reply(refusal()); };
-  verbs.go = [refusal](Mode, const std::string&) { return refusal(); };
+  verbs.go = [refusal](live::Mode, const std::string&) { return refusal(); };
   verbs.record = [refusal](bool, const std::string&) { return refusal(); };
   verbs.status = [last, age_s]() mutable {
     last.loading_s = age_s();
@@ -191,7 +191,7 @@ class LiveRun {
         sets_(
             options.set_file, [this](set::Set& set) { override_set(set, options_); }, reports,
             options.with),
-        device_(open_graphics(
+        device_(live::open_graphics(
             render::options_for(options.device, sets_.running().set.quality.hardware_rays),
             sets_.running().set.quality.cpu_instead, reports)),
         screen_(kept_, options.on_screen) {}
@@ -224,7 +224,7 @@ class LiveRun {
     const set::Set& set = sets_.running().set;
     EventLoop loop([this](const std::exception& error) { loop_failed(error); });
     std::optional<LiveFiles> files;
-    const auto show = [&](pipeline::Shot shot, const Look& look, GuidesOf guides) {
+    const auto show = [&](pipeline::Shot shot, const live::Look& look, GuidesOf guides) {
       if (options_.on_shown) options_.on_shown(shot, look);
       screen_->show(shot, std::move(guides));
       if (shot.picture) files->take(std::move(shot.picture));
@@ -298,7 +298,7 @@ class LiveRun {
   void say_live(const set::Set& set) {
     const bool holds_rate = set.quality.fps > 0;
     reports_({report::Severity::info, "",
-              "live on " + device_words(*device_) + ", set \"" + set.name + "\", " +
+              "live on " + live::device_words(*device_) + ", set \"" + set.name + "\", " +
                   (holds_rate ? "at most " : "") +
                   set::plural(std::uint64_t(set.quality.samples), "sample") + " per frame" +
                   (holds_rate ? ", fewer where the rate would suffer (quality.fps)" : "")});

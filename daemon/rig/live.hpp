@@ -9,15 +9,15 @@
 #include <stop_token>
 #include <vector>
 
-#include "daemon/output/osd_page.hpp"
-#include "daemon/pipeline/liveness.hpp"
-#include "daemon/pipeline/metrics.hpp"
-#include "daemon/pipeline/shot.hpp"
-#include "daemon/render/renderer.hpp"
-#include "daemon/report/reports.hpp"
-#include "daemon/rig/cameras.hpp"
+#include "daemon/core/live/cameras.hpp"
+#include "daemon/core/output/osd_page.hpp"
+#include "daemon/core/pipeline/liveness.hpp"
+#include "daemon/core/pipeline/metrics.hpp"
+#include "daemon/core/pipeline/shot.hpp"
+#include "daemon/core/render/renderer.hpp"
+#include "daemon/core/report/reports.hpp"
+#include "daemon/core/set/load.hpp"
 #include "daemon/rig/controls.hpp"
-#include "daemon/set/load.hpp"
 #include "drivers/buttons.hpp"
 
 namespace previz::rig {
@@ -42,11 +42,11 @@ struct LiveOptions {
   // Opens devices besides those the set names, for tests.
   std::function<std::vector<std::unique_ptr<Buttons>>()> buttons;
   // Called with a set's cameras before they are used, for tests, which may put others around them.
-  std::function<void(Cameras&)> around_cameras;
+  std::function<void(live::Cameras&)> around_cameras;
   // As StageKeeper's, for tests.
   std::function<void(const std::string&)> rehearse;
   // Called with every picture as it goes to the display, on the pipeline's last thread.
-  std::function<void(const pipeline::Shot&, const Look&)> on_shown;
+  std::function<void(const pipeline::Shot&, const live::Look&)> on_shown;
   // Called with every screenful as it is read back, and the overlay's words, on the display's
   // thread.
   std::function<void(const Plate&, const output::OsdPage&)> on_screen;

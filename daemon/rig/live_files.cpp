@@ -3,9 +3,9 @@
 #include <chrono>
 #include <cstdlib>
 
-#include "daemon/output/png.hpp"
+#include "daemon/core/output/png.hpp"
+#include "daemon/core/session/draft.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/draft.hpp"
 
 namespace previz::rig {
 

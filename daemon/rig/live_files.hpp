@@ -10,8 +10,8 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/pipeline/channel.hpp"
-#include "daemon/report/reports.hpp"
+#include "daemon/core/pipeline/channel.hpp"
+#include "daemon/core/report/reports.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
 

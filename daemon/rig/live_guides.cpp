@@ -22,12 +22,13 @@ struct UnderLines {
   std::optional<GuideModel::View> view;  // absent: nobody knows where the camera was
 };
 
-std::shared_ptr<const output::GuidePage> lines_over(const UnderLines& picture, const Look& look) {
+std::shared_ptr<const output::GuidePage> lines_over(const UnderLines& picture,
+                                                    const live::Look& look) {
   std::optional<output::GuidePage> page;
   const auto model = *picture.model->get();
   if (look.guides && model && picture.view) page = model->guides_of(*picture.view);
   const bool is_whole = !look.guides || model;
-  if (look.marking.is_on && look.state.mode == Mode::live) {
+  if (look.marking.is_on && look.state.mode == live::Mode::live) {
     const output::GuidePage marks =
         marking_lines(look.marking, picture.lens,
                       picture.view ? std::optional(picture.view->world_from_camera) : std::nullopt);
@@ -63,7 +64,8 @@ GuidesOf LiveGuides::look_at(const Shot& shot) {
   UnderLines picture{.model = model_, .lens = camera_.intrinsics, .view = {}};
   if (const glm::dmat4* pose = world_from_camera(shot))
     picture.view = GuideModel::View{*pose, shot.scene, shot.motion.carriers};
-  return [picture = std::move(picture)](const Look& look) { return lines_over(picture, look); };
+  return
+      [picture = std::move(picture)](const live::Look& look) { return lines_over(picture, look); };
 }
 
 void LiveGuides::run() {

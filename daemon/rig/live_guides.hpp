@@ -8,11 +8,11 @@
 #include <optional>
 #include <thread>
 
-#include "daemon/fit/figure.hpp"
-#include "daemon/output/guide_page.hpp"
-#include "daemon/pipeline/channel.hpp"
-#include "daemon/pipeline/shot.hpp"
-#include "daemon/pipeline/stage_keeper.hpp"
+#include "daemon/core/fit/figure.hpp"
+#include "daemon/core/output/guide_page.hpp"
+#include "daemon/core/pipeline/channel.hpp"
+#include "daemon/core/pipeline/shot.hpp"
+#include "daemon/core/pipeline/stage_keeper.hpp"
 #include "daemon/rig/controls.hpp"
 #include "daemon/rig/guides.hpp"
 
@@ -21,7 +21,7 @@ namespace previz::rig {
 // Computes the lines over one picture that a look asks for, on the thread that shows it; null:
 // there are none, or not yet. It may be called as long as there is a picture, also after LiveGuides
 // has gone.
-using GuidesOf = std::function<std::shared_ptr<const output::GuidePage>(const Look&)>;
+using GuidesOf = std::function<std::shared_ptr<const output::GuidePage>(const live::Look&)>;
 
 // Nothing is measured or kept while Look::guides is false, but for the model that was made before.
 class LiveGuides {
@@ -29,7 +29,7 @@ class LiveGuides {
   struct Parts {  // outlive the guides
     const set::Set& set;
     const scene::Scene& scene;
-    const pipeline::Newest<Look>& look;
+    const pipeline::Newest<live::Look>& look;
     pipeline::StageKeeper::Parts kept;
   };
 

@@ -37,7 +37,7 @@ void add_corner(output::GuidePage& page, const output::GuideWord& corner) {
 
 }  // namespace
 
-output::GuidePage marking_lines(const Marking& marking, const PinholeIntrinsics& lens,
+output::GuidePage marking_lines(const live::Marking& marking, const PinholeIntrinsics& lens,
                                 const std::optional<glm::dmat4>& world_from_camera) {
   output::GuidePage page{lens.width, lens.height, {}, {}};
   if (world_from_camera) {

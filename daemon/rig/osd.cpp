@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "daemon/set/names.hpp"
-#include "daemon/set/problems.hpp"
+#include "daemon/core/set/names.hpp"
+#include "daemon/core/set/problems.hpp"
 
 namespace previz::rig {
 namespace {
@@ -31,15 +31,15 @@ std::string clock(double seconds) {
   return fmt::format("{:02}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
 }
 
-OsdText mode(const Look& look) {
+OsdText mode(const live::Look& look) {
   switch (look.state.mode) {
-    case Mode::live:
+    case live::Mode::live:
       return {"LIVE", OsdTone::plain};
-    case Mode::refine:
+    case live::Mode::refine:
       return {"REFINE", OsdTone::mode};
-    case Mode::review:
+    case live::Mode::review:
       return {"REVIEW", OsdTone::mode};
-    case Mode::standby:
+    case live::Mode::standby:
       return {"STANDBY", OsdTone::mode};
   }
   return {};
@@ -65,10 +65,10 @@ OsdText space(std::uint64_t bytes) {
                                  : OsdTone::plain};
 }
 
-std::string samples(const PictureFacts& picture, const Look& look) {
+std::string samples(const PictureFacts& picture, const live::Look& look) {
   if (picture.samples == 0) return "plate only";
   std::string text = counted(picture.samples, "sample");
-  if (look.state.mode == Mode::refine && picture.error > 0)
+  if (look.state.mode == live::Mode::refine && picture.error > 0)
     text += fmt::format(" · error {:.2g} %", 100 * picture.error);
   if (picture.history > 0) text += " + " + counted(picture.history, "frame");
   if (picture.width > 0) text += fmt::format(" · {}x{}", picture.width, picture.height);
@@ -141,12 +141,12 @@ std::string milliseconds(double ms) {
   return fmt::format("{:.{}f} ms", ms, ms < 9.995 ? 2 : 1);
 }
 
-std::vector<OsdText> lines_of(const PassTimes& times) {
-  const std::vector<PassTimes::Pass>& passes = times.passes;
+std::vector<OsdText> lines_of(const live::PassTimes& times) {
+  const std::vector<live::PassTimes::Pass>& passes = times.passes;
   const char* const each = times.is_of_rounds ? "round" : "frame";
   double sum_ms = 0, others_ms = 0;
   std::vector<OsdText> longest;
-  for (const PassTimes::Pass& pass : passes) {
+  for (const live::PassTimes::Pass& pass : passes) {
     sum_ms += pass.ms;
     if (longest.size() < most_passes)
       longest.push_back({pass.name + ": " + milliseconds(pass.ms)});
@@ -211,7 +211,7 @@ std::string words_of(const fit::Figure& figure) {
 
 OsdPage osd_page(const RigFacts& rig, const PictureFacts* picture, const Pace& pace) {
   OsdPage page;
-  const Look& look = rig.look;
+  const live::Look& look = rig.look;
   page.top_left.push_back(mode(look));
   if (look.state.recording)
     page.top_left.push_back({"● " + clock(rig.recorded_s), OsdTone::recording});
@@ -222,7 +222,7 @@ OsdPage osd_page(const RigFacts& rig, const PictureFacts* picture, const Pace& p
   if (rig.free_bytes) page.top_right.push_back(space(*rig.free_bytes));
   if (picture) {
     page.bottom_left.push_back({samples(*picture, look)});
-    if (look.state.mode != Mode::refine && pace.fps > 0)
+    if (look.state.mode != live::Mode::refine && pace.fps > 0)
       page.bottom_left.push_back(
           {fmt::format("{:.1f} fps · {:.0f} ms", pace.fps, 1e3 * pace.latency_s)});
     page.bottom_right.push_back(tracking_words(*picture));

@@ -7,14 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "daemon/fit/figure.hpp"
-#include "daemon/output/osd_page.hpp"
-#include "daemon/output/record_queue.hpp"
-#include "daemon/pipeline/shot.hpp"
-#include "daemon/report/report.hpp"
+#include "daemon/core/fit/figure.hpp"
+#include "daemon/core/live/pass_meter.hpp"
+#include "daemon/core/output/osd_page.hpp"
+#include "daemon/core/output/record_queue.hpp"
+#include "daemon/core/pipeline/shot.hpp"
+#include "daemon/core/report/report.hpp"
+#include "daemon/core/session/session.hpp"
 #include "daemon/rig/controls.hpp"
-#include "daemon/rig/pass_meter.hpp"
-#include "drivers/session/session.hpp"
 
 namespace previz::rig {
 
@@ -41,7 +41,7 @@ struct Pace {
 
 // Facts about the rig apart from the picture.
 struct RigFacts {
-  Look look;
+  live::Look look;
   std::string take;          // name of the take that is being recorded
   double recorded_s = 0;     // its length so far
   session::Losses lost;      // since the take began
@@ -52,8 +52,9 @@ struct RigFacts {
   std::optional<std::uint64_t> free_bytes;  // for takes, without the reserve; none: not known
   std::vector<report::Notice> news;         // actions of buttons and of the rig, oldest first
   std::vector<report::Notice> troubles;     // troubles of devices
-  std::optional<PassTimes> pass_times;      // none: nothing was rendered since they were asked for
-  std::optional<fit::Figure> fit;           // of the model; none: the guides are off
+  std::optional<live::PassTimes>
+      pass_times;                  // none: nothing was rendered since they were asked for
+  std::optional<fit::Figure> fit;  // of the model; none: the guides are off
 };
 
 // Returns "model 0.3 px (90 % 0.8)", or what is wrong: that a thing of the model or all of it is

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/set/set.hpp"
+#include "daemon/core/set/set.hpp"
 #include "drivers/buttons.hpp"
 
 namespace previz::rig {

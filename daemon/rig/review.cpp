@@ -3,8 +3,8 @@
 #include <stop_token>
 #include <utility>
 
-#include "daemon/pipeline/take.hpp"
-#include "daemon/pipeline/take_shots.hpp"
+#include "daemon/core/pipeline/take.hpp"
+#include "daemon/core/pipeline/take_shots.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::rig {
@@ -36,7 +36,7 @@ void play(const std::stop_token& stop, const std::filesystem::path& directory, c
 }  // namespace
 
 Review::Review(std::filesystem::path take, const LoadedSet& set,
-               pipeline::Mailbox<pipeline::Shot>& out, Inbox& inbox, Reports& reports)
+               pipeline::Mailbox<pipeline::Shot>& out, live::Inbox& inbox, Reports& reports)
     : thread_([take = std::move(take), &set, &out, &inbox, &reports,
                this](const std::stop_token& stop) {
         try {
@@ -44,7 +44,7 @@ Review::Review(std::filesystem::path take, const LoadedSet& set,
         } catch (const std::exception& error) {
           if (!stop.stop_requested()) reports({Severity::error, "review", error.what()});
         }
-        if (!stop.stop_requested()) inbox.post(Event::review_ended);
+        if (!stop.stop_requested()) inbox.post(live::Event::review_ended);
         done_ = true;
       }) {}
 

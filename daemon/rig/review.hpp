@@ -6,10 +6,10 @@
 #include <filesystem>
 #include <thread>
 
-#include "daemon/pipeline/channel.hpp"
-#include "daemon/pipeline/shot.hpp"
-#include "daemon/report/reports.hpp"
-#include "daemon/rig/inbox.hpp"
+#include "daemon/core/live/inbox.hpp"
+#include "daemon/core/pipeline/channel.hpp"
+#include "daemon/core/pipeline/shot.hpp"
+#include "daemon/core/report/reports.hpp"
 #include "daemon/rig/set_keeper.hpp"
 
 namespace previz::rig {
@@ -20,7 +20,7 @@ class Review {
   // it was recorded with another set, it also reports why. `set` is the running one; it, `out` and
   // the other two outlive this.
   Review(std::filesystem::path take, const LoadedSet& set, pipeline::Mailbox<pipeline::Shot>& out,
-         Inbox& inbox, report::Reports& reports);
+         live::Inbox& inbox, report::Reports& reports);
 
   // Ends it soon, whatever it is at: a take is read as a whole before its first picture.
   void stop() { thread_.request_stop(); }

@@ -8,10 +8,10 @@
 #include <system_error>
 #include <utility>
 
-#include "daemon/pipeline/take.hpp"
-#include "daemon/scene/assets.hpp"
-#include "daemon/scene/lamp_strength.hpp"
-#include "daemon/set/names.hpp"
+#include "daemon/core/pipeline/take.hpp"
+#include "daemon/core/scene/assets.hpp"
+#include "daemon/core/scene/lamp_strength.hpp"
+#include "daemon/core/set/names.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::rig {
@@ -37,7 +37,7 @@ constexpr double longest_folder_silence_s = 2;
 // Whoever asks for a snapshot waits at most so long for the next picture; D-Bus itself waits 25 s.
 constexpr std::chrono::seconds snapshot_patience{20};
 
-output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& cameras,
+output::TakeTemplate take_template(const LoadedSet& loaded, const live::Cameras& cameras,
                                    Reports& reports) {
   const set::Set& set = loaded.set;
   output::TakeTemplate take;
@@ -62,7 +62,7 @@ output::TakeTemplate take_template(const LoadedSet& loaded, const Cameras& camer
   return take;
 }
 
-output::RecorderOptions recorder_options(const LoadedSet& loaded, const Cameras& cameras,
+output::RecorderOptions recorder_options(const LoadedSet& loaded, const live::Cameras& cameras,
                                          const pipeline::StageKeeper::Parts& kept,
                                          const KeptTake& last) {
   const set::Recording& recording = loaded.set.recording;
@@ -102,14 +102,15 @@ pipeline::Waiting waiting_for_folders(const output::Recorder& recorder) {
   return waiting;
 }
 
-Cameras open_cameras_of(const LoadedSet& loaded, const Rig::Parts& parts, const Usb& usb) {
-  Cameras cameras = open_cameras(loaded.set, parts.loop_cameras, usb);
+live::Cameras open_cameras_of(const LoadedSet& loaded, const Rig::Parts& parts,
+                              const live::Usb& usb) {
+  live::Cameras cameras = live::open_cameras(loaded.set, parts.loop_cameras, usb);
   if (parts.around_cameras) parts.around_cameras(cameras);
   return cameras;
 }
 
 // If the USB cannot be watched, cameras are still found, but only when the next attempt is due.
-Usb watch_usb(Reports& reports) {
+live::Usb watch_usb(Reports& reports) {
   try {
     return std::make_shared<const usb::Hotplug>();
   } catch (const Error& error) {
@@ -151,7 +152,7 @@ Rig::Rig(Parts parts)
   desk_.emplace(
       loaded_.set.buttons, open_button_devices(loaded_.set, cameras_, parts_.more_buttons),
       ButtonDesk::Parts{parts_.loop, parts_.kept.reports, parts_.kept.metrics}, asks_of_buttons());
-  if (!parts_.last_take.directory.empty()) controls_.happened(Event::take_finished);
+  if (!parts_.last_take.directory.empty()) controls_.happened(live::Event::take_finished);
   free_bytes_ = recorder_.free_bytes();
   look_at_folders();
   show_facts();
@@ -252,7 +253,7 @@ void Rig::know_take() {
 }
 
 int Rig::samples() const {
-  const Look& look = controls_.look();
+  const live::Look& look = controls_.look();
   const int governed = pipeline_.governed().samples;
   return look.governed && governed > 0 ? governed : look.samples;
 }
@@ -270,7 +271,7 @@ void Rig::perform(const set::Action& action, const std::string& by, Answered ans
     answered(outcome);
 }
 
-Outcome Rig::wish(Event event, const std::string& by) {
+Outcome Rig::wish(live::Event event, const std::string& by) {
   know_take();
   return apply(controls_.happened(event), by);
 }
@@ -310,7 +311,7 @@ void Rig::publish_look() {
 // Begins and ends the review as the mode says. One that is to end may take a moment to do so; the
 // next one waits for that.
 void Rig::look_at_review() {
-  const bool is_wanted = controls_.look().state.mode == Mode::review;
+  const bool is_wanted = controls_.look().state.mode == live::Mode::review;
   if (review_ && !is_wanted) review_->stop();
   if (review_ && review_->is_stopped() && review_->done()) review_.reset();
   if (review_) return;
@@ -327,7 +328,7 @@ std::optional<std::string> Rig::carry_out(Request request, const std::string& by
         recorder_.start();
         controls_.begin_marks();
       } catch (const std::bad_alloc& error) {
-        controls_.happened(Event::recorder_failed);
+        controls_.happened(live::Event::recorder_failed);
         return std::string("the take is not begun: ") + reason_of(error);
       }
       break;
@@ -384,7 +385,7 @@ void Rig::look_at_set() {
 }
 
 void Rig::take_snapshots() {
-  for (const Inbox::Snapshot& snapshot : inbox_.take_snapshots()) {
+  for (const live::Inbox::Snapshot& snapshot : inbox_.take_snapshots()) {
     apply({snapshot.said, false, {}}, "snapshot",
           snapshot.is_saved ? Severity::info : Severity::error);
     answer_snapshot({snapshot.said, !snapshot.is_saved, {}});
@@ -407,15 +408,15 @@ void Rig::answer_snapshot(const Outcome& outcome) {
 
 void Rig::take_inbox() {
   take_snapshots();
-  for (const Event event : inbox_.take()) {
-    const State before = controls_.look().state;
+  for (const live::Event event : inbox_.take()) {
+    const live::State before = controls_.look().state;
     const Outcome outcome = controls_.happened(event);
     if (controls_.look().state == before) continue;
-    if (event == Event::good_frame)
+    if (event == live::Event::good_frame)
       publish_look();
-    else if (event == Event::camera_lost)
+    else if (event == live::Event::camera_lost)
       apply({"camera lost", false, {}}, "rig", Severity::error);
-    else if (event == Event::camera_back)
+    else if (event == live::Event::camera_back)
       apply({"camera is back", false, {}}, "rig");
     else
       apply(outcome, "rig");
@@ -485,17 +486,17 @@ void Rig::look_at_folders() {
 
 void Rig::look_at_recorder() {
   const output::RecorderStatus status = recorder_.status();
-  const auto announce = [&](std::uint64_t& known, std::uint64_t now, Event event,
+  const auto announce = [&](std::uint64_t& known, std::uint64_t now, live::Event event,
                             const std::string& said, Severity severity) {
     if (now == known) return;
     known = now;
     // A take that is lost while the next one runs does not end that one.
-    if (event != Event::recorder_failed || !status.recording) controls_.happened(event);
+    if (event != live::Event::recorder_failed || !status.recording) controls_.happened(event);
     apply({said, false, {}}, "recorder", severity);
   };
-  announce(failures_, status.failures, Event::recorder_failed, "take ended, " + status.fault,
+  announce(failures_, status.failures, live::Event::recorder_failed, "take ended, " + status.fault,
            Severity::error);
-  announce(finished_takes_, status.finished_takes, Event::take_finished,
+  announce(finished_takes_, status.finished_takes, live::Event::take_finished,
            "take " + status.finished + " is finished", Severity::info);
   if (std::exchange(is_good_, status.good) != status.good && changed_) changed_();
   announce_salvaged(status.salvaged);
@@ -517,7 +518,8 @@ void Rig::announce_salvaged(const std::vector<std::string>& salvaged) {
 // A recording that nobody ended goes on in the next take, and the crew is told so until somebody
 // says that he has seen it.
 void Rig::resume(const std::string& take) {
-  if (!controls_.look().state.recording) apply(controls_.happened(Event::record_on), "recorder");
+  if (!controls_.look().state.recording)
+    apply(controls_.happened(live::Event::record_on), "recorder");
   const std::string what = take + " was cut off; recording continues in the next take";
   apply({what, false, {}}, "recorder", Severity::error);
   parts_.kept.reports.show(report::lasting(cut_off, what));
@@ -537,7 +539,7 @@ void Rig::show_picture(pipeline::Shot shot) {
              loaded_.scene, loaded_.set,
              loaded_.set.observer.exposure.value_or(shot.frame->exposure)))
       parts_.kept.reports(report::once({Severity::warning, "scene", what}));
-  if (!shot.frozen) aim_.set(aim_of(shot, lens_));
+  if (!shot.frozen) aim_.set(live::aim_of(shot, lens_));
   GuidesOf guides = guides_.look_at(shot);
   parts_.show(std::move(shot), *look_.get(), std::move(guides));
 }

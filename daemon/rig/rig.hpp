@@ -15,17 +15,17 @@
 #include <string>
 #include <vector>
 
-#include "daemon/output/recorder.hpp"
-#include "daemon/pipeline/channel.hpp"
-#include "daemon/pipeline/metrics.hpp"
-#include "daemon/report/reports.hpp"
+#include "daemon/core/live/cameras.hpp"
+#include "daemon/core/live/inbox.hpp"
+#include "daemon/core/live/live_pipeline.hpp"
+#include "daemon/core/output/recorder.hpp"
+#include "daemon/core/pipeline/channel.hpp"
+#include "daemon/core/pipeline/metrics.hpp"
+#include "daemon/core/report/reports.hpp"
 #include "daemon/rig/button_desk.hpp"
-#include "daemon/rig/cameras.hpp"
 #include "daemon/rig/controls.hpp"
 #include "daemon/rig/event_loop.hpp"
-#include "daemon/rig/inbox.hpp"
 #include "daemon/rig/live_guides.hpp"
-#include "daemon/rig/live_pipeline.hpp"
 #include "daemon/rig/osd.hpp"
 #include "daemon/rig/review.hpp"
 #include "daemon/rig/service.hpp"
@@ -51,11 +51,11 @@ class Rig {
     std::shared_ptr<render::Device> device;
     std::shared_ptr<render::Renderer>& renderer;  // as LivePipeline's
     // Shows a picture and the lines over it, on the pipeline's last thread.
-    std::function<void(pipeline::Shot, const Look&, GuidesOf)> show;
-    LiveRender::Wants wants;                                              // on the render thread
+    std::function<void(pipeline::Shot, const live::Look&, GuidesOf)> show;
+    live::LiveRender::Wants wants;                                        // on the render thread
     std::function<void(RigFacts)> show_facts;                             // facts for the overlay
     std::function<std::vector<std::unique_ptr<Buttons>>()> more_buttons;  // may be empty
-    std::function<void(Cameras&)> around_cameras;  // as LiveOptions'; may be empty
+    std::function<void(live::Cameras&)> around_cameras;  // as LiveOptions'; may be empty
     bool loop_cameras = false;
     KeptTake& last_take;  // of the rig before; run() leaves the last one in it
     std::stop_token stop;
@@ -74,7 +74,7 @@ class Rig {
 
   // Call both on the loop's thread. `by` names who asks, for the log and the take: "button red".
   Outcome perform(const set::Action& action, const std::string& by);
-  Outcome wish(Event event, const std::string& by);
+  Outcome wish(live::Event event, const std::string& by);
   // Does what perform() does; what became of a snapshot is answered once it is known, on the loop's
   // thread.
   using Answered = std::function<void(const Outcome&)>;
@@ -126,10 +126,10 @@ class Rig {
 
   Parts parts_;
   const LoadedSet& loaded_;
-  Cameras cameras_;
+  live::Cameras cameras_;
   Controls controls_;
-  pipeline::Newest<Look> look_;
-  Inbox inbox_;
+  pipeline::Newest<live::Look> look_;
+  live::Inbox inbox_;
   output::Recorder recorder_;
   pipeline::Metrics::Watch recorder_watch_, folders_watch_, inbox_watch_;
   std::optional<ButtonDesk> desk_;  // always there once the rig is made
@@ -154,11 +154,12 @@ class Rig {
   std::function<void()> changed_;
   std::optional<std::uint64_t> free_bytes_;
   const PinholeIntrinsics lens_;
-  pipeline::Newest<std::optional<Aim>> aim_{std::nullopt};  // of the picture that was shown last
+  pipeline::Newest<std::optional<live::Aim>> aim_{
+      std::nullopt};  // of the picture that was shown last
   // When each button went down: whether a press is short, long or double is known only later.
-  std::map<std::string, std::optional<Aim>> pressed_aims_;
+  std::map<std::string, std::optional<live::Aim>> pressed_aims_;
   LiveGuides guides_;
-  LivePipeline pipeline_;  // last: its threads use all of the above
+  live::LivePipeline pipeline_;  // last: its threads use all of the above
 };
 
 }  // namespace previz::rig

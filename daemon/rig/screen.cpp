@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/output/guide_painter.hpp"
-#include "daemon/output/osd_painter.hpp"
-#include "daemon/output/png.hpp"
-#include "daemon/pipeline/channel.hpp"
-#include "daemon/set/names.hpp"
+#include "daemon/core/output/guide_painter.hpp"
+#include "daemon/core/output/osd_painter.hpp"
+#include "daemon/core/output/png.hpp"
+#include "daemon/core/pipeline/channel.hpp"
+#include "daemon/core/set/names.hpp"
 #include "drivers/display_drivers.hpp"
 #include "drivers/display_lifeline.hpp"
 #include "drivers/error.hpp"
@@ -97,7 +97,7 @@ struct Screen::Impl {
   void run();
   void look_after(std::optional<Picture>& newest);
   void begin_anew();
-  bool renew_guides(bool fresh, const Look& look);
+  bool renew_guides(bool fresh, const live::Look& look);
   void put(const output::OsdPage& next, bool fresh);
   Screenful compose(const DisplayMode& mode, const output::OsdPage& next);
   void was_shown(const Shown& shown, bool fresh);
@@ -121,8 +121,8 @@ struct Screen::Impl {
   // What of a look says which lines are wanted.
   struct Asked {
     bool guides = false;
-    Marking marking;
-    Mode mode = Mode::standby;
+    live::Marking marking;
+    live::Mode mode = live::Mode::standby;
 
     bool any() const { return guides || marking.is_on; }
     friend bool operator==(const Asked&, const Asked&) = default;
@@ -171,7 +171,7 @@ void Screen::Impl::look_after(std::optional<Picture>& newest) {
   const std::shared_ptr<const RigFacts> facts = rig.get();
   const bool fresh = newest.has_value();
   if (fresh) picture = std::move(newest);
-  if (facts->look.state.mode == Mode::standby) {
+  if (facts->look.state.mode == live::Mode::standby) {
     if (fresh) parts.kept.metrics.dropped("screen", "standby");
     if (!std::exchange(dark, true)) {
       life.release();
@@ -189,7 +189,7 @@ void Screen::Impl::look_after(std::optional<Picture>& newest) {
 
 // Returns whether the screen has other lines to show. Those of a picture that stands may come late:
 // when they are asked for, or once the model is there.
-bool Screen::Impl::renew_guides(bool fresh, const Look& look) {
+bool Screen::Impl::renew_guides(bool fresh, const live::Look& look) {
   Asked asked{look.guides, look.marking, look.state.mode};
   const bool is_same = asked == asked_for;
   if (!fresh && is_same && (!asked.any() || (guides && guides->is_whole))) return false;

@@ -6,13 +6,13 @@
 #include <memory>
 #include <optional>
 
-#include "daemon/output/osd_page.hpp"
-#include "daemon/pipeline/metrics.hpp"
-#include "daemon/pipeline/shot.hpp"
-#include "daemon/pipeline/stage_keeper.hpp"
+#include "daemon/core/output/osd_page.hpp"
+#include "daemon/core/pipeline/metrics.hpp"
+#include "daemon/core/pipeline/shot.hpp"
+#include "daemon/core/pipeline/stage_keeper.hpp"
+#include "daemon/core/set/set.hpp"
 #include "daemon/rig/live_guides.hpp"
 #include "daemon/rig/osd.hpp"
-#include "daemon/set/set.hpp"
 #include "drivers/card_picture.hpp"
 
 namespace previz::rig {

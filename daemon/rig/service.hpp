@@ -7,8 +7,8 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/pipeline/liveness.hpp"
-#include "daemon/report/reports.hpp"
+#include "daemon/core/pipeline/liveness.hpp"
+#include "daemon/core/report/reports.hpp"
 
 namespace previz::rig {
 

@@ -3,14 +3,14 @@
 #include <algorithm>
 #include <vector>
 
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/session/draft.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/core/set/file_edit.hpp"
+#include "daemon/core/set/load.hpp"
 #include "daemon/rig/errand.hpp"
 #include "daemon/rig/kept_edits.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/set/file_edit.hpp"
-#include "daemon/set/load.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/draft.hpp"
-#include "drivers/session/files.hpp"
 
 namespace previz::rig {
 

@@ -11,11 +11,11 @@
 #include <string>
 #include <utility>
 
-#include "daemon/pipeline/edits.hpp"
-#include "daemon/report/reports.hpp"
-#include "daemon/scene/scene.hpp"
-#include "daemon/set/load.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/core/pipeline/edits.hpp"
+#include "daemon/core/report/reports.hpp"
+#include "daemon/core/scene/scene.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/set.hpp"
 
 namespace previz::rig {
 

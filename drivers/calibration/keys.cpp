@@ -91,13 +91,13 @@ Keys clip_keys(ResponseCurve& r, const char* about) {
 
 Keys shading_keys(LightCameraCalibration& c) {
   return {
-      {"intrinsics", "vignetting", &c.vignetting, plain.within(-1e6, 1e6), "v1 to v3 of the fraction of light that the lens passes, 1 + v1 t^2 + v2 t^4 + v3 t^6, where t is the angle off axis in radians (previzd calibrate vignetting).", {}, "vignetting", {}, true},
-      {"response", "dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal of red, green and blue when the lens is covered, as a fraction of white (previzd calibrate dark).", {}, "dark_level", {}, true},
+      {"intrinsics", "vignetting", &c.vignetting, plain.within(-1e6, 1e6), "v1 to v3 of the fraction of light that the lens passes, 1 + v1 t^2 + v2 t^4 + v3 t^6, where t is the angle off axis in radians (previz calibrate vignetting).", {}, "vignetting", {}, true},
+      {"response", "dark_level", &c.dark_level, plain.within(0, max_dark_level), "Signal of red, green and blue when the lens is covered, as a fraction of white (previz calibrate dark).", {}, "dark_level", {}, true},
   };
 }
 
-constexpr auto observer_clips = "A pixel at or above this fraction of the largest picture value is clipped: it means at least that much light. Lower it if white areas stay below it, as in compressed or limited-range video (previzd calibrate response --camera observer measures it).";
-constexpr auto light_camera_clips = "A pixel at or above this fraction of the largest picture value is clipped: it means at least that much light, and a shorter exposure of the bracket measures it. Lower it if lamps stay below it, as in compressed or limited-range video (previzd calibrate response --camera light measures it).";
+constexpr auto observer_clips = "A pixel at or above this fraction of the largest picture value is clipped: it means at least that much light. Lower it if white areas stay below it, as in compressed or limited-range video (previz calibrate response --camera observer measures it).";
+constexpr auto light_camera_clips = "A pixel at or above this fraction of the largest picture value is clipped: it means at least that much light, and a shorter exposure of the bracket measures it. Lower it if lamps stay below it, as in compressed or limited-range video (previz calibrate response --camera light measures it).";
 
 // clang-format on
 

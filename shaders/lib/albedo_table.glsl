@@ -1,4 +1,4 @@
-// The tables of directional albedo (daemon/render/albedo_table.hpp).
+// The tables of directional albedo (daemon/core/render/world/albedo_table.hpp).
 #ifndef PREVIZ_ALBEDO_TABLE_GLSL
 #define PREVIZ_ALBEDO_TABLE_GLSL
 

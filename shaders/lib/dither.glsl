@@ -5,7 +5,7 @@
 #include "shaders/lib/render_shared.h"
 #include "shaders/lib/response.glsl"
 
-// DITHER_SIDE^2 thresholds between 0 and 1, of blue noise (daemon/render/blue_noise.hpp).
+// DITHER_SIDE^2 thresholds between 0 and 1, of blue noise (daemon/core/render/picture/blue_noise.hpp).
 layout(scalar) readonly buffer Thresholds { float thresholds[]; };
 
 // Returns the code below or above `signal`, so that the mean over the pattern's pixels is the signal

@@ -1,6 +1,6 @@
 // The tree of lamps: the lamp of a light sample is found by descending from the root, each time into
 // a child by its importance, a bound on what its lamps bring to the receiver (shaders/README.md, "The
-// tree of lamps"; daemon/render/light_tree.cpp builds it).
+// tree of lamps"; daemon/core/render/world/light_tree.cpp builds it).
 #ifndef PREVIZ_LIGHT_TREE_GLSL
 #define PREVIZ_LIGHT_TREE_GLSL
 

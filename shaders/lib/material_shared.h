@@ -1,6 +1,6 @@
 // The renderer's features and the materials, which cross between C++ and the shaders, in scalar
 // layout. An extension of materials that is a layer has its bit, its textures and its factors here;
-// daemon/scene/material_extensions.cpp has all that only C++ knows of it.
+// daemon/core/scene/material_extensions.cpp has all that only C++ knows of it.
 #ifndef PREVIZ_MATERIAL_SHARED_H
 #define PREVIZ_MATERIAL_SHARED_H
 

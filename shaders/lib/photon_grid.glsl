@@ -37,7 +37,7 @@ ivec3 photon_cell(vec3 position, int level) {
   return ivec3(clamp(floor(position / cell_width(level)), vec3(-1e9), vec3(1e9)));
 }
 
-// Returns twice the number of photons, rounded up to a power of two; daemon/render/photon_map.cpp
+// Returns twice the number of photons, rounded up to a power of two; daemon/core/render/passes/photon_map.cpp
 // allocates as many buckets.
 uint photon_bucket_count() { return 2u << findMSB(2u * frame.photon_count - 1u); }
 

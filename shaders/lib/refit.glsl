@@ -1,5 +1,5 @@
 // The buffers of the passes that make a tree follow a mesh that deforms
-// (daemon/scene/bvh_refit.hpp).
+// (daemon/core/scene/bvh_refit.hpp).
 #ifndef PREVIZ_REFIT_GLSL
 #define PREVIZ_REFIT_GLSL
 

@@ -11,7 +11,7 @@
 namespace previz::gpu {
 #endif
 
-// A table of daemon/render/albedo_table.hpp has this many texels on each side.
+// A table of daemon/core/render/world/albedo_table.hpp has this many texels on each side.
 PREVIZ_CONST uint ALBEDO_SIDE = 32u;
 // The place of sheen's table among them, where any surface has sheen.
 PREVIZ_CONST uint ALBEDO_SHEEN = 1u;
@@ -237,7 +237,7 @@ struct GpuLight {
   float rest_cdf;         // the share of these up to and including this light
 };
 
-// A node of the tree of lamps (daemon/render/light_tree.hpp). The root is the first; the children of
+// A node of the tree of lamps (daemon/core/render/world/light_tree.hpp). The root is the first; the children of
 // a node are neighbours, the first at an even index.
 struct GpuLightNode {
   vec3 center;           // of a sphere around the lamps, from the tree's origin
@@ -314,7 +314,7 @@ struct GpuDenoise {
   uint has_caustics;    // 1: what photons bring is added after the filter
 };
 
-// Where an instance was in the frame before (daemon/render/history.hpp).
+// Where an instance was in the frame before (daemon/core/render/passes/history.hpp).
 struct GpuMotion {
   vec4 before_from_now[3];  // rows; from the camera-relative world of this frame to that one's
   uint is_known;            // 0: the instance has no history
@@ -375,7 +375,7 @@ struct GpuMorphWeight {
   float weight;
 };
 
-// Push constants of the pass that deforms a mesh (daemon/render/deformer.hpp). All firsts count
+// Push constants of the pass that deforms a mesh (daemon/core/render/world/deformer.hpp). All firsts count
 // elements of the buffers that hold those of all meshes.
 struct GpuDeform {
   uint vertices;

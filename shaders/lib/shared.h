@@ -35,7 +35,7 @@ PREVIZ_CONST uint DEVICE_LANES_MEET = 2u;
 PREVIZ_CONST uint DEVICE_READS_STORAGE = 4u;  // lib/fetch.glsl
 
 // The scene as lib/trace.glsl reads it is one buffer of texels of four words, made by
-// daemon/scene/bvh.hpp. It consists of records of four texels, one cache line, in blocks of eight;
+// daemon/core/scene/bvh.hpp. It consists of records of four texels, one cache line, in blocks of eight;
 // the children of a node are one block. Record 0 is the space in which a ray starts: that of the
 // top level, or of the only instance.
 //

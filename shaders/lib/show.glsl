@@ -1,5 +1,5 @@
 // The passes that make the shown picture share the rule of the composite (shaders/README.md, "The
-// composite"; daemon/render/composite.cpp has it in double precision).
+// composite"; daemon/core/render/picture/composite.cpp has it in double precision).
 #ifndef PREVIZ_SHOW_GLSL
 #define PREVIZ_SHOW_GLSL
 

@@ -1,5 +1,5 @@
 // Closest hits and shadow rays by ray queries (GL_EXT_ray_query), through the structures of
-// daemon/render/ray_structures.hpp. Internal to lib/trace.glsl and lib/alpha.glsl.
+// daemon/core/render/world/ray_structures.hpp. Internal to lib/trace.glsl and lib/alpha.glsl.
 //
 // Rays are tested as the hardware does it, so that a hit is that of lib/trace_tree.glsl but for
 // rounding. What the hardware has no rule for is decided here: which of two surfaces in one place is hit, and that

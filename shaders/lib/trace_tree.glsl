@@ -1,4 +1,4 @@
-// Closest hits and shadow rays through the two-level tree of daemon/scene/bvh.hpp, in compute.
+// Closest hits and shadow rays through the two-level tree of daemon/core/scene/bvh.hpp, in compute.
 //
 // The loop visits one record per turn, whatever its kind. On a CPU device, which gains nothing from
 // branches, all lanes of a subgroup test its eight boxes and its two triangles side by side; on a card

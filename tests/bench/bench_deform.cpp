@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "daemon/bench/shapes.hpp"
-#include "daemon/render/renderer.hpp"
+#include "daemon/core/render/renderer.hpp"
 #include "drivers/error.hpp"
 #include "tests/bench/frames_after_change.hpp"
 #include "tests/bench/program.hpp"

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/set/names.hpp"
+#include "daemon/core/set/names.hpp"
 #include "drivers/error.hpp"
 #include "tests/bench/equal_error/reference.hpp"
 #include "tests/bench/equal_error/time_to_error.hpp"

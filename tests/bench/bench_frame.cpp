@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "daemon/bench/shapes.hpp"
-#include "daemon/render/renderer.hpp"
+#include "daemon/core/render/renderer.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 #include "tests/bench/measure.hpp"

@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "daemon/fit/figure.hpp"
-#include "daemon/output/guide_painter.hpp"
-#include "daemon/output/png.hpp"
-#include "daemon/pipeline/take.hpp"
-#include "daemon/pipeline/track_stage.hpp"
+#include "daemon/core/fit/figure.hpp"
+#include "daemon/core/output/guide_painter.hpp"
+#include "daemon/core/output/png.hpp"
+#include "daemon/core/pipeline/take.hpp"
+#include "daemon/core/pipeline/track_stage.hpp"
+#include "daemon/core/scene/load.hpp"
 #include "daemon/rig/guides.hpp"
-#include "daemon/scene/load.hpp"
 #include "drivers/display_drivers.hpp"
 #include "tests/bench/measure.hpp"
 #include "tests/bench/program.hpp"

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "daemon/bench/shapes.hpp"
-#include "daemon/lighting/lighting.hpp"
-#include "daemon/render/gpu_environment.hpp"
+#include "daemon/core/lighting/lighting.hpp"
+#include "daemon/core/render/world/gpu_environment.hpp"
 #include "drivers/plate.hpp"
 #include "tests/bench/live_in_turns.hpp"
 #include "tests/bench/program.hpp"

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/render/renderer.hpp"
+#include "daemon/core/render/renderer.hpp"
 #include "drivers/plate.hpp"
 #include "tests/bench/equal_error/view.hpp"
 #include "tests/bench/measure.hpp"

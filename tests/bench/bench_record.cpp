@@ -11,10 +11,10 @@
 #include <string>
 #include <thread>
 
-#include "daemon/output/recorder.hpp"
+#include "daemon/core/output/recorder.hpp"
+#include "daemon/core/session/replay_camera.hpp"
+#include "daemon/core/session/session.hpp"
 #include "drivers/error.hpp"
-#include "drivers/replay/replay_camera.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/bench/camera_pictures.hpp"
 #include "tests/bench/measure.hpp"
 #include "tests/bench/program.hpp"

@@ -14,9 +14,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/tracking/apriltag_tracker.hpp"
-#include "daemon/tracking/photometry.hpp"
-#include "daemon/tracking/pose_starts.hpp"
+#include "daemon/core/tracking/apriltag_tracker.hpp"
+#include "daemon/core/tracking/photometry.hpp"
+#include "daemon/core/tracking/pose_starts.hpp"
 #include "drivers/error.hpp"
 #include "tests/bench/measure.hpp"
 #include "tests/bench/program.hpp"

@@ -5,9 +5,9 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
+#include "daemon/core/session/session.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
-#include "drivers/session/session.hpp"
 
 namespace previz::bench {
 namespace {

@@ -16,7 +16,7 @@ Assumptions:
     fails with the same probability.
   - The disk that all nodes share takes no time of its own, and no other job is on the farm.
   - The check runs after the last task, on one node: the scheduler's delay, its start-up, and a time for each frame.
-Wall time is the mean over trials, with the slowest of them beside it; speed-up is over one `previzd render` on one
+Wall time is the mean over trials, with the slowest of them beside it; speed-up is over one `previz render` on one
 computer without scheduler, stragglers and requeues; efficiency is speed-up by nodes. A row with more nodes than tasks
 leaves nodes idle.
 """

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/render/renderer.hpp"
+#include "daemon/core/render/renderer.hpp"
 #include "tests/bench/measure.hpp"
 
 namespace previz::bench {

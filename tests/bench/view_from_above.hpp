@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "daemon/render/renderer.hpp"
+#include "daemon/core/render/renderer.hpp"
 
 namespace previz::bench {
 

@@ -58,7 +58,7 @@ inside ctest --test-dir "$build" --parallel "$(($(nproc) + 1))" --output-on-fail
   --tests-regex "${names:-.}"
 [[ ${#targets[@]} -eq 0 ]] || exit 0
 
-inside "$build/daemon/previzd" render config/demo/session --set config/demo/demo.toml --out "$build/demo" \
+inside "$build/daemon/previz" render config/demo/session --set config/demo/demo.toml --out "$build/demo" \
   --frames 0 --spp 4 --no-video --force
 
 # Intel's and NVIDIA's drivers, on stubs of the kernel's: nothing is computed, but memory, compilers and
@@ -69,7 +69,7 @@ icd=/usr/share/vulkan/icd.d
 # on_stub NAME VARIABLE=VALUE...
 on_stub() {
   local log=$build/$1.log
-  inside env "${@:2}" timeout 300 "$build/daemon/previzd" render config/demo/session --set config/demo/demo.toml \
+  inside env "${@:2}" timeout 300 "$build/daemon/previz" render config/demo/session --set config/demo/demo.toml \
     --out "$build/$1" --frames 0 --spp 2 --scale 0.25 --neighbours 0 --no-video --force --validation >"$log" 2>&1 || {
     echo "debian13: the demo does not run on $1:" >&2
     cat "$log" >&2
@@ -89,7 +89,8 @@ inside env PREVIZ_HARDWARE_RAYS=1 MESA_SHADER_CACHE_DIR=build/debian13/shader_ca
   --gtest_filter='Alpha.*:Pane.*:Deform*:DirectLight.*:Caustic*:Composite.*:Mirror*:ColouredGlass.*'
 inside cmake --build "$build" --target deb
 # shellcheck disable=SC2016
-inside bash -ec 'apt-get install --yes --quiet --no-install-recommends "$1"/previzd_*.deb >/dev/null
+inside bash -ec 'apt-get install --yes --quiet --no-install-recommends "$1"/{previzd,previz-tools}_*.deb >/dev/null
   previzd check config/demo/demo.toml
-  apt-get purge --yes --quiet previzd >/dev/null' - "$PWD/$build"
+  previz takes list config/demo
+  apt-get purge --yes --quiet previzd previz-tools >/dev/null' - "$PWD/$build"
 echo "debian13: passed, in Debian $(<"$root/etc/debian_version")"

@@ -1,8 +1,8 @@
 // A take of half a second, looped, whose cable can be pulled.
 #include <chrono>
 
+#include "daemon/core/session/replay_camera.hpp"
 #include "drivers/faults.hpp"
-#include "drivers/replay/replay_camera.hpp"
 #include "tests/devices/devices.hpp"
 #include "tests/support/session_fixture.hpp"
 

@@ -7,7 +7,7 @@
 
 #include <csignal>
 
-#include "daemon/output/salvage.hpp"
+#include "daemon/core/output/salvage.hpp"
 #include "tests/durability/scarce_memory.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"

@@ -1,7 +1,7 @@
 // Sessions on disks that lose power and that fail: what was acknowledged is there, and nothing is
 // taken for whole that is not.
-#include "daemon/output/asset_store.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/output/asset_store.hpp"
+#include "daemon/core/session/files.hpp"
 #include "tests/durability/faulty_rounds.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/recorder_fixture.hpp"

@@ -2,11 +2,11 @@
 // has its own mishap.
 #include <iostream>
 
-#include "daemon/output/take_writer.hpp"
-#include "daemon/post/check.hpp"
+#include "daemon/core/check/check.hpp"
+#include "daemon/core/output/take_writer.hpp"
+#include "daemon/core/session/session.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/lifeline.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/durability/simulated_time.hpp"
 #include "tests/durability/simulated_time_camera.hpp"
 #include "tests/support/content_of.hpp"
@@ -85,7 +85,7 @@ class SimulatedDay : public testing::Test {
   // Runs the rig until the crew's script has ended.
   void run(const std::function<void()>& script) {
     LiveOptions options;
-    options.around_cameras = [this](Cameras& cameras) {
+    options.around_cameras = [this](live::Cameras& cameras) {
       cameras.observer = std::make_unique<Lifeline>("simulated", [this] { return device_.open(); });
       cameras.observer->start();
       cameras.clock_offset_ns = 0;
@@ -94,7 +94,7 @@ class SimulatedDay : public testing::Test {
         return event;
       });
     };
-    options.on_shown = [this](const pipeline::Shot& shot, const Look& look) {
+    options.on_shown = [this](const pipeline::Shot& shot, const live::Look& look) {
       look_at(shot, look);
     };
     metrics_ = test::run_crewed(std::move(options), directory_.path(), hand_, script, reports_);
@@ -163,7 +163,7 @@ class SimulatedDay : public testing::Test {
     return stamps == Stamps::own_clock || is_suspended_ ? arrival : earliest(stamps);
   }
 
-  void look_at(const pipeline::Shot& shot, const Look& look) {
+  void look_at(const pipeline::Shot& shot, const live::Look& look) {
     const std::int64_t arrived = shot.arrived.time_since_epoch().count();
     EXPECT_GT(shot.frame->timestamp_ns, shown_stamp_ns_);
     EXPECT_LE(time_.now_ns() - arrived, 20 * ms) << "something waits on the way to the display";
@@ -362,7 +362,7 @@ class SimulatedDay : public testing::Test {
     session::Session take = session::open_session(folder);
     EXPECT_TRUE(take.missing.empty());
     std::ostringstream said;
-    EXPECT_EQ(post::check_set({folder}, said), 0) << said.str();
+    EXPECT_EQ(check::check_set({folder}, said), 0) << said.str();
     const auto stream = session::open_stream(take, "observer");
     ASSERT_TRUE(stream && take.info.take);
     const Recorded& recorded = takes_[index];

@@ -2,10 +2,10 @@
 // waits, goes on where it was, and shows nobody half of anything meanwhile.
 #include <stop_token>
 
-#include "daemon/output/salvage.hpp"
-#include "daemon/output/take_list.hpp"
-#include "daemon/post/render_directory.hpp"
-#include "daemon/post/take_copy.hpp"
+#include "daemon/core/output/salvage.hpp"
+#include "daemon/core/output/take_list.hpp"
+#include "daemon/tools/post/render_directory.hpp"
+#include "daemon/tools/post/take_copy.hpp"
 #include "tests/durability/still_disk.hpp"
 #include "tests/support/cut_off_take.hpp"
 #include "tests/support/session_fixture.hpp"

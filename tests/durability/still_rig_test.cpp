@@ -81,9 +81,9 @@ TEST_F(RigLive, ADiskOfTakesThatStandsStillKeepsNoButtonWaiting) {
     for (int times = 0; times < 2; ++times) {
       const Shown now = shown_now();
       press("refine");
-      until_mode(Mode::refine);
+      until_mode(live::Mode::refine);
       press("live");
-      until_mode(Mode::live);
+      until_mode(live::Mode::live);
       until([&](const Shown& s) { return s.count > now.count + 2; });
     }
     disk.go_on();

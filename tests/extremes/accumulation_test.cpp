@@ -1,6 +1,6 @@
 // The real accumulate shader, fed with ten million samples from 1e-4 to 1e4: the means of the sums
 // are within 1e-6 of the exact ones.
-#include "daemon/render/kernel.hpp"
+#include "daemon/core/render/device/kernel.hpp"
 #include "shaders/accumulate.spv.h"
 #include "tests/support/pixels_by_hand.hpp"
 

@@ -1,8 +1,8 @@
 // Pixels at the ends of the sensor's codes, both ways; brackets that are clipped or black in every
 // exposure.
-#include "daemon/lighting/hdr.hpp"
-#include "daemon/lighting/lighting.hpp"
-#include "daemon/lighting/response.hpp"
+#include "daemon/core/lighting/hdr.hpp"
+#include "daemon/core/lighting/lighting.hpp"
+#include "daemon/core/lighting/response.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/pixels_by_hand.hpp"

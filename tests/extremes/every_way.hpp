@@ -2,7 +2,7 @@
 // picture that is shown, with and without its noise.
 #pragma once
 
-#include "daemon/lighting/response.hpp"
+#include "daemon/core/lighting/response.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {

@@ -1,5 +1,5 @@
 // Triangles that are hardly there, not there, or far too many: shaded or dropped, and counted.
-#include "daemon/scene/bvh.hpp"
+#include "daemon/core/scene/bvh.hpp"
 #include "tests/support/gltf_test.hpp"
 #include "tests/support/render_fixture.hpp"
 

@@ -1,8 +1,8 @@
 // Apertures from nothing to the widest, focus from a centimetre to infinity: continuous with the
 // pinhole, sharp where the focus is; what no lens can be is refused by the key's name.
-#include "daemon/set/load.hpp"
-#include "daemon/set/set.hpp"
-#include "drivers/session/session_toml.hpp"
+#include "daemon/core/session/session_toml.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/set.hpp"
 #include "tests/extremes/every_way.hpp"
 
 namespace previz::test::lens_test {

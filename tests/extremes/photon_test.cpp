@@ -1,6 +1,6 @@
 // Photons after a million passes, photons that never arrive, and radii of nothing.
-#include "daemon/render/device.hpp"
-#include "daemon/render/photon_schedule.hpp"
+#include "daemon/core/render/device/device.hpp"
+#include "daemon/core/render/passes/photon_schedule.hpp"
 #include "tests/extremes/every_way.hpp"
 
 namespace previz::test::photon_test {

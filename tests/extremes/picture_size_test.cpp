@@ -1,6 +1,6 @@
 // Pictures from one pixel to the largest there are: they work, or are refused before anything is
 // allocated.
-#include "daemon/render/picture_memory.hpp"
+#include "daemon/core/render/picture/picture_memory.hpp"
 
 #include "tests/support/render_fixture.hpp"
 

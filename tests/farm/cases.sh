@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The cases of run.sh, in the order in which they run. Each has a folder ($folder), a job folder ($job) and a folder for
 # pictures ($pictures) of its own, and a cluster of its own once it has called start_cluster.
-# shellcheck disable=SC2154  # run.sh sets here, out, previzd, folder, job, pictures, render and check
+# shellcheck disable=SC2154  # run.sh sets here, out, previz, folder, job, pictures, render and check
 
 # The demo take has six frames; at this size a task takes seconds to start and a tenth of one for a frame, and with many
 # samples a few seconds for a frame, so that it can be met in the middle.
@@ -67,8 +67,8 @@ case_network() {
   expect "a task on node1 is in the middle of its frames" await 120 has_begun 1 3
   node cut-node 1
   declare_lost 1
-  expect "the task runs on node3, too" await 30 node on-node 3 pgrep --exact previzd
-  expect "its first copy runs on" node on-node 1 pgrep --exact previzd
+  expect "the task runs on node3, too" await 30 node on-node 3 pgrep --exact previz
+  expect "its first copy runs on" node on-node 1 pgrep --exact previz
   await_end
   expect "the check passes" has_passed
   expect "the bits are those of one run" same_render "$out/reference/slower" "$pictures"
@@ -96,7 +96,7 @@ case_cancelled_job() {
   start_cluster
   submit "${slow[@]}" --chunk 2 --job "$job" --out "$pictures"
   expect "a task on node1 is in the middle of its frames" await 120 has_begun 1 2
-  timeout 30 "$previzd" farm cancel "$job"
+  timeout 30 "$previz" farm cancel "$job"
   expect "the render leaves the queue" await 30 has_left "$render"
   expect "the check leaves the queue" await 30 has_left "$check"
   expect "status says that nothing runs" job_says 'nothing runs'
@@ -113,7 +113,7 @@ case_cancelled_wait() {
   PREVIZ_FARM_WAIT_S=60 submit "$folder/demo/session" --set "$folder/demo/demo.toml" --scale 0.1 --spp 4 --chunk 2 \
     --job "$job" --out "$pictures"
   expect "status says why a task waits" await 60 job_says "waiting to be requeued: .*$folder/demo/session"
-  timeout 30 "$previzd" farm cancel "$job"
+  timeout 30 "$previz" farm cancel "$job"
   expect "all leave the queue" await 40 all_have_left
   sleep 3
   expect "none comes back" all_have_left
@@ -166,7 +166,7 @@ case_corrupted() {
   expect "the bits are those of one run" same_render "$out/reference/quick" "$pictures"
 
   spoil "$pictures/0003.exr"
-  if timeout 60 "$previzd" farm finish "$job"; then
+  if timeout 60 "$previz" farm finish "$job"; then
     expect "finish has put the picture in from its task's" same_render "$out/reference/quick" "$pictures"
   else
     retry_renders_what_is_missing
@@ -202,20 +202,20 @@ case_missing_take() {
   expect "the bits are those of one run" same_frames "$out/reference/quick" "$pictures"
 }
 
-# A node with another version of previzd.
+# A node with another version of previz.
 case_other_version() {
   reference quick "${quick[@]}"
   local version other
-  version=$("$previzd" --version | grep --only-matching --extended-regexp '[0-9]+\.[0-9]+\.[0-9]+')
+  version=$("$previz" --version | grep --only-matching --extended-regexp '[0-9]+\.[0-9]+\.[0-9]+')
   other=${version%?}$(((${version: -1} + 1) % 10))
-  sed "s/previzd ${version//./\\.}/previzd $other/g" "$previzd" >"$folder/previzd"
-  chmod +x "$folder/previzd"
-  expect "the other previzd says $other" grep --quiet "$other" <("$folder/previzd" --version)
+  sed "s/${version//./\\.}/$other/g" "$previz" >"$folder/previz"
+  chmod +x "$folder/previz"
+  expect "the other previz says $other" grep --quiet "$other" <("$folder/previz" --version)
   start_cluster
-  node on-node 1 mount --bind "$folder/previzd" "$previzd"
+  node on-node 1 mount --bind "$folder/previz" "$previz"
   submit "${quick[@]}" --chunk 2 --job "$job" --out "$pictures"
   expect "status names both versions" await 90 job_says "$other.*$version|$version.*$other"
-  node on-node 1 umount "$previzd"
+  node on-node 1 umount "$previz"
   await_end
   has_passed || retry_renders_what_is_missing
   expect "the bits are those of one run" same_render "$out/reference/quick" "$pictures"
@@ -267,12 +267,12 @@ all_have_left() { [[ -z $(squeue --noheader --format=%i) ]]; }
 case_without_cluster() {
   local odd=$folder/$'a "take\'s"\n$HOME %j'
   cp --recursive config/demo "$odd"
-  SLURM_CONF=/nonexistent timeout 30 "$previzd" farm "${quick[@]}" --chunk 2 --job "$job" --out "$pictures" --dry-run
+  SLURM_CONF=/nonexistent timeout 30 "$previz" farm "${quick[@]}" --chunk 2 --job "$job" --out "$pictures" --dry-run
   expect "no picture is made" [ ! -e "$pictures/0000.exr" ]
-  timeout 30 "$previzd" farm "${quick[@]}" --chunk 2 --job "$folder/job2" --out "$pictures" --openjd "$folder/demo.yaml"
+  timeout 30 "$previz" farm "${quick[@]}" --chunk 2 --job "$folder/job2" --out "$pictures" --openjd "$folder/demo.yaml"
   expect "the template is right" "$here/check_openjd.py" "$folder/demo.yaml"
   # The arguments of a template's commands have no line breaks (5.2 of the specification).
-  if timeout 30 "$previzd" farm "$odd/session" --set "$odd/demo.toml" --chunk 2 --job "$odd/job" --out "$odd/pictures" \
+  if timeout 30 "$previz" farm "$odd/session" --set "$odd/demo.toml" --chunk 2 --job "$odd/job" --out "$odd/pictures" \
     --openjd "$folder/odd.yaml" 2>&1 | tee "$folder/odd.txt"; then
     expect "the template of odd names is right" "$here/check_openjd.py" "$folder/odd.yaml"
   else
@@ -285,7 +285,7 @@ case_without_cluster() {
 case_loop() {
   local ranges=("${demo[@]}" --scale 0.05 --spp 256 --neighbours 0 --frames 0-3 --no-video)
   reference loop "${ranges[@]}"
-  timeout 30 "$previzd" farm "${ranges[@]}" --chunk 1 --sample-ranges 2 --job "$job" --out "$pictures" \
+  timeout 30 "$previz" farm "${ranges[@]}" --chunk 1 --sample-ranges 2 --job "$job" --out "$pictures" \
     --openjd "$folder/job.yaml"
   on_three_machines
   expect "the bits are those of one run" same_render "$out/reference/loop" "$pictures"
@@ -322,7 +322,7 @@ static int call(const char* name, int descriptor, int command, void* argument) {
 FORWARD(fcntl)
 FORWARD(fcntl64)
 END
-  timeout 30 "$previzd" farm "${quick[@]}" --chunk 2 --job "$job" --out "$pictures" --openjd "$folder/job.yaml"
+  timeout 30 "$previz" farm "${quick[@]}" --chunk 2 --job "$job" --out "$pictures" --openjd "$folder/job.yaml"
   printf '{"outcome": "running", "host": "lost", "pid": 7, "since": "today", "message": ""}' >"$job/state/0001.json"
   touch --date='120 seconds ago' "$job/state/0001.json"
   LD_PRELOAD=$folder/no_locks.so on_three_machines
@@ -368,7 +368,7 @@ written_pictures() {
 retry_renders_what_is_missing() {
   written_pictures >"$folder/before.txt"
   local lost
-  timeout 60 "$previzd" farm retry "$job" | tee "$folder/submitted.txt"
+  timeout 60 "$previz" farm retry "$job" | tee "$folder/submitted.txt"
   check=$(sed -n 's/^check: job \([0-9]*\)$/\1/p' "$folder/submitted.txt")
   expect "retry prints the id of its check" [ -n "$check" ]
   await_end

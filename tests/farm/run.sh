@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# `previzd farm` on a real Slurm cluster of three nodes that runs on this machine (cluster.sh): the pictures of the demo
-# take, from tasks that fail in the ways of cases.sh, are held against those of one `previzd render`, bit for bit. As
+# `previz farm` on a real Slurm cluster of three nodes that runs on this machine (cluster.sh): the pictures of the demo
+# take, from tasks that fail in the ways of cases.sh, are held against those of one `previz render`, bit for bit. As
 # root; installs Slurm with the first run. Ten minutes on two cores.
 #   tests/farm/run.sh            all cases
 #   tests/farm/run.sh CASE...    cases by the names that cases.sh gives them: cluster, array, power, network, ...
@@ -11,7 +11,7 @@ cd "$(dirname "$0")/../.."
 here=$PWD/tests/farm
 out=$PWD/build/farm
 build=$(realpath "${PREVIZ_BUILD:-build/release}")
-previzd=$build/daemon/previzd
+previz=$build/daemon/previz
 # A task that finds its node at fault waits this long before it is requeued.
 export PREVIZ_FARM_WAIT_S=3
 export MESA_SHADER_CACHE_DIR=${MESA_SHADER_CACHE_DIR:-$PWD/build/mesa_shader_cache}
@@ -67,15 +67,15 @@ end_case() {
   exit $status
 }
 
-# reference NAME RENDER_ARGUMENTS...: one run of `previzd render`, whose pictures are in $out/reference/NAME. An earlier
+# reference NAME RENDER_ARGUMENTS...: one run of `previz render`, whose pictures are in $out/reference/NAME. An earlier
 # one is used again where arguments and program are the same.
 reference() {
   local target=$out/reference/$1 made_by
-  made_by="${*:2} $(stat --format='%i %Y' "$previzd")"
+  made_by="${*:2} $(stat --format='%i %Y' "$previz")"
   [[ -e $target.made_by && $(<"$target.made_by") == "$made_by" ]] && return
   rm -rf "$target" "$target.made_by"
   mkdir -p "$out/reference"
-  timeout 300 "$previzd" render "${@:2}" --out "$target"
+  timeout 300 "$previz" render "${@:2}" --out "$target"
   echo "$made_by" >"$target.made_by"
 }
 
@@ -99,7 +99,7 @@ same_render() {
 
 # submit PREVIZD_FARM_ARGUMENTS...: sets `render` and `check` to the Slurm ids.
 submit() {
-  timeout 60 "$previzd" farm "$@" | tee "$folder/submitted.txt"
+  timeout 60 "$previz" farm "$@" | tee "$folder/submitted.txt"
   render=$(sed -n 's/^render: job \([0-9]*\)$/\1/p' "$folder/submitted.txt")
   check=$(sed -n 's/^check: job \([0-9]*\)$/\1/p' "$folder/submitted.txt")
   expect "the ids of render and check are printed" [ -n "$render" -a -n "$check" ]
@@ -116,7 +116,7 @@ await_end() {
 has_passed() { [[ $(scontrol --oneliner show job "$check") == *" ExitCode=0:0 "* ]]; }
 
 # job_says STATUS_PATTERN: whether `farm status` prints a line that matches, whatever status it ends with.
-job_says() { { timeout 30 "$previzd" farm status "$job" || true; } 2>&1 | grep --ignore-case --extended-regexp "$1"; }
+job_says() { { timeout 30 "$previz" farm status "$job" || true; } 2>&1 | grep --ignore-case --extended-regexp "$1"; }
 
 # The number of the task, in the array that renders, which runs on a node.
 task_on() { squeue --noheader --array --states=RUNNING --nodelist="node$1" --jobs="$render" --format=%K; }
@@ -166,7 +166,7 @@ fi
 config/install-deps.sh slurm-wlm munge util-linux python3-jsonschema python3-yaml
 if [[ -z ${PREVIZ_BUILD:-} ]]; then
   [[ -e $build/CMakeCache.txt ]] || cmake --preset release --log-level=WARNING
-  cmake --build "$build" --parallel "$(nproc)" --target previzd
+  cmake --build "$build" --parallel "$(nproc)" --target previz
 fi
 mapfile -t known < <(sed -n 's/^case_\([a-z_]*\)() {$/\1/p' "$here/cases.sh")
 cases=("$@")

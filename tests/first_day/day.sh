@@ -1,7 +1,7 @@
 # Sourced by the days. Each works in a folder of its own, $work, with the programs of the release build.
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
-previzd=$root/build/release/daemon/previzd
+previzd=$root/build/release/daemon/previzd previz=$root/build/release/daemon/previz
 previzctl=$root/build/release/daemon/control/previzctl
 demo=$root/config/demo
 work=$(mktemp -d)

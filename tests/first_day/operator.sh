@@ -47,9 +47,9 @@ wait_for 60 "live" "$previzctl" status
 step 0 "$previzctl" action mark_good
 step 0 "$previzctl" mode review
 step 0 "$previzctl" mode live
-step 0 "$previzd" takes list takes
+step 0 "$previz" takes list takes
 expect "good"
-step 0 "$previzd" takes check takes/demo_take001
+step 0 "$previz" takes check takes/demo_take001
 
 # What is wrong with a set file that was saved is said, with its line; the rig goes on with the old one.
 cp demo.toml right.toml

@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 config/install-deps.sh ffmpeg poppler-utils dbus bsdutils
 cmake --preset release --log-level=WARNING
-cmake --build --preset release --parallel "$(nproc)" --target previzd previzctl
+cmake --build --preset release --parallel "$(nproc)" --target previzd previz previzctl
 [[ $# -gt 0 ]] || set -- student operator director
 for day in "$@"; do
   printf '\n== the first day of a%s %s ==\n' "$([[ $day != operator ]] || echo n)" "$day"

@@ -34,8 +34,8 @@ environment() {
 }
 
 mkdir photos clip
-step 0 "$previzd" print tags --ids 0-2 --size 80mm
-step 0 "$previzd" print board chessboard:9x6:25mm
+step 0 "$previz" print tags --ids 0-2 --size 80mm
+step 0 "$previz" print board chessboard:9x6:25mm
 pdftoppm -r 200 -png -singlefile board.pdf board
 photo photos/1.png 0 0 0 0 0 0.45
 photo photos/2.png 30 0 0 0.02 0 0.42
@@ -70,22 +70,22 @@ cat >frames.json <<'FRAMES'
   "observer": { "pictures": "clip/%04d.png", "fps": 6, "exposure": 1 } }
 FRAMES
 
-step 0 "$previzd" calibrate observer photos --board chessboard:9x6:25mm --set my.toml --write
+step 0 "$previz" calibrate observer photos --board chessboard:9x6:25mm --set my.toml --write
 # Six pictures are no walk: that is said, and a ruler gives the tags' places.
-step 1 "$previzd" calibrate tags clip --set my.toml --size 80mm --write
+step 1 "$previz" calibrate tags clip --set my.toml --size 80mm --write
 expect "these views are missing"
 sed -n '/^\[\[tag\]\]/,/^$/p' "$demo/demo.toml" >>my.toml
 step 0 "$previzd" check my.toml
-step 0 "$previzd" model clip --set my.toml --pictures marks
-step 0 "$previzd" import frames.json take
+step 0 "$previz" model clip --set my.toml --pictures marks
+step 0 "$previz" import frames.json take
 
 # The manual's order, "THE LIGHT": the model in grey, how the HDRI is turned, how bright it is, the model's colours.
-step 0 "$previzd" model take --set my.toml --parts "$demo/real.toml" --out real.glb --grey --write
+step 0 "$previz" model take --set my.toml --parts "$demo/real.toml" --out real.glb --grey --write
 step 0 "$previzd" check take --set my.toml
 expect "calibrate balance"
-step 0 "$previzd" calibrate light take --rotation --set my.toml --write
-step 0 "$previzd" calibrate balance take --set my.toml --write
-step 0 "$previzd" model take --set my.toml --parts "$demo/real.toml" --out real.glb
-step 0 "$previzd" render take --set my.toml --frames 0 --spp 16 --out pictures
+step 0 "$previz" calibrate light take --rotation --set my.toml --write
+step 0 "$previz" calibrate balance take --set my.toml --write
+step 0 "$previz" model take --set my.toml --parts "$demo/real.toml" --out real.glb
+step 0 "$previz" render take --set my.toml --frames 0 --spp 16 --out pictures
 never "times as bright as the picture"
 [[ -s pictures/0000.png && -s pictures/0000.exr && -s pictures/review.mp4 ]] || fail "render left no picture, layers or movie"

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "daemon/farm/job.hpp"
-#include "daemon/output/sums_exr.hpp"
-#include "daemon/post/finished_frame.hpp"
+#include "daemon/core/output/sums_exr.hpp"
+#include "daemon/tools/farm/job.hpp"
+#include "daemon/tools/post/finished_frame.hpp"
 #include "drivers/error.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"

@@ -1,9 +1,9 @@
-// What `previzd import` reads, but for videos (video_targets.cpp).
+// What `previz import` reads, but for videos (video_targets.cpp).
 #include <fstream>
 
-#include "daemon/exchange/footage.hpp"
-#include "daemon/exchange/import_description.hpp"
-#include "daemon/exchange/picture_header.hpp"
+#include "daemon/tools/exchange/footage.hpp"
+#include "daemon/tools/exchange/import_description.hpp"
+#include "daemon/tools/exchange/picture_header.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 

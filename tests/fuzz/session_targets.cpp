@@ -1,9 +1,9 @@
 // What a take from elsewhere consists of.
+#include "daemon/core/session/json_lines.hpp"
+#include "daemon/core/session/session.hpp"
+#include "daemon/core/session/session_toml.hpp"
+#include "daemon/core/session/video_reader.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/json_lines.hpp"
-#include "drivers/session/session.hpp"
-#include "drivers/session/session_toml.hpp"
-#include "drivers/session/video_reader.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 

@@ -10,13 +10,13 @@
 #include <iterator>
 #include <map>
 
-#include "daemon/post/take_copy.hpp"
+#include "daemon/core/session/draft.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/core/session/repair.hpp"
+#include "daemon/core/session/session.hpp"
+#include "daemon/core/session/summary.hpp"
+#include "daemon/tools/post/take_copy.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/draft.hpp"
-#include "drivers/session/files.hpp"
-#include "drivers/session/repair.hpp"
-#include "drivers/session/session.hpp"
-#include "drivers/session/summary.hpp"
 #include "tests/fuzz/targets.hpp"
 #include "tests/support/session_fixture.hpp"
 
@@ -240,7 +240,7 @@ bool attempt(const std::function<void()>& action) {
   }
 }
 
-// Returns what is damaged, as `previzd takes check` finds it.
+// Returns what is damaged, as `previz takes check` finds it.
 std::vector<std::string> check(const fs::path& take) {
   session::Session opened = session::open_session(take);
   for (const char* source : {"observer", "light", "composite"}) {

@@ -9,9 +9,9 @@ extern "C" {
 #include <iterator>
 #include <limits>
 
-#include "daemon/exchange/import.hpp"
+#include "daemon/core/session/session.hpp"
+#include "daemon/tools/exchange/import.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/fuzz/targets.hpp"
 

@@ -11,11 +11,11 @@
 #include <string>
 #include <vector>
 
-#include "daemon/render/feature.hpp"
-#include "daemon/render/passes.hpp"
-#include "daemon/render/spirv.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/set/load.hpp"
+#include "daemon/core/render/device/spirv.hpp"
+#include "daemon/core/render/passes/passes.hpp"
+#include "daemon/core/render/world/feature.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/set/load.hpp"
 #include "shaders/deform.spv.h"
 #include "shaders/lib/shared.h"
 #include "shaders/refit_leaves.spv.h"

@@ -22,28 +22,28 @@ purges_without_trace() {
   [[ ! -s new ]] || fail "purge left: $(cat new)"
 }
 
-step "install on a farm's computer"
-apt-get install --quiet=2 ./previzd-farm.deb >apt.log 2>&1 || { cat apt.log; fail "the farm's does not install"; }
-previzd --version
-previzd farm --help >/dev/null
-[[ -z $(find / -xdev -path /tmp -prune -o -path '*/system/previz*' -print) ]] || fail "the farm's has a systemd unit"
-[[ ! -e /etc/previzd && ! -e /var/lib/previzd ]] || fail "the farm's has the rig's folders"
-! id previz 2>/dev/null || fail "the farm's made the user previz"
-bash -c 'source /usr/share/bash-completion/completions/previzd; complete -p previzd' >/dev/null
+step "install the tools"
+apt-get install --quiet=2 ./previz-tools.deb >apt.log 2>&1 || { cat apt.log; fail "the tools do not install"; }
+previz --version
+previz farm --help >/dev/null
+[[ -z $(find / -xdev -path /tmp -prune -o -path '*/system/previz*' -print) ]] || fail "the tools have a systemd unit"
+[[ ! -e /etc/previzd && ! -e /var/lib/previzd ]] || fail "the tools have the rig's folders"
+! id previz 2>/dev/null || fail "the tools made the user previz"
+bash -c 'source /usr/share/bash-completion/completions/previz; complete -p previz' >/dev/null
 
 step "a job without a scheduler"
-previzd farm demo/session --set demo/demo.toml --frames 0-1 --scale 0.1 --spp 1 --cpu --out finished | tee plan
+previz farm demo/session --set demo/demo.toml --frames 0-1 --scale 0.1 --spp 1 --cpu --out finished | tee plan
 grep -qF 'There is no Slurm here' plan || fail "the plan does not say how the job is started"
 bash finished.farm/loop.sh
 for file in 0000.png 0000.exr 0001.png 0001.exr; do
   [[ -s finished/$file ]] || fail "the job has not made $file"
 done
-previzd farm status finished.farm | grep -qF '2 of 2 frames done' || fail "the job is not done"
+previz farm status finished.farm | grep -qF '2 of 2 frames done' || fail "the job is not done"
 
-step "purge the farm's"
-dpkg --purge previzd-farm
-purges_without_trace previzd-farm
-# What the rig's package needs is not to be there for the farm's sake.
+step "purge the tools"
+dpkg --purge previz-tools
+purges_without_trace previz-tools
+# What the rig's package needs is not to be there for the tools' sake.
 apt-get autoremove --purge --quiet=2 >apt.log 2>&1 || { cat apt.log; fail "autoremove fails"; }
 
 step "install"
@@ -68,9 +68,8 @@ perl -c /etc/needrestart/conf.d/previzd.conf 2>/dev/null || fail "needrestart ca
 step "the demonstration set renders"
 mkdir -m 777 pictures
 setpriv --reuid=previz --regid=previz --init-groups env XDG_CACHE_HOME=/tmp \
-  previzd --log-level warning render /usr/share/previzd/demo/session --set /etc/previzd/set.toml \
-  --frames 0 --spp 1 --no-exr --no-video --out pictures
-[[ -s pictures/0000.png ]] || fail "no picture"
+  previzd --log-level warning run /etc/previzd/set.toml --spp 1 --out pictures
+[[ -s pictures/picture.png ]] || fail "no picture"
 
 step "upgrade, with a set that was changed"
 echo '# ours' >>/etc/previzd/set.toml
@@ -96,9 +95,9 @@ rm -r /var/lib/previzd
 step "install, and purge"
 purges_without_trace previzd
 
-step "the rig's in the place of the farm's"
-dpkg --install previzd-farm.deb
-! dpkg --install previzd.deb 2>refusal || fail "both packages are installed"
-grep -q 'conflict' refusal || fail "the packages do not conflict: $(cat refusal)"
-apt-get install --quiet=2 ./previzd.deb >apt.log 2>&1 || { cat apt.log; fail "the farm's is in the way"; }
-[[ ! -e /usr/share/doc/previzd-farm ]] || fail "the farm's stayed beside the rig's"
+step "the tools beside the rig"
+dpkg --install previzd.deb
+! previzd takes list /var/lib/previzd 2>refusal || fail "previzd has tools of its own"
+grep -q 'install the package previz-tools' refusal || fail "who misses the tools is not told where they are"
+apt-get install --quiet=2 ./previz-tools.deb >apt.log 2>&1 || { cat apt.log; fail "the tools do not go with the rig"; }
+previzd takes list /usr/share/previzd/demo

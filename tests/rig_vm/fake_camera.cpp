@@ -12,8 +12,8 @@
 #include <iostream>
 #include <vector>
 
+#include "daemon/core/session/session.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/session.hpp"
 
 namespace {
 

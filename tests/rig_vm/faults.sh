@@ -50,6 +50,7 @@ prepare() {
   mv "$part" "$machine"
   make_disks "$machine" "$guest/root.ext4:raw" "$machine/a.ext4:raw" "$machine/b.ext4:raw" || return
   cp "$deb" "$share/previzd.deb"
+  cp "$tools_deb" "$share/previz-tools.deb"
   cp "$build/tests/rig_vm/rig_vm_camera" $here/{steps.sh,prepare_in_guest.sh} config/takes-disk.conf "$share/"
   # The demo's light, an eighth as often: the emulated processor has little time for it.
   cp -r config/demo/session "$share/light"

@@ -31,7 +31,7 @@ frames_in() { wc -l <"$(take_folder "$1")/observer.jsonl"; }
 # These two say that all there is of a take is as it was recorded, whether it was closed or not. That the emulated processor
 # was too slow for some frames, it may say.
 damage_of() {
-  previzd takes check "$(take_folder "$1")" 2>&1 | grep -Ev ': whole, |did not reach the disk in time' | grep -Ev "$2"
+  previz takes check "$(take_folder "$1")" 2>&1 | grep -Ev ': whole, |did not reach the disk in time' | grep -Ev "$2"
 }
 is_sound() {
   local what

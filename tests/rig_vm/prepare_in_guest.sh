@@ -33,7 +33,7 @@ mkdir -p /etc/systemd/system.conf.d /etc/previzd /etc/systemd/system/previzd.ser
 printf '[Manager]\nDefaultEnvironment=LP_NATIVE_VECTOR_WIDTH=128\n' >/etc/systemd/system.conf.d/rig.conf
 systemctl daemon-reexec
 cp set.toml /etc/previzd/set.toml
-dpkg --force-confold --install previzd.deb || fail "the package does not install"
+dpkg --force-confold --install previzd.deb previz-tools.deb || fail "the package does not install"
 cp takes-disk.conf /etc/systemd/system/previzd.service.d/
 chown previz:previz /mnt/a /mnt/b
 systemctl daemon-reload

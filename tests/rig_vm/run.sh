@@ -38,12 +38,12 @@ done
 cmake "$build" --log-level=WARNING -DPREVIZ_GATE=OFF >/dev/null
 suites=(camera_compliance replug usb buttons display_devices)
 cmake --build "$build" --parallel "$(nproc)" --target deb rig_vm_devices previzd "${suites[@]/#/test_}"
-deb=$(ls "$build"/previzd_*.deb)
+deb=$(ls "$build"/previzd_*.deb) tools_deb=$(ls "$build"/previz-tools_*.deb)
 
-key=$( (dpkg-deb --field "$deb" Depends; cat "$here"/guest/*) | sha256sum | cut -c1-16)
+key=$( (dpkg-deb --field "$deb" Depends; dpkg-deb --field "$tools_deb" Depends; cat "$here"/guest/*) | sha256sum | cut -c1-16)
 guest=${PREVIZ_RIG_VM_CACHE:-build/rig_vm}/$key
 if [[ ! -e $guest/root.ext4 ]]; then
-  "$here/guest/build.sh" "$deb" "$guest.part"
+  "$here/guest/build.sh" "$guest.part" "$deb" "$tools_deb"
   rm -rf "$guest"
   mv "$guest.part" "$guest"
 fi

@@ -5,7 +5,7 @@
 
 #include <csignal>
 
-#include "daemon/set/actions.hpp"
+#include "daemon/core/set/actions.hpp"
 #include "tests/devices/hostile_packets.hpp"
 #include "tests/storm/storm.hpp"
 #include "tests/support/tracking_synthetic.hpp"

@@ -3,8 +3,8 @@
 #include <systemd/sd-bus.h>
 
 #include "daemon/control/bus.hpp"
-#include "daemon/set/actions.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/core/set/actions.hpp"
 #include "tests/devices/private_network.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/other_camera.hpp"
@@ -135,7 +135,7 @@ void Storm::throw_in_every_stage() {
     throw std::runtime_error("lightning in " + where);
   };
   options_.rehearse = [lightning](const std::string& part) { lightning(300, part); };
-  options_.around_cameras = [lightning](Cameras& cameras) {
+  options_.around_cameras = [lightning](live::Cameras& cameras) {
     for (std::unique_ptr<Camera>* camera : {&cameras.observer, &cameras.light})
       test::put_around(*camera, [lightning](CameraEvent event, Camera&) {
         lightning(200, "a cable");

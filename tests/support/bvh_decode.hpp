@@ -7,7 +7,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "daemon/scene/bvh.hpp"
+#include "daemon/core/scene/bvh.hpp"
 
 namespace previz::test {
 

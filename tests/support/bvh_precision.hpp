@@ -6,7 +6,7 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec3.hpp>
 
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "tests/bench/tracers/gpu_tracer.hpp"
 
 namespace previz::test {

@@ -2,8 +2,8 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "daemon/calibrate/lens/observer.hpp"
-#include "daemon/calibrate/tags/tag_lens.hpp"
+#include "daemon/tools/calibrate/lens/observer.hpp"
+#include "daemon/tools/calibrate/tags/tag_lens.hpp"
 
 namespace previz::test {
 namespace {

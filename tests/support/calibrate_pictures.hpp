@@ -2,11 +2,11 @@
 // calibrations.
 #pragma once
 
-#include "daemon/calibrate/lens/source.hpp"
-#include "daemon/calibrate/lens/views.hpp"
-#include "daemon/calibrate/sensor/brackets.hpp"
-#include "daemon/tracking/joint_pose.hpp"
-#include "drivers/session/session.hpp"
+#include "daemon/core/session/session.hpp"
+#include "daemon/core/tracking/joint_pose.hpp"
+#include "daemon/tools/calibrate/lens/source.hpp"
+#include "daemon/tools/calibrate/lens/views.hpp"
+#include "daemon/tools/calibrate/sensor/brackets.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/units.hpp"
 

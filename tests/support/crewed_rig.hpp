@@ -3,9 +3,9 @@
 
 #include <stop_token>
 
+#include "daemon/core/session/files.hpp"
+#include "daemon/core/set/actions.hpp"
 #include "daemon/rig/live.hpp"
-#include "daemon/set/actions.hpp"
-#include "drivers/session/files.hpp"
 #include "tests/support/hand.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"

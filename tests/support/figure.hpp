@@ -6,7 +6,7 @@
 #include <glm/mat4x4.hpp>
 #include <vector>
 
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/scene/scene.hpp"
 
 namespace previz::test {
 

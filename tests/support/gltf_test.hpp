@@ -1,10 +1,10 @@
 // A glTF file that a test writes and loads as the only object of a set.
 #pragma once
 
-#include "daemon/scene/load.hpp"
-#include "daemon/scene/scene.hpp"
-#include "daemon/set/set.hpp"
-#include "drivers/session/records.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/scene/scene.hpp"
+#include "daemon/core/session/records.hpp"
+#include "daemon/core/set/set.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "drivers/session/files.hpp"
+#include "daemon/core/session/files.hpp"
 
 namespace previz::test {
 namespace {

@@ -8,7 +8,7 @@ extern "C" {
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "daemon/exchange/import.hpp"
+#include "daemon/tools/exchange/import.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 

@@ -11,8 +11,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
-#include "daemon/lighting/luminance.hpp"
-#include "daemon/lighting/response.hpp"
+#include "daemon/core/lighting/luminance.hpp"
+#include "daemon/core/lighting/response.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 

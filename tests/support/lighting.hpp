@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "daemon/lighting/environment.hpp"
-#include "daemon/lighting/exr_picture.hpp"
-#include "daemon/lighting/hdr.hpp"
+#include "daemon/core/lighting/environment.hpp"
+#include "daemon/core/lighting/exr_picture.hpp"
+#include "daemon/core/lighting/hdr.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
 

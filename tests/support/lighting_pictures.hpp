@@ -5,8 +5,8 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "daemon/lighting/environment.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/core/lighting/environment.hpp"
+#include "daemon/core/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 #include "tests/support/units.hpp"

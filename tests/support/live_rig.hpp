@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/post/render.hpp"
+#include "daemon/tools/post/render.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/small_take.hpp"
@@ -49,7 +49,7 @@ class RigLive : public testing::Test {
  protected:
   struct Shown {
     pipeline::Shot shot;
-    rig::Look look;
+    live::Look look;
     int count = 0;     // pictures until this one
     int rendered = 0;  // how many of these were rendered
     bool records(int samples) const { return look.state.recording && shot.samples == samples; }
@@ -85,7 +85,7 @@ class RigLive : public testing::Test {
   void run(const std::function<void()>& script) {
     rig::LiveOptions options = options_;
     if (sees_pictures_)
-      options.on_shown = [&](const pipeline::Shot& shot, const rig::Look& look) {
+      options.on_shown = [&](const pipeline::Shot& shot, const live::Look& look) {
         std::unique_lock lock(mutex_);
         shown_ = {shot, look, shown_.count + 1, shown_.rendered + (shot.samples > 0 ? 1 : 0)};
         seen_.notify_all();
@@ -156,9 +156,9 @@ class RigLive : public testing::Test {
   Shown until_frozen(int samples = 0) {
     return until([=](const Shown& s) { return s.shot.frozen && s.shot.samples >= samples; });
   }
-  Shown until_mode(rig::Mode mode) {
+  Shown until_mode(live::Mode mode) {
     return until([mode](const Shown& s) {
-      return s.look.state.mode == mode && s.shot.frozen == (mode == rig::Mode::refine);
+      return s.look.state.mode == mode && s.shot.frozen == (mode == live::Mode::refine);
     });
   }
   void until_said(const std::string& words) {
@@ -194,7 +194,7 @@ class RigLive : public testing::Test {
     return directory_ / "takes" / name;
   }
 
-  // The layers of the frame as `previzd render` makes them.
+  // The layers of the frame as `previz render` makes them.
   render::Layers rendered(const std::filesystem::path& take, std::int64_t timestamp_ns,
                           std::int64_t samples) {
     session::Session session = session::open_session(take);

@@ -1,7 +1,7 @@
 // The pages of words that a rig shows on its display, for a crew that reads them.
 #pragma once
 
-#include "daemon/output/osd_painter.hpp"
+#include "daemon/core/output/osd_painter.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/test.hpp"
 

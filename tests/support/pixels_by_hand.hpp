@@ -1,7 +1,7 @@
 // Runs pixels and layers that a test makes by hand through the renderer's steps after sampling.
 #pragma once
 
-#include "daemon/render/presenter.hpp"
+#include "daemon/core/render/passes/presenter.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test {

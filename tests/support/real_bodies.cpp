@@ -1,7 +1,7 @@
 #include "tests/support/real_bodies.hpp"
 
-#include "daemon/fit/light_edge.hpp"
-#include "daemon/tracking/camera_pose.hpp"
+#include "daemon/core/fit/light_edge.hpp"
+#include "daemon/core/tracking/camera_pose.hpp"
 
 namespace previz::test {
 

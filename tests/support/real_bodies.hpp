@@ -1,7 +1,7 @@
 // Boxes and sheets as a scene that is real, and a camera that looks at them.
 #pragma once
 
-#include "daemon/fit/real_model.hpp"
+#include "daemon/core/fit/real_model.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 

@@ -1,7 +1,7 @@
 // What the tests of the recorder share: what it is offered, and what it says and counts.
 #pragma once
 
-#include "daemon/output/recorder.hpp"
+#include "daemon/core/output/recorder.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"

@@ -3,7 +3,7 @@
 
 #include <mutex>
 
-#include "daemon/render/renderer.hpp"
+#include "daemon/core/render/renderer.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/scenes.hpp"
 #include "tests/support/test.hpp"

@@ -7,8 +7,8 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "daemon/lighting/environment.hpp"
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/lighting/environment.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "drivers/calibration.hpp"
 
 namespace previz::test {

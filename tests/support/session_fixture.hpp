@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "daemon/core/session/session.hpp"
 #include "drivers/frame.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/temporary_directory.hpp"
 

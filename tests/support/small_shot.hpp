@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "daemon/pipeline/shot.hpp"
+#include "daemon/core/pipeline/shot.hpp"
 #include "drivers/plate.hpp"
 
 namespace previz::test {

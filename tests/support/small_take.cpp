@@ -7,9 +7,9 @@
 #include <random>
 #include <vector>
 
-#include "drivers/session/clusters.hpp"
-#include "drivers/session/crc32.hpp"
-#include "drivers/session/session.hpp"
+#include "daemon/core/session/clusters.hpp"
+#include "daemon/core/session/crc32.hpp"
+#include "daemon/core/session/session.hpp"
 #include "tests/support/gltf_writer.hpp"
 
 namespace previz::test {

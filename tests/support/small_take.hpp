@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "daemon/core/session/session.hpp"
 #include "drivers/frame.hpp"
-#include "drivers/session/session.hpp"
 
 namespace previz::test {
 

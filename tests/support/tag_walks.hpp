@@ -1,8 +1,8 @@
 // What a camera would see of tags on a walk, made by the tests: corners with noise, no pictures.
 #pragma once
 
-#include "daemon/calibrate/tags/tag_bundle.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/core/set/set.hpp"
+#include "daemon/tools/calibrate/tags/tag_bundle.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::test {

@@ -3,7 +3,7 @@
 
 #include <glm/gtc/quaternion.hpp>
 
-#include "daemon/tracking/apriltag_tracker.hpp"
+#include "daemon/core/tracking/apriltag_tracker.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 

@@ -10,8 +10,8 @@
 #include <glm/matrix.hpp>
 #include <stdexcept>
 
-#include "daemon/tracking/photometry.hpp"
-#include "daemon/tracking/tag_family.hpp"
+#include "daemon/core/tracking/photometry.hpp"
+#include "daemon/core/tracking/tag_family.hpp"
 #include "drivers/calibration/pinhole.hpp"
 
 namespace previz::test {

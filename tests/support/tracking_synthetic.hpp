@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/set/set.hpp"
+#include "daemon/core/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 

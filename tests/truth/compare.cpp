@@ -6,7 +6,7 @@
 #include <functional>
 #include <glm/common.hpp>
 
-#include "daemon/lighting/response.hpp"
+#include "daemon/core/lighting/response.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 

@@ -2,7 +2,7 @@
 #include "tests/truth/compare.hpp"
 #include "tests/support/test.hpp"
 
-#include "daemon/lighting/response.hpp"
+#include "daemon/core/lighting/response.hpp"
 #include "drivers/plate.hpp"
 
 namespace previz::truth::compare_test {

@@ -5,7 +5,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "daemon/lighting/environment.hpp"
+#include "daemon/core/lighting/environment.hpp"
 
 namespace previz::truth {
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <optional>
 
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/scene/scene.hpp"
 
 namespace previz::truth {
 

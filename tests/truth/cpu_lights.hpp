@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "tests/truth/cpu_geometry.hpp"
 #include "tests/truth/cpu_random.hpp"
 

@@ -5,7 +5,7 @@
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
 
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "tests/truth/cpu_bsdf.hpp"
 #include "tests/truth/cpu_geometry.hpp"
 

@@ -8,8 +8,8 @@
 #include <memory>
 #include <vector>
 
-#include "daemon/lighting/environment.hpp"
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/lighting/environment.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "drivers/calibration.hpp"
 
 namespace previz::truth {

@@ -9,10 +9,10 @@
 #include <numbers>
 #include <regex>
 
-#include "daemon/lighting/exr_picture.hpp"
-#include "daemon/lighting/resampling.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/lighting/exr_picture.hpp"
+#include "daemon/core/lighting/resampling.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/cpu_geometry.hpp"
 #include "tests/truth/truth_take.hpp"

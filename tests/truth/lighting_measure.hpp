@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/lighting/lighting.hpp"
-#include "daemon/lighting/sources.hpp"
+#include "daemon/core/lighting/lighting.hpp"
+#include "daemon/core/lighting/sources.hpp"
 #include "tests/truth/truth_set.hpp"
 
 namespace previz::truth {

@@ -8,11 +8,11 @@
 #include <glm/matrix.hpp>
 #include <optional>
 
-#include "daemon/lighting/response.hpp"
-#include "daemon/pipeline/render_stage.hpp"
-#include "daemon/pipeline/take.hpp"
-#include "daemon/pipeline/take_shots.hpp"
-#include "daemon/scene/load.hpp"
+#include "daemon/core/lighting/response.hpp"
+#include "daemon/core/pipeline/render_stage.hpp"
+#include "daemon/core/pipeline/take.hpp"
+#include "daemon/core/pipeline/take_shots.hpp"
+#include "daemon/core/scene/load.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"

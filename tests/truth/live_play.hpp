@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"

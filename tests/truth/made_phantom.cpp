@@ -7,8 +7,8 @@
 #include <glm/geometric.hpp>
 #include <regex>
 
-#include "daemon/model/model.hpp"
-#include "daemon/scene/load.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/tools/model/model.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/truth/truth_take.hpp"

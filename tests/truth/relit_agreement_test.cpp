@@ -1,8 +1,8 @@
 // Lamps that were taken out of an environment and changed in the mixed world, against the CPU
 // tracer.
-#include "daemon/lighting/claims.hpp"
-#include "daemon/lighting/light_mode.hpp"
-#include "daemon/pipeline/relight.hpp"
+#include "daemon/core/lighting/claims.hpp"
+#include "daemon/core/lighting/light_mode.hpp"
+#include "daemon/core/pipeline/relight.hpp"
 #include "tests/truth/two_tracers.hpp"
 
 namespace previz::test::relit_agreement_test {

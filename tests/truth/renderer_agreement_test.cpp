@@ -1,8 +1,8 @@
 // The GPU renderer against the independent CPU tracer, both radiances, at reduced size: on sets
 // varied by seed (camera, objects diffuse, textured, plastic, rough and smooth metal, emitter,
 // removed, lamps, lens) and on the ground truth sets.
-#include "daemon/lighting/lighting.hpp"
-#include "daemon/scene/load.hpp"
+#include "daemon/core/lighting/lighting.hpp"
+#include "daemon/core/scene/load.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/truth/cpu_camera.hpp"
 #include "tests/truth/truth_set.hpp"

@@ -8,13 +8,13 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "daemon/scene/load.hpp"
-#include "daemon/scene/scene.hpp"
-#include "daemon/tracking/apriltag_tracker.hpp"
-#include "daemon/tracking/joint_pose.hpp"
-#include "daemon/tracking/pose_filter.hpp"
-#include "daemon/tracking/pose_starts.hpp"
-#include "daemon/tracking/tag_detector.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/scene/scene.hpp"
+#include "daemon/core/tracking/apriltag_tracker.hpp"
+#include "daemon/core/tracking/joint_pose.hpp"
+#include "daemon/core/tracking/pose_filter.hpp"
+#include "daemon/core/tracking/pose_starts.hpp"
+#include "daemon/core/tracking/tag_detector.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 

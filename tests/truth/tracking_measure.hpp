@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/tracking/apriltag_tracker.hpp"
-#include "daemon/tracking/tracker.hpp"
+#include "daemon/core/tracking/apriltag_tracker.hpp"
+#include "daemon/core/tracking/tracker.hpp"
 #include "tests/truth/truth_set.hpp"
 
 namespace previz::truth {

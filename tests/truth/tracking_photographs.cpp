@@ -12,10 +12,10 @@
 #include <set>
 #include <sstream>
 
-#include "daemon/tracking/apriltag_tracker.hpp"
-#include "daemon/tracking/joint_pose.hpp"
-#include "daemon/tracking/pose_filter.hpp"
-#include "daemon/tracking/tag_detector.hpp"
+#include "daemon/core/tracking/apriltag_tracker.hpp"
+#include "daemon/core/tracking/joint_pose.hpp"
+#include "daemon/core/tracking/pose_filter.hpp"
+#include "daemon/core/tracking/tag_detector.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/tracking_measure.hpp"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "daemon/set/set.hpp"
-#include "daemon/tracking/apriltag_tracker.hpp"
+#include "daemon/core/set/set.hpp"
+#include "daemon/core/tracking/apriltag_tracker.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 

@@ -1,6 +1,6 @@
 // The bundled set against Cycles' truth, from the session to the picture's file, in so few samples
 // that a gate has the time.
-#include "daemon/output/png.hpp"
+#include "daemon/core/output/png.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

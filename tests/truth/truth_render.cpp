@@ -3,11 +3,11 @@
 #include <chrono>
 #include <iostream>
 
-#include "daemon/lighting/lighting.hpp"
-#include "daemon/output/exr.hpp"
-#include "daemon/output/png.hpp"
-#include "daemon/post/render.hpp"
-#include "daemon/scene/load.hpp"
+#include "daemon/core/lighting/lighting.hpp"
+#include "daemon/core/output/exr.hpp"
+#include "daemon/core/output/png.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/tools/post/render.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/cpu_tracer.hpp"
 #include "tests/truth/truth_take.hpp"

@@ -1,4 +1,4 @@
-// Truth frames of a set that was written as a session, rendered as `previzd render` would.
+// Truth frames of a set that was written as a session, rendered as `previz render` would.
 #pragma once
 
 #include <cstdint>
@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "daemon/post/finished_frame.hpp"
+#include "daemon/tools/post/finished_frame.hpp"
 #include "tests/truth/compare.hpp"
 #include "tests/truth/truth_set.hpp"
 

@@ -1,4 +1,4 @@
-// Renders the truth frames of ground truth sets as `previzd render` would, or plays their sequences
+// Renders the truth frames of ground truth sets as `previz render` would, or plays their sequences
 // as live would show them, and says how far off they are. tests/truth/run builds and calls it.
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "daemon/output/png.hpp"
+#include "daemon/core/output/png.hpp"
 #include "drivers/error.hpp"
 #include "tests/truth/compare.hpp"
 #include "tests/truth/comparison_sheet.hpp"
@@ -297,7 +297,7 @@ int main(int argc, char** argv) {
            arguments.made = from == "made";
            if (from != "made" && from != "truth") arguments.phantom = from;
          },
-         "truth: the set's own; made: by previzd model from marks in its pictures; or a .glb file "
+         "truth: the set's own; made: by previz model from marks in its pictures; or a .glb file "
          "in place of the set's own")
       ->check(CLI::IsMember({"truth", "made"}) | CLI::ExistingFile);
   app.add_option("--spp", arguments.samples, "samples per pixel [256; with --live 1]")

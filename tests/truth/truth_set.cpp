@@ -9,9 +9,9 @@
 #include <numbers>
 #include <sstream>
 
-#include "daemon/lighting/exr_picture.hpp"
-#include "daemon/lighting/response.hpp"
-#include "daemon/output/png.hpp"
+#include "daemon/core/lighting/exr_picture.hpp"
+#include "daemon/core/lighting/response.hpp"
+#include "daemon/core/output/png.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
 

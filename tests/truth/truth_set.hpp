@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/set/set.hpp"
+#include "daemon/core/set/set.hpp"
 #include "drivers/calibration.hpp"
 #include "tests/truth/compare.hpp"
 

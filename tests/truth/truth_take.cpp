@@ -4,10 +4,10 @@
 #include <numbers>
 #include <sstream>
 
-#include "daemon/output/png.hpp"
+#include "daemon/core/output/png.hpp"
+#include "daemon/core/session/session.hpp"
 #include "drivers/error.hpp"
 #include "drivers/plate.hpp"
-#include "drivers/session/session.hpp"
 
 namespace previz::truth {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
-#include "daemon/lighting/linear_picture.hpp"
+#include "daemon/core/lighting/linear_picture.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::truth {

@@ -1,6 +1,6 @@
 #include "tests/bench/equal_error/method.hpp"
 
-#include "daemon/pipeline/refinement.hpp"
+#include "daemon/core/pipeline/refinement.hpp"
 #include "tests/bench/measure.hpp"
 
 namespace previz::bench {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/render/renderer.hpp"
+#include "daemon/core/render/renderer.hpp"
 #include "tests/bench/equal_error/view.hpp"
 #include "tests/truth/compare.hpp"
 

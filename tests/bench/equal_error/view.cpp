@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
-#include "daemon/lighting/light_mode.hpp"
-#include "daemon/lighting/lighting.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/core/lighting/light_mode.hpp"
+#include "daemon/core/lighting/lighting.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/set/set.hpp"
 #include "drivers/error.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/truth/cpu_camera.hpp"

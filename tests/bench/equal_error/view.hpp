@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/lighting/environment.hpp"
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/lighting/environment.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "tests/truth/truth_set.hpp"
 
 namespace previz::bench {

@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "drivers/embree.hpp"
 #include "tests/bench/tracers/gpu_tracer.hpp"
 

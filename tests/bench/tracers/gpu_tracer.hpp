@@ -7,10 +7,10 @@
 #include <span>
 #include <vector>
 
-#include "daemon/render/kernel.hpp"
-#include "daemon/render/ray_structures.hpp"
-#include "daemon/scene/bvh.hpp"
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/render/device/kernel.hpp"
+#include "daemon/core/render/world/ray_structures.hpp"
+#include "daemon/core/scene/bvh.hpp"
+#include "daemon/core/scene/scene.hpp"
 
 namespace previz::bench {
 

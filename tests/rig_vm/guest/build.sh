@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
-# Builds the guest: Debian 12 with its stock kernel, gpio-sim, and everything the package depends on,
-# but not the package.   build.sh PREVIZD.deb DIRECTORY   leaves vmlinuz, initrd.gz, root.ext4 there.
+# Builds the guest: Debian 12 with its stock kernel, gpio-sim, and everything the packages depend on,
+# but not the packages. 
+#   build.sh DIRECTORY PREVIZD.deb PREVIZ-TOOLS.deb   leaves vmlinuz, initrd.gz, root.ext4 there.
 # As root; takes a few minutes and the network.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
-deb=$(realpath "$1")
-mkdir -p "$2"
-to=$(realpath "$2")
+mkdir -p "$1"
+to=$(realpath "$1")
+mapfile -t debs < <(realpath "${@:2}")
 root=$to/root
 [[ -e $to/modules/kver ]] || "$here/build_modules.sh" "$to/modules"
 kver=$(cat "$to/modules/kver")
@@ -26,13 +27,13 @@ done
 rm -rf "$root"
 sources=$to/debian.sources
 cat /etc/apt/sources.list.d/*.sources >"$sources"
-# The package goes in and out again, which leaves what it depends on.
+# The packages go in and out again, which leaves what they depend on.
 mmdebstrap --quiet --variant=minbase --mode=root --format=directory \
   --aptopt='APT::Install-Recommends "false"' "${leave_out[@]/#/--dpkgopt=path-exclude=}" \
   --include="$(IFS=,; echo "${packages[*]}")" \
-  --customize-hook="copy-in $deb /tmp" \
-  --customize-hook="chroot \"\$1\" env DEBIAN_FRONTEND=noninteractive apt-get -qq install /tmp/$(basename "$deb") >/dev/null" \
-  --customize-hook='chroot "$1" dpkg --purge previzd' \
+  --customize-hook="copy-in ${debs[*]} /tmp" \
+  --customize-hook="chroot \"\$1\" env DEBIAN_FRONTEND=noninteractive sh -c 'cd /tmp && apt-get -qq install ./*.deb' >/dev/null" \
+  --customize-hook='chroot "$1" dpkg --purge previzd previz-tools' \
   bookworm "$root" "$sources"
 
 install -D -m 644 -t "$root/lib/modules/$kver/extra" "$to"/modules/*.ko

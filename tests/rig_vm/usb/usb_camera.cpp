@@ -10,8 +10,8 @@
 #include <cstdlib>
 #include <map>
 
+#include "daemon/core/session/session.hpp"
 #include "drivers/error.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/rig_vm/usb/redirection.hpp"
 
 namespace previz::test {

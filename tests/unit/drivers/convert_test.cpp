@@ -1,6 +1,6 @@
 #include "drivers/convert/convert.hpp"
 
-#include "daemon/lighting/response.hpp"
+#include "daemon/core/lighting/response.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/test.hpp"
 

@@ -1,6 +1,6 @@
 #include "drivers/faults.hpp"
 
-#include "drivers/replay/replay_camera.hpp"
+#include "daemon/core/session/replay_camera.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 

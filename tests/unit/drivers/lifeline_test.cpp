@@ -1,7 +1,7 @@
 // A device that comes and goes, in a time that passes only when somebody sleeps.
 #include "drivers/lifeline.hpp"
 
-#include "drivers/replay/replay_camera.hpp"
+#include "daemon/core/session/replay_camera.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 

@@ -1,10 +1,10 @@
 // The exported camera against matrices that are known, and against what OpenCV's model projects.
-#include "daemon/exchange/camera_track.hpp"
+#include "daemon/tools/exchange/camera_track.hpp"
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "drivers/session/draft.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/session/draft.hpp"
+#include "daemon/core/session/files.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"

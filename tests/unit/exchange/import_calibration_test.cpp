@@ -2,11 +2,11 @@
 // mistake gives the same words, at the place where it is.
 #include <nlohmann/json.hpp>
 
-#include "daemon/exchange/import_description.hpp"
-#include "daemon/set/load.hpp"
-#include "daemon/set/print.hpp"
+#include "daemon/core/session/session_toml.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/print.hpp"
+#include "daemon/tools/exchange/import_description.hpp"
 #include "drivers/calibration/fisheye.hpp"
-#include "drivers/session/session_toml.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 

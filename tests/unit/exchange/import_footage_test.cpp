@@ -1,6 +1,6 @@
-#include "daemon/exchange/footage.hpp"
-#include "daemon/exchange/picture_header.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/tools/exchange/footage.hpp"
+#include "daemon/tools/exchange/picture_header.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/import_fixture.hpp"
 

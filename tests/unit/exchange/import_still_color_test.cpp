@@ -6,9 +6,9 @@
 #include <exiv2/exiv2.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "daemon/exchange/footage.hpp"
-#include "daemon/exchange/video_color.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/tools/exchange/footage.hpp"
+#include "daemon/tools/exchange/video_color.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/import_fixture.hpp"
 

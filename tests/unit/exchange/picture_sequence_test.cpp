@@ -1,7 +1,7 @@
 // Numbered pictures: how their names are written, and what is missing of them.
-#include "daemon/exchange/picture_sequence.hpp"
+#include "daemon/tools/exchange/picture_sequence.hpp"
 
-#include "drivers/session/files.hpp"
+#include "daemon/core/session/files.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/import_fixture.hpp"
 

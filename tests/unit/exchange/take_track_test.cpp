@@ -3,14 +3,14 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/exchange/camera_track.hpp"
-#include "daemon/exchange/placed_model.hpp"
-#include "daemon/exchange/take_track.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/scene/scene.hpp"
-#include "daemon/set/load.hpp"
-#include "drivers/session/draft.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/scene/scene.hpp"
+#include "daemon/core/session/draft.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/tools/exchange/camera_track.hpp"
+#include "daemon/tools/exchange/placed_model.hpp"
+#include "daemon/tools/exchange/take_track.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/import_fixture.hpp"
@@ -180,7 +180,7 @@ TEST(MovedTag, IsNamedAndNotUsedWhereTwoOthersAgree) {
     EXPECT_THAT(said.str(), HasSubstr("6 of 6 frames tracked"));
     EXPECT_THAT(said.str(), HasSubstr("tag 1: seen in 6 frames, used for the camera in 0"));
     EXPECT_THAT(said.str(), HasSubstr("warning: tag 1 is "));
-    EXPECT_THAT(said.str(), HasSubstr("`previzd calibrate tags TAKE`"));
+    EXPECT_THAT(said.str(), HasSubstr("`previz calibrate tags TAKE`"));
     EXPECT_THAT(said.str(), Not(HasSubstr("all tags measure")));
   }
 }
@@ -258,7 +258,7 @@ TEST_F(UntrackedTake, WithoutTagsSaysWhatToDo) {
   EXPECT_THAT(test::error_of([&] {
                 export_take({session_, out_}, said_);
               }),
-              HasSubstr("`previzd track` says why; the set file needs [[tag]]"));
+              HasSubstr("`previz track` says why; the set file needs [[tag]]"));
 }
 
 TEST(PlacedModel, KeepsWhatItDoesNotKnow) {

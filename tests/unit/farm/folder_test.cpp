@@ -1,14 +1,14 @@
 // Who is at work in a job's folder, on file systems with locks and without.
-#include "daemon/farm/folder.hpp"
+#include "daemon/tools/farm/folder.hpp"
 
 #include <atomic>
 #include <cerrno>
 #include <mutex>
 #include <sstream>
 
-#include "daemon/farm/job_lock.hpp"
-#include "daemon/farm/signs_of_life.hpp"
-#include "drivers/session/draft.hpp"
+#include "daemon/core/session/draft.hpp"
+#include "daemon/tools/farm/job_lock.hpp"
+#include "daemon/tools/farm/signs_of_life.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"

@@ -1,5 +1,5 @@
 // How frames are divided, and that a plan is read back as it was written, or refused.
-#include "daemon/farm/job.hpp"
+#include "daemon/tools/farm/job.hpp"
 
 #include <nlohmann/json.hpp>
 

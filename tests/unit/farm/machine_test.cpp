@@ -1,5 +1,5 @@
 // What keeps a machine from a task is found before its first frame, and said in one line.
-#include "daemon/farm/machine.hpp"
+#include "daemon/tools/farm/machine.hpp"
 
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"

@@ -1,9 +1,9 @@
 // What the scheduler and the shell are given, whatever is in the names.
-#include "daemon/farm/scripts.hpp"
+#include "daemon/tools/farm/scripts.hpp"
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/farm/program.hpp"
+#include "daemon/tools/farm/program.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 

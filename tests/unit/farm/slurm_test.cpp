@@ -1,8 +1,8 @@
 // What Slurm's programs are asked, and what their answers mean. In their place stand scripts that
 // write down their arguments; tests/farm does the same with a real cluster.
-#include "daemon/farm/slurm.hpp"
+#include "daemon/tools/farm/slurm.hpp"
 
-#include "daemon/farm/program.hpp"
+#include "daemon/tools/farm/program.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"

@@ -1,10 +1,10 @@
-// What `previzd farm status` says, by a job's folder and the answers of a Slurm that scripts stand
+// What `previz farm status` says, by a job's folder and the answers of a Slurm that scripts stand
 // in for.
-#include "daemon/farm/status.hpp"
+#include "daemon/tools/farm/status.hpp"
 
-#include "daemon/farm/farm.hpp"
-#include "daemon/farm/finish.hpp"
-#include "drivers/printable.hpp"
+#include "daemon/core/report/printable.hpp"
+#include "daemon/tools/farm/farm.hpp"
+#include "daemon/tools/farm/finish.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
@@ -111,7 +111,7 @@ TEST_F(FarmStatus, OfATaskThatIsGoneIsAFailure) {
             "0 of 4 frames done, 0 tasks running, 2 failed\n"
             "task 0, frames 0 to 1 of 12A: ended on node1 with 0 of 2 frames done\n"
             "task 1, frames 2 to 3 of 12A: node1: no Vulkan device\n"
-            "nothing runs: `previzd farm retry` renders what is missing\n");
+            "nothing runs: `previz farm retry` renders what is missing\n");
 }
 
 // The folder was moved, or is given by another path: a retry would submit all again.
@@ -122,7 +122,7 @@ TEST_F(FarmStatus, NamesJobsOfAnotherName) {
 }
 
 TEST_F(FarmStatus, SaysWhatIsToBeDoneAfterALastStepThatFailed) {
-  const std::string finish = "`previzd farm finish " + folder_.path().string() + "`";
+  const std::string finish = "`previz farm finish " + folder_.path().string() + "`";
   JobStatus status = all_done();
   EXPECT_EQ(words(status),
             "4 of 4 frames done, 0 tasks running, 0 failed\nthe last step has not run; " + finish +

@@ -1,7 +1,7 @@
 // What a submission leaves behind, and what it takes from an earlier one. Scripts stand in for
 // Slurm's programs.
-#include "daemon/farm/farm.hpp"
-#include "daemon/post/render.hpp"
+#include "daemon/tools/farm/farm.hpp"
+#include "daemon/tools/post/render.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
@@ -155,7 +155,7 @@ TEST_F(FarmSubmission, ThatIsCanceledIsStopped) {
   stand_in("squeue", "echo '17_0|0|RUNNING|node1|None'");
   cancel(job(), out_);
   EXPECT_THAT(out_.str(), HasSubstr(": canceled; "));
-  EXPECT_EQ(folder_.read_stopped(), "`previzd farm cancel`\n");
+  EXPECT_EQ(folder_.read_stopped(), "`previz farm cancel`\n");
   stand_in("squeue", "");
   retry(job(), out_);
   EXPECT_EQ(folder_.read_stopped(), "");

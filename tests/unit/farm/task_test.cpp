@@ -1,17 +1,17 @@
 // A whole job on a small take, without a scheduler: plan, tasks, last step. What stands in
 // JOB/state and JOB/missing.json is what the crew reads in the morning.
-#include "daemon/farm/task.hpp"
+#include "daemon/tools/farm/task.hpp"
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/farm/farm.hpp"
-#include "daemon/farm/finish.hpp"
-#include "daemon/farm/plan.hpp"
-#include "daemon/farm/status.hpp"
-#include "daemon/post/folder_locks.hpp"
-#include "daemon/post/render.hpp"
-#include "drivers/session/draft.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/session/draft.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/tools/farm/farm.hpp"
+#include "daemon/tools/farm/finish.hpp"
+#include "daemon/tools/farm/plan.hpp"
+#include "daemon/tools/farm/status.hpp"
+#include "daemon/tools/post/folder_locks.hpp"
+#include "daemon/tools/post/render.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
@@ -177,7 +177,7 @@ TEST_F(FarmTask, ThatIsMissingIsNamedAndTriedAgain) {
   EXPECT_EQ(run(2), task_status::done);
   EXPECT_EQ(finish(), task_status::machine_fault);
   EXPECT_THAT(out_.str(), HasSubstr("session: frames 3 to 5: not begun"));
-  EXPECT_THAT(out_.str(), HasSubstr("3 frames are missing; `previzd farm retry`"));
+  EXPECT_THAT(out_.str(), HasSubstr("3 frames are missing; `previz farm retry`"));
   const auto missing = nlohmann::json::parse(content_of(folder_.missing_file()));
   EXPECT_EQ(missing[0]["frames"], (std::vector<int>{3, 4, 5}));
   const auto before = std::filesystem::last_write_time(directory_ / "out/0000.exr");
@@ -239,7 +239,7 @@ TEST_F(FarmTask, ThatMergesNeedsAllSums) {
   EXPECT_EQ(run(4), task_status::missing_sums);
   EXPECT_EQ(state_of(folder_.read_state(4)),
             "machine: chunk 1 (frames 0 to 3 of session, sample range 2 of 2) is not rendered, so "
-            "that there is nothing to merge; `previzd farm retry` renders it");
+            "that there is nothing to merge; `previz farm retry` renders it");
   EXPECT_EQ(run(5), task_status::done) << out_.str();
   EXPECT_EQ(finish(), task_status::machine_fault);
   run_all();

@@ -1,5 +1,5 @@
 // Tests which edges a body of triangles has.
-#include "daemon/fit/feature_edges.hpp"
+#include "daemon/core/fit/feature_edges.hpp"
 
 #include "tests/support/real_bodies.hpp"
 

@@ -1,5 +1,5 @@
 // How far a model is off, in pictures that are drawn exactly.
-#include "daemon/fit/figure.hpp"
+#include "daemon/core/fit/figure.hpp"
 
 #include "tests/support/real_bodies.hpp"
 

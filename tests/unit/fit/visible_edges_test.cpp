@@ -1,7 +1,7 @@
 // Tests which edges of a model a camera sees, and in which of them light is looked for.
-#include "daemon/fit/visible_edges.hpp"
+#include "daemon/core/fit/visible_edges.hpp"
 
-#include "daemon/fit/light_edge.hpp"
+#include "daemon/core/fit/light_edge.hpp"
 #include "tests/support/real_bodies.hpp"
 
 namespace previz::visible_edges_test {

@@ -1,8 +1,8 @@
 // Brackets whose exposures are not of the same light: what has moved, what was switched, what is
 // missing, what is stated wrongly.
-#include "daemon/lighting/bracket.hpp"
+#include "daemon/core/lighting/bracket.hpp"
 
-#include "daemon/lighting/hdr.hpp"
+#include "daemon/core/lighting/hdr.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"

@@ -10,8 +10,8 @@
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 
-#include "daemon/lighting/lighting.hpp"
-#include "daemon/lighting/picture_file.hpp"
+#include "daemon/core/lighting/lighting.hpp"
+#include "daemon/core/lighting/picture_file.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

@@ -2,8 +2,8 @@
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
 
-#include "daemon/lighting/exr_picture.hpp"
-#include "daemon/lighting/lighting.hpp"
+#include "daemon/core/lighting/exr_picture.hpp"
+#include "daemon/core/lighting/lighting.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -103,7 +103,7 @@ TEST_F(LoadEnvironment, KeepsFluxAndIrradiance) {
   }
 }
 
-// What `previzd calibrate balance` prints makes up for an environment that does not fit the camera.
+// What `previz calibrate balance` prints makes up for an environment that does not fit the camera.
 TEST_F(LoadEnvironment, IsMultipliedByTheBalanceAndTheGain) {
   write_exr_picture(file, rough_sky(64));
   const EnvironmentMap plain = load_environment(settings).environment;

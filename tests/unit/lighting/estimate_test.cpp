@@ -1,5 +1,5 @@
 // From made-up skies through made-up fisheye pictures to the map, and back to the sky.
-#include "daemon/lighting/lighting.hpp"
+#include "daemon/core/lighting/lighting.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"

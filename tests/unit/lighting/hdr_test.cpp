@@ -1,6 +1,6 @@
-#include "daemon/lighting/hdr.hpp"
+#include "daemon/core/lighting/hdr.hpp"
 
-#include "daemon/lighting/response.hpp"
+#include "daemon/core/lighting/response.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"

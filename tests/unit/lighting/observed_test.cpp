@@ -1,8 +1,8 @@
 // The unseen part of the light filled with what the film camera saw there.
-#include "daemon/lighting/observed.hpp"
+#include "daemon/core/lighting/observed.hpp"
 
-#include "daemon/lighting/lighting.hpp"
-#include "daemon/lighting/response.hpp"
+#include "daemon/core/lighting/lighting.hpp"
+#include "daemon/core/lighting/response.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/lighting_pictures.hpp"

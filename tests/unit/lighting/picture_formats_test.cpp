@@ -1,7 +1,7 @@
 // What an environment's picture may be besides a latitude-longitude OpenEXR: Radiance .hdr, a cube
 // cross; and what is said about everything else.
-#include "daemon/lighting/lighting.hpp"
-#include "daemon/lighting/picture_file.hpp"
+#include "daemon/core/lighting/lighting.hpp"
+#include "daemon/core/lighting/picture_file.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/temporary_directory.hpp"

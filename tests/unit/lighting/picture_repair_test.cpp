@@ -1,5 +1,5 @@
 // Pixels of an environment that hold no radiance: the sun of a file that overflowed, and damage.
-#include "daemon/lighting/lighting.hpp"
+#include "daemon/core/lighting/lighting.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

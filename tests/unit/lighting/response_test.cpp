@@ -1,4 +1,4 @@
-#include "daemon/lighting/response.hpp"
+#include "daemon/core/lighting/response.hpp"
 
 #include "tests/support/test.hpp"
 

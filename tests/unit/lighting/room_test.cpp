@@ -1,9 +1,9 @@
 // A lamp in a room, seen from the light camera, put where it stands as seen from the set.
-#include "daemon/lighting/room.hpp"
+#include "daemon/core/lighting/room.hpp"
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "daemon/lighting/lighting.hpp"
+#include "daemon/core/lighting/lighting.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"

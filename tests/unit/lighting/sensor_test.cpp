@@ -1,6 +1,6 @@
 // What lens and sensor do to a picture besides the response, and what is done where it clips.
-#include "daemon/lighting/expansion.hpp"
-#include "daemon/lighting/lighting.hpp"
+#include "daemon/core/lighting/expansion.hpp"
+#include "daemon/core/lighting/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"
 

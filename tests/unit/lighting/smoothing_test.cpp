@@ -1,4 +1,4 @@
-#include "daemon/lighting/smoothing.hpp"
+#include "daemon/core/lighting/smoothing.hpp"
 
 #include "tests/support/test.hpp"
 

@@ -1,9 +1,9 @@
 // Light sources taken out of environment maps made by code, and what is left.
-#include "daemon/lighting/sources.hpp"
+#include "daemon/core/lighting/sources.hpp"
 
-#include "daemon/lighting/bright_regions.hpp"
-#include "daemon/lighting/light_mode.hpp"
-#include "daemon/lighting/source_tracker.hpp"
+#include "daemon/core/lighting/bright_regions.hpp"
+#include "daemon/core/lighting/light_mode.hpp"
+#include "daemon/core/lighting/source_tracker.hpp"
 #include "shaders/lib/octahedral.h"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"

@@ -1,5 +1,5 @@
 // The edges of a model in pictures that are drawn exactly: what the marks left open is found.
-#include "daemon/model/edges.hpp"
+#include "daemon/tools/model/edges.hpp"
 
 #include "tests/support/tracking_synthetic.hpp"
 #include "tests/unit/model/marked_scene.hpp"

@@ -1,7 +1,7 @@
 // The adjustment: right within the accuracy that it states, and clear about what it cannot know.
-#include "daemon/model/fit.hpp"
+#include "daemon/tools/model/fit.hpp"
 
-#include "daemon/model/solids.hpp"
+#include "daemon/tools/model/solids.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 #include "tests/support/units.hpp"
 #include "tests/unit/model/marked_scene.hpp"

@@ -1,9 +1,9 @@
 // The model as a file: our own reader gets back what was written.
-#include "daemon/model/glb.hpp"
+#include "daemon/tools/model/glb.hpp"
 
-#include "daemon/model/solids.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/set/load.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/tools/model/solids.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 

@@ -1,7 +1,7 @@
 // A scene that is known, and what a person would mark in pictures of it.
 #pragma once
 
-#include "daemon/model/fit.hpp"
+#include "daemon/tools/model/fit.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::test {

@@ -1,14 +1,14 @@
 // The command on the bundled take: from marks in its pictures to a phantom in the set file.
-#include "daemon/model/model.hpp"
+#include "daemon/tools/model/model.hpp"
 
 #include <fmt/format.h>
 
-#include "daemon/calibrate/known_camera.hpp"
-#include "daemon/model/parts.hpp"
-#include "daemon/model/views.hpp"
-#include "daemon/output/png.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/set/load.hpp"
+#include "daemon/core/output/png.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/tools/calibrate/known_camera.hpp"
+#include "daemon/tools/model/parts.hpp"
+#include "daemon/tools/model/views.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

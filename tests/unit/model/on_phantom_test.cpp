@@ -1,5 +1,5 @@
 // Tags are put onto the surface of a phantom that is not quite where the tags' own plane is.
-#include "daemon/model/on_phantom.hpp"
+#include "daemon/tools/model/on_phantom.hpp"
 
 #include "tests/support/scenes.hpp"
 #include "tests/support/test.hpp"

@@ -1,5 +1,5 @@
 // The file of parts: what it holds, and what is said of its mistakes.
-#include "daemon/model/parts.hpp"
+#include "daemon/tools/model/parts.hpp"
 
 #include "tests/support/test.hpp"
 

@@ -1,14 +1,14 @@
 // The model of what was marked on the rig: a take in whose events somebody has marked three corners
 // of a cube.
-#include "daemon/model/rig_marks.hpp"
+#include "daemon/tools/model/rig_marks.hpp"
 
-#include "daemon/model/model.hpp"
-#include "daemon/model/parts_text.hpp"
-#include "daemon/set/load.hpp"
-#include "drivers/session/files.hpp"
-#include "drivers/session/json_lines.hpp"
-#include "drivers/session/marks.hpp"
-#include "drivers/session/session.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/core/session/json_lines.hpp"
+#include "daemon/core/session/marks.hpp"
+#include "daemon/core/session/session.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/tools/model/model.hpp"
+#include "daemon/tools/model/parts_text.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

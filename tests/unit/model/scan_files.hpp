@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "daemon/model/scan_mesh.hpp"
+#include "daemon/tools/model/scan_mesh.hpp"
 
 namespace previz::test {
 

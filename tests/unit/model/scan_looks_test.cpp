@@ -1,5 +1,5 @@
 // Scans: the colours that their files have, and scans in glTF.
-#include "daemon/model/scan_read.hpp"
+#include "daemon/tools/model/scan_read.hpp"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,8 @@
 #include <functional>
 #include <glm/geometric.hpp>
 
-#include "daemon/model/glb.hpp"
-#include "daemon/model/scan_mesh.hpp"
+#include "daemon/tools/model/glb.hpp"
+#include "daemon/tools/model/scan_mesh.hpp"
 #include "drivers/box/in_child.hpp"
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/temporary_directory.hpp"

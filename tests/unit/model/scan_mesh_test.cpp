@@ -1,7 +1,7 @@
 // The surface of a scan: welded, mended, shaded and simplified.
-#include "daemon/model/scan_mesh.hpp"
+#include "daemon/tools/model/scan_mesh.hpp"
 
-#include "daemon/model/scan_simplify.hpp"
+#include "daemon/tools/model/scan_simplify.hpp"
 #include "tests/support/test.hpp"
 #include "tests/unit/model/scan_files.hpp"
 

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/model/scan_read.hpp"
+#include "daemon/tools/model/scan_read.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 

@@ -1,5 +1,5 @@
 // Scans: read from each kind of file, in each of its dialects.
-#include "daemon/model/scan_read.hpp"
+#include "daemon/tools/model/scan_read.hpp"
 
 #include <fmt/format.h>
 
@@ -11,8 +11,8 @@
 #include <functional>
 #include <glm/geometric.hpp>
 
-#include "daemon/model/glb.hpp"
-#include "daemon/model/scan_mesh.hpp"
+#include "daemon/tools/model/glb.hpp"
+#include "daemon/tools/model/scan_mesh.hpp"
 #include "drivers/box/in_child.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -1,5 +1,5 @@
 // Scans that are placed by the tags of the set that their own colours show.
-#include "daemon/model/scans.hpp"
+#include "daemon/tools/model/scans.hpp"
 
 #include <limits>
 

@@ -1,12 +1,12 @@
 // Scans that are placed by points that are marked in pictures.
-#include "daemon/model/scans.hpp"
+#include "daemon/tools/model/scans.hpp"
 
 #include <fmt/format.h>
 
-#include "daemon/model/glb.hpp"
-#include "daemon/model/scan_place.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/set/load.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/tools/model/glb.hpp"
+#include "daemon/tools/model/scan_place.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 #include "tests/unit/model/marked_scene.hpp"

@@ -1,5 +1,5 @@
 // Closed geometry: nothing leaks where parts meet, and faces look outwards.
-#include "daemon/model/solids.hpp"
+#include "daemon/tools/model/solids.hpp"
 
 #include "tests/support/tracking_synthetic.hpp"
 #include "tests/unit/model/marked_scene.hpp"

@@ -9,7 +9,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "daemon/set/set.hpp"
+#include "daemon/core/set/set.hpp"
 
 namespace previz::test {
 

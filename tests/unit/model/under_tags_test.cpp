@@ -1,9 +1,9 @@
 // Tests what a picture shows in place of hidden tags: the surface around them, continued.
-#include "daemon/model/under_tags.hpp"
+#include "daemon/tools/model/under_tags.hpp"
 
 #include <glm/geometric.hpp>
 
-#include "daemon/tracking/tag_family.hpp"
+#include "daemon/core/tracking/tag_family.hpp"
 #include "tests/support/scenes.hpp"
 #include "tests/support/test.hpp"
 

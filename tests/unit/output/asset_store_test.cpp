@@ -1,13 +1,13 @@
 // The files that takes need: kept once, as they were when the set was loaded, and linked into
 // takes.
-#include "daemon/output/asset_store.hpp"
+#include "daemon/core/output/asset_store.hpp"
 
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "daemon/core/session/files.hpp"
 #include "drivers/descriptor.hpp"
-#include "drivers/session/files.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"

@@ -1,5 +1,5 @@
 // The EXR that carries every layer: exact names, exact values, honest header.
-#include "daemon/output/exr.hpp"
+#include "daemon/core/output/exr.hpp"
 
 #include <ImfArray.h>
 #include <ImfChannelList.h>
@@ -12,8 +12,8 @@
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 
-#include "daemon/output/exr_file.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/output/exr_file.hpp"
+#include "daemon/core/session/files.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/full_disk.hpp"
 #include "tests/support/temporary_directory.hpp"

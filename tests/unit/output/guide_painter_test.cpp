@@ -1,5 +1,5 @@
 // Lines over a picture as tiles: where they lie on the screen, and that they are few.
-#include "daemon/output/guide_painter.hpp"
+#include "daemon/core/output/guide_painter.hpp"
 
 #include "tests/support/test.hpp"
 

@@ -1,5 +1,5 @@
 // The overlay as pixels: boxes that fit, do not overlap, and can be read on any picture.
-#include "daemon/output/osd_painter.hpp"
+#include "daemon/core/output/osd_painter.hpp"
 
 #include "tests/support/test.hpp"
 

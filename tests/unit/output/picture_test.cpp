@@ -1,6 +1,6 @@
 // PNG pictures return bit for bit; the review video keeps the capture times.
-#include "daemon/output/png.hpp"
-#include "daemon/output/video.hpp"
+#include "daemon/core/output/png.hpp"
+#include "daemon/core/output/video.hpp"
 #include "drivers/av.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/temporary_directory.hpp"

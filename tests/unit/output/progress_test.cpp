@@ -1,5 +1,5 @@
 // What people see while a long job runs.
-#include "daemon/output/progress.hpp"
+#include "daemon/core/output/progress.hpp"
 
 #include "tests/support/test.hpp"
 

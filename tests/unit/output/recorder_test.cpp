@@ -1,5 +1,5 @@
 // Takes: every frame is in them or counted, whatever happens to process and disk.
-#include "daemon/output/recorder.hpp"
+#include "daemon/core/output/recorder.hpp"
 
 #include "drivers/bracket.hpp"
 #include "tests/support/child_process.hpp"

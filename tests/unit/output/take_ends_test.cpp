@@ -3,7 +3,7 @@
 #include <fcntl.h>
 #include <sys/stat.h>
 
-#include "drivers/session/files.hpp"
+#include "daemon/core/session/files.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/cut_off_take.hpp"
 #include "tests/support/recorder_fixture.hpp"

@@ -1,8 +1,8 @@
 // A recording that goes on in a second folder, and what is kept before the button.
-#include "daemon/output/take_folders.hpp"
+#include "daemon/core/output/take_folders.hpp"
 
-#include "daemon/output/folder_watch.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/output/folder_watch.hpp"
+#include "daemon/core/session/files.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/recorder_fixture.hpp"
 #include "tests/support/test.hpp"

@@ -1,5 +1,5 @@
 // Mailboxes keep the newest and count the rest; queues keep everything in order; both end cleanly.
-#include "daemon/pipeline/channel.hpp"
+#include "daemon/core/pipeline/channel.hpp"
 
 #include "tests/support/test.hpp"
 

@@ -1,5 +1,5 @@
 // The frame rate governor on simulated renderers: what a frame costs is written down, not measured.
-#include "daemon/pipeline/governor.hpp"
+#include "daemon/core/pipeline/governor.hpp"
 
 #include "tests/support/test.hpp"
 

@@ -1,8 +1,8 @@
 // Lamps that the set declares and the light camera sees shine once, and can be dimmed and removed.
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "daemon/pipeline/light_stage.hpp"
-#include "daemon/pipeline/relight.hpp"
+#include "daemon/core/pipeline/light_stage.hpp"
+#include "daemon/core/pipeline/relight.hpp"
 #include "tests/support/lighting.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"

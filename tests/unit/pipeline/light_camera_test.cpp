@@ -1,7 +1,7 @@
 // The light from frame to frame: what is switched, what is static, what cannot be used, and that
 // nobody waits for it.
-#include "daemon/pipeline/light_feed.hpp"
-#include "daemon/pipeline/light_stage.hpp"
+#include "daemon/core/pipeline/light_feed.hpp"
+#include "daemon/core/pipeline/light_stage.hpp"
 #include "drivers/bracket.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/gltf_writer.hpp"

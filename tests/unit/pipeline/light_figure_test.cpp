@@ -1,7 +1,7 @@
 // How bright the model comes out beside the picture: what counts, and what is said of it.
-#include "daemon/pipeline/light_figure.hpp"
+#include "daemon/core/pipeline/light_figure.hpp"
 
-#include "daemon/render/composite.hpp"
+#include "daemon/core/render/picture/composite.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::pipeline::light_figure_test {
@@ -46,7 +46,7 @@ TEST(LightFigure, IsTheFactorOfEachChannel) {
   EXPECT_EQ(figure->tiles, 16u);
   const std::string remark = light_remark(*figure);
   EXPECT_NE(remark.find("1.1 1.6 1.9 times as bright as the picture"), std::string::npos) << remark;
-  EXPECT_NE(remark.find("previzd calibrate balance"), std::string::npos) << remark;
+  EXPECT_NE(remark.find("previz calibrate balance"), std::string::npos) << remark;
 }
 
 TEST(LightFigure, IsNotRemarkedOnWhereTheModelFits) {

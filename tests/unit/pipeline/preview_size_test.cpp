@@ -1,9 +1,9 @@
 // A preview's smaller picture is the same view through larger pixels, averaged in linear light.
-#include "daemon/pipeline/preview_size.hpp"
+#include "daemon/core/pipeline/preview_size.hpp"
 
-#include "daemon/pipeline/render_stage.hpp"
-#include "daemon/pipeline/take.hpp"
-#include "daemon/scene/load.hpp"
+#include "daemon/core/pipeline/render_stage.hpp"
+#include "daemon/core/pipeline/take.hpp"
+#include "daemon/core/scene/load.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"

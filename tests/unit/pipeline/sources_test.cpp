@@ -1,6 +1,6 @@
 // Light sources from frame to frame, and light from a recording.
-#include "daemon/pipeline/light_stage.hpp"
-#include "daemon/pipeline/track_stage.hpp"
+#include "daemon/core/pipeline/light_stage.hpp"
+#include "daemon/core/pipeline/track_stage.hpp"
 #include "tests/support/lighting_pictures.hpp"
 #include "tests/support/test.hpp"
 

@@ -1,6 +1,6 @@
 // A part that fails, and a thread that hangs, without a pipeline around them and in a time that is
 // made up.
-#include "daemon/pipeline/stage_keeper.hpp"
+#include "daemon/core/pipeline/stage_keeper.hpp"
 
 #include "tests/support/test.hpp"
 

@@ -1,9 +1,9 @@
 // A line of stages ends in order at the stream's end, cleanly at a stop, and at once at an error.
-#include "daemon/pipeline/stages.hpp"
+#include "daemon/core/pipeline/stages.hpp"
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/pipeline/metrics.hpp"
+#include "daemon/core/pipeline/metrics.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/wait_until.hpp"
 

@@ -1,7 +1,7 @@
 // The tracked and lit shots of a recorded take.
-#include "daemon/pipeline/take_shots.hpp"
+#include "daemon/core/pipeline/take_shots.hpp"
+#include "daemon/core/session/files.hpp"
 #include "drivers/plate.hpp"
-#include "drivers/session/files.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -1,6 +1,6 @@
 // Which frames each of several processes renders that share a take: here two objects that have the
 // same folder open.
-#include "daemon/post/frames_to_render.hpp"
+#include "daemon/tools/post/frames_to_render.hpp"
 
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

@@ -2,11 +2,11 @@
 // nobody waits for ever, and what is no file is named.
 #include <sys/stat.h>
 
-#include "daemon/output/salvage.hpp"
-#include "daemon/pipeline/take.hpp"
-#include "daemon/post/takes.hpp"
-#include "drivers/session/draft.hpp"
-#include "drivers/session/summary.hpp"
+#include "daemon/core/output/salvage.hpp"
+#include "daemon/core/pipeline/take.hpp"
+#include "daemon/core/session/draft.hpp"
+#include "daemon/core/session/summary.hpp"
+#include "daemon/tools/post/takes.hpp"
 #include "tests/support/child_process.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"

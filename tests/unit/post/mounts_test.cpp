@@ -1,4 +1,4 @@
-#include "daemon/post/mounts.hpp"
+#include "daemon/tools/post/mounts.hpp"
 
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -1,12 +1,12 @@
-// `previzd render` of pictures that are averaged with their neighbours in time, on a small take:
+// `previz render` of pictures that are averaged with their neighbours in time, on a small take:
 // whatever part of it is rendered, and by whom, the files are the same.
-#include "daemon/output/exr.hpp"
-#include "daemon/output/png.hpp"
-#include "daemon/pipeline/render_stage.hpp"
-#include "daemon/pipeline/take.hpp"
-#include "daemon/pipeline/take_shots.hpp"
-#include "daemon/post/render.hpp"
-#include "daemon/scene/load.hpp"
+#include "daemon/core/output/exr.hpp"
+#include "daemon/core/output/png.hpp"
+#include "daemon/core/pipeline/render_stage.hpp"
+#include "daemon/core/pipeline/take.hpp"
+#include "daemon/core/pipeline/take_shots.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/tools/post/render.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/test.hpp"

@@ -1,15 +1,15 @@
-// `previzd render` and `previzd run` from end to end on a small take, on whatever Vulkan device
+// `previz render` and `previzd run` from end to end on a small take, on whatever Vulkan device
 // there is (Mesa's CPU driver where there is no GPU).
-#include "daemon/post/render.hpp"
+#include "daemon/tools/post/render.hpp"
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/output/exr.hpp"
-#include "daemon/output/png.hpp"
-#include "daemon/pipeline/preview_size.hpp"
+#include "daemon/core/output/exr.hpp"
+#include "daemon/core/output/png.hpp"
+#include "daemon/core/pipeline/preview_size.hpp"
+#include "daemon/core/session/files.hpp"
 #include "daemon/rig/live.hpp"
 #include "drivers/plate.hpp"
-#include "drivers/session/files.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -261,7 +261,7 @@ TEST_F(RenderSession, ALightThatDoesNotFitThePictureIsSaid) {
   render(options);
   EXPECT_NE(out_.str().find("light: the model under this light is "), std::string::npos)
       << out_.str();
-  EXPECT_NE(out_.str().find("previzd calibrate balance"), std::string::npos) << out_.str();
+  EXPECT_NE(out_.str().find("previz calibrate balance"), std::string::npos) << out_.str();
   EXPECT_NE(out_.str().find("light: shadows would have taken more light"), std::string::npos)
       << out_.str();
   for (const glm::vec3& value : layers.composite)
@@ -491,7 +491,7 @@ TEST_F(RenderSession, LiveTakesTheSamplesItIsAskedFor) {
   options.samples = 3;  // the set says 2
   std::atomic<bool> rendered = false;
   std::set<int> samples;  // of the pictures that were rendered whole
-  options.on_shown = [&](const pipeline::Shot& shot, const rig::Look&) {
+  options.on_shown = [&](const pipeline::Shot& shot, const live::Look&) {
     if (!shot.whole || !shot.untouched.empty()) return;
     samples.insert(shot.samples);
     rendered = true;
@@ -517,7 +517,7 @@ TEST_F(RenderSession, LiveFillsTheLightFromTheFilmCamera) {
   write_take(true, "[lighting]\nunseen = \"observer\"\n");
   rig::LiveOptions options = live_options();
   std::atomic<bool> lit = false;
-  options.on_shown = [&](const pipeline::Shot& shot, const rig::Look&) {
+  options.on_shown = [&](const pipeline::Shot& shot, const live::Look&) {
     if (shot.light) lit = true;
   };
   const pipeline::MetricsSnapshot metrics =

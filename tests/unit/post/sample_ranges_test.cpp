@@ -1,12 +1,12 @@
-// `previzd render --sample-range` and `previzd merge`: a take whose frames' samples are rendered in
+// `previz render --sample-range` and `previz merge`: a take whose frames' samples are rendered in
 // ranges has the files of one that is rendered as a whole.
-#include "daemon/post/sample_ranges.hpp"
+#include "daemon/tools/post/sample_ranges.hpp"
 
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "daemon/output/sums_exr.hpp"
-#include "daemon/post/render.hpp"
+#include "daemon/core/output/sums_exr.hpp"
+#include "daemon/tools/post/render.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/test.hpp"

@@ -1,13 +1,13 @@
 // Takes are listed, marked, checked, copied and deleted, and nothing else is.
-#include "daemon/post/takes.hpp"
+#include "daemon/tools/post/takes.hpp"
 
-#include "daemon/output/take_folders.hpp"
-#include "daemon/output/take_list.hpp"
-#include "daemon/post/render_folder.hpp"
-#include "daemon/post/render_takes.hpp"
-#include "daemon/post/take_copy.hpp"
-#include "drivers/session/draft.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/output/take_folders.hpp"
+#include "daemon/core/output/take_list.hpp"
+#include "daemon/core/session/draft.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/tools/post/render_folder.hpp"
+#include "daemon/tools/post/render_takes.hpp"
+#include "daemon/tools/post/take_copy.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -327,7 +327,7 @@ TEST_F(Takes, NoTakeOfThatKindIsSaid) {
   RenderOptions options;
   options.session = folder_;
   EXPECT_THAT(test::error_of([&] { render_takes(options, WhichTakes::good, out_); }),
-              HasSubstr("no take in it is marked good; `previzd takes mark TAKE`"));
+              HasSubstr("no take in it is marked good; `previz takes mark TAKE`"));
   options.session = directory_ / "nowhere";
   EXPECT_THAT(test::error_of([&] { render_takes(options, WhichTakes::all, out_); }),
               HasSubstr("contains no takes"));

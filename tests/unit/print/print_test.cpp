@@ -1,16 +1,16 @@
-// What `previzd print` draws, rasterised as a printer would: ids, sizes and places in millimetres.
+// What `previz print` draws, rasterised as a printer would: ids, sizes and places in millimetres.
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "daemon/calibrate/lens/board_finder.hpp"
-#include "daemon/print/boards.hpp"
-#include "daemon/print/pdf.hpp"
-#include "daemon/print/print.hpp"
-#include "daemon/print/tag_cells.hpp"
-#include "daemon/print/tags.hpp"
-#include "daemon/tracking/tag_detector.hpp"
-#include "drivers/session/draft.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/core/session/draft.hpp"
+#include "daemon/core/session/files.hpp"
+#include "daemon/core/tracking/tag_detector.hpp"
+#include "daemon/tools/calibrate/lens/board_finder.hpp"
+#include "daemon/tools/print/boards.hpp"
+#include "daemon/tools/print/pdf.hpp"
+#include "daemon/tools/print/print.hpp"
+#include "daemon/tools/print/tag_cells.hpp"
+#include "daemon/tools/print/tags.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"

@@ -63,7 +63,7 @@ class Ending : public testing::Test {
 
   void make_job() {
     const test::Ended ended = test::run_program(
-        {"daemon/previzd", "farm", directory_ / "session", "--spp", "1000000", "--out",
+        {"daemon/previz", "farm", directory_ / "session", "--spp", "1000000", "--out",
          directory_ / "new/it", "--job", directory_ / "job", "--openjd", directory_ / "job.json"});
     ASSERT_EQ(ended.status, 0) << ended.said;
   }
@@ -89,9 +89,9 @@ std::string name_of(const char* command) {
 INSTANTIATE_TEST_SUITE_P(
     OfEachCommand, FullOutput,
     testing::Values("daemon/previzd --help", "daemon/previzd --version",
-                    "daemon/previzd takes list TAKE", "daemon/previzd takes check TAKE",
+                    "daemon/previz takes list TAKE", "daemon/previz takes check TAKE",
                     "daemon/previzd check SET", "daemon/previzd devices --rules",
-                    "daemon/previzd farm TAKE --dry-run", "daemon/control/previzctl actions"),
+                    "daemon/previz farm TAKE --dry-run", "daemon/control/previzctl actions"),
     [](const auto& name) { return name_of(name.param); });
 
 // Commands that are confined write where they were asked to, also by links and by names of their
@@ -121,7 +121,7 @@ TEST_F(Ending, ConfinedCommandsWriteWhereTheyWereAskedTo) {
     return folder / "links" / name;
   };
   const auto run = [&](std::vector<std::string> words) {
-    words.insert(words.begin(), "daemon/previzd");
+    words.insert(words.begin(), "daemon/previz");
     const test::Ended ended = test::run_program(words);
     EXPECT_EQ(ended.status, 0) << ended.said;
     EXPECT_THAT(ended.said, Not(HasSubstr("cannot be kept"))) << ended.said;
@@ -164,12 +164,12 @@ TEST_F(Ending, WordsOfOthersAreShownAndNotObeyed) {
   const std::string escape = "x\x1b[31m", long_one(100'000, 'x');
   using Words = std::vector<std::string>;
   for (const Words& words :
-       {Words{"daemon/previzd", "takes", "list", takes.string()},
-        Words{"daemon/previzd", "takes", "check", (takes / "1_take001\nK_take009  good\x1b[2J")},
-        Words{"daemon/previzd", "takes", "list", escape},
-        Words{"daemon/previzd", "render", (directory_ / escape).string()},
-        Words{"daemon/previzd", "takes", "list", long_one},
-        Words{"daemon/previzd", "render", "--" + long_one, escape},
+       {Words{"daemon/previz", "takes", "list", takes.string()},
+        Words{"daemon/previz", "takes", "check", (takes / "1_take001\nK_take009  good\x1b[2J")},
+        Words{"daemon/previz", "takes", "list", escape},
+        Words{"daemon/previz", "render", (directory_ / escape).string()},
+        Words{"daemon/previz", "takes", "list", long_one},
+        Words{"daemon/previz", "render", "--" + long_one, escape},
         Words{"daemon/control/previzctl", "action", escape},
         Words{"daemon/control/previzctl", "action", long_one},
         Words{"daemon/control/previzctl", long_one}}) {
@@ -208,7 +208,7 @@ TEST_P(CrashedCommand, IsConfinedAndEndsWithALineAndWithoutHalfFiles) {
                                                .output = ""});
   EXPECT_FALSE(ended.ran_over);
   EXPECT_EQ(ended.status, is_task ? 75 : 1);
-  EXPECT_THAT(ended.said, HasSubstr("previzd: the command was stopped: Segmentation fault"));
+  EXPECT_THAT(ended.said, HasSubstr("previz: the command was stopped: Segmentation fault"));
   EXPECT_THAT(ended.worker_status, AllOf(HasSubstr("NoNewPrivs:\t1"), HasSubstr("Seccomp:\t2")));
   for (const auto& entry : fs::recursive_directory_iterator(directory_.path()))
     EXPECT_THAT(entry.path().string(), Not(HasSubstr(".part")));
@@ -220,11 +220,11 @@ TEST_P(CrashedCommand, IsConfinedAndEndsWithALineAndWithoutHalfFiles) {
 INSTANTIATE_TEST_SUITE_P(
     OfEachCommand, CrashedCommand,
     testing::Values(
-        "daemon/previzd import JSON NEW",
-        "daemon/previzd model PICTURES --tags-only --set FOOTAGE_SET",
-        "daemon/previzd calibrate observer PICTURES --board charuco:11x8:20mm:15mm:5x5_1000",
-        "daemon/previzd render TAKE --spp 1000000 --out NEW", "daemon/previzd trade TAKE --out NEW",
-        "daemon/previzd farm task JOB 0"),
+        "daemon/previz import JSON NEW",
+        "daemon/previz model PICTURES --tags-only --set FOOTAGE_SET",
+        "daemon/previz calibrate observer PICTURES --board charuco:11x8:20mm:15mm:5x5_1000",
+        "daemon/previz render TAKE --spp 1000000 --out NEW", "daemon/previz trade TAKE --out NEW",
+        "daemon/previz farm task JOB 0"),
     [](const auto& name) { return name_of(name.param); });
 
 class StoppedCommand : public Ending, public testing::WithParamInterface<const char*> {};
@@ -242,7 +242,7 @@ TEST_P(StoppedCommand, EndsWithItsSignalAndWithoutHalfFiles) {
   EXPECT_FALSE(ended.ran_over);
   EXPECT_EQ(ended.status, 128 + signal) << ended.seconds << " s: " << ended.said;
   const std::string command = GetParam();
-  if (command.find("previzd model ") != std::string::npos) {  // which looks for no stop
+  if (command.find("previz model ") != std::string::npos) {  // which looks for no stop
     EXPECT_LT(ended.seconds, 0.7 + 2);
   }
   for (const auto& entry : fs::recursive_directory_iterator(directory_.path()))
@@ -252,12 +252,12 @@ TEST_P(StoppedCommand, EndsWithItsSignalAndWithoutHalfFiles) {
 INSTANTIATE_TEST_SUITE_P(
     OfEachCommand, StoppedCommand,
     testing::Values(
-        "daemon/previzd import JSON NEW",
-        "daemon/previzd model PICTURES --tags-only --set FOOTAGE_SET",
-        "daemon/previzd calibrate observer PICTURES --board charuco:11x8:20mm:15mm:5x5_1000",
-        "daemon/previzd calibrate tags PICTURES --set FOOTAGE_SET",
-        "daemon/previzd bench --seconds 60", "daemon/previzd render TAKE --spp 1000000 --out NEW",
-        "daemon/previzd trade TAKE --out NEW", "daemon/previzd farm task JOB 0"),
+        "daemon/previz import JSON NEW",
+        "daemon/previz model PICTURES --tags-only --set FOOTAGE_SET",
+        "daemon/previz calibrate observer PICTURES --board charuco:11x8:20mm:15mm:5x5_1000",
+        "daemon/previz calibrate tags PICTURES --set FOOTAGE_SET",
+        "daemon/previzd bench --seconds 60", "daemon/previz render TAKE --spp 1000000 --out NEW",
+        "daemon/previz trade TAKE --out NEW", "daemon/previz farm task JOB 0"),
     [](const auto& name) { return name_of(name.param); });
 
 }  // namespace previz::endings_test

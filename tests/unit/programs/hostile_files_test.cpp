@@ -40,7 +40,8 @@ class HostileFile : public testing::Test {
 
   // Runs a command in which TAKE, SET and FILE stand for their paths.
   test::Ended run(const std::string& command, const fs::path& file) {
-    std::vector<std::string> words{"daemon/previzd"};
+    const bool is_of_the_rig = command.starts_with("check ") || command.starts_with("run ");
+    std::vector<std::string> words{is_of_the_rig ? "daemon/previzd" : "daemon/previz"};
     std::istringstream parts(command);
     for (std::string word; parts >> word;) {
       if (word == "TAKE") word = directory_ / "session";

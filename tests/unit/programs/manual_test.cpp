@@ -1,12 +1,13 @@
 // The manual pages and the completions say what the programs do.
 #include <CLI/CLI.hpp>
 
-#include "daemon/calibrate/lens/board.hpp"
 #include "daemon/command_line.hpp"
+#include "daemon/core/set/actions.hpp"
+#include "daemon/core/set/table.hpp"
 #include "daemon/manual/command.hpp"
 #include "daemon/manual/pages.hpp"
-#include "daemon/set/actions.hpp"
-#include "daemon/set/table.hpp"
+#include "daemon/tools/calibrate/lens/board.hpp"
+#include "daemon/tools/command_line.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
@@ -67,25 +68,25 @@ TEST(ManualPages, HaveEveryActionOfTheRig) {
 }
 
 TEST(ManualPages, ShowHowEachCommandIsCalled) {
-  const std::string text = page(man_pages(), "previzd.8");
-  EXPECT_THAT(text, HasSubstr(".SS \\fBprevizd render\\fR [\\fIOPTION\\fR...] \\fIsession\\fR\n"));
-  EXPECT_THAT(text, HasSubstr(".SS \\fBprevizd calibrate lens\\fR"));
+  const std::string text = page(man_pages(), "previz.1");
+  EXPECT_THAT(text, HasSubstr(".SS \\fBpreviz render\\fR [\\fIOPTION\\fR...] \\fIsession\\fR\n"));
+  EXPECT_THAT(text, HasSubstr(".SS \\fBpreviz calibrate lens\\fR"));
   EXPECT_THAT(text, HasSubstr("\\fB\\-\\-estimator\\fR \\fBpaired\\fR|\\fBdifference\\fR\n"));
 }
 
-std::vector<Command> previzd_commands() {
-  CLI::App app{"", "previzd"};
-  CommandLine said;
+std::vector<Command> previz_commands() {
+  CLI::App app{"", "previz"};
+  tools::CommandLine said;
   add_commands(app, said);
   return commands_of(app);
 }
 
 TEST(ManualPages, OfTheFarmHasEachOfItsCommandsAndOptions) {
-  const std::string text = page(man_pages(), "previzd-farm.1");
-  EXPECT_THAT(text, HasSubstr(".SH NAME\nprevizd\\-farm \\- Render takes on many machines"));
+  const std::string text = page(man_pages(), "previz-farm.1");
+  EXPECT_THAT(text, HasSubstr(".SH NAME\npreviz\\-farm \\- Render takes on many machines"));
   int commands = 0;
-  for (const Command& command : previzd_commands()) {
-    if (command.path != "previzd farm" && !command.path.starts_with("previzd farm ")) continue;
+  for (const Command& command : previz_commands()) {
+    if (command.path != "previz farm" && !command.path.starts_with("previz farm ")) continue;
     SCOPED_TRACE(command.path);
     ++commands;
     const std::size_t begin = text.find("\\fB" + command.path + "\\fR [");
@@ -102,9 +103,9 @@ TEST(ManualPages, OfTheFarmHasEachOfItsCommandsAndOptions) {
 }
 
 TEST(ManualPages, LeaveTheFarmsOptionsToItsOwnPage) {
-  const std::string text = page(man_pages(), "previzd.8");
-  EXPECT_THAT(text, HasSubstr(".SS \\fBprevizd farm\\fR"));
-  EXPECT_THAT(text, HasSubstr("See previzd\\-farm(1)."));
+  const std::string text = page(man_pages(), "previz.1");
+  EXPECT_THAT(text, HasSubstr(".SS \\fBpreviz farm\\fR"));
+  EXPECT_THAT(text, HasSubstr("See previz\\-farm(1)."));
   EXPECT_THAT(text, Not(HasSubstr("openjd")));
 }
 
@@ -126,15 +127,23 @@ std::vector<std::string> terms_of(const std::string& text, const std::string& se
 }
 
 TEST(ManualPages, HaveExamplesThatTheCommandLineUnderstands) {
-  std::vector<std::string> examples = terms_of(page(man_pages(), "previzd.8"), "EXAMPLES");
+  std::vector<std::string> of_the_rig = terms_of(page(man_pages(), "previzd.8"), "EXAMPLES");
+  EXPECT_GE(of_the_rig.size(), 8u);
+  for (const std::string& example : of_the_rig) {
+    CLI::App app{"", "previzd"};
+    CommandLine said;
+    add_commands(app, said);
+    EXPECT_NO_THROW(app.parse(example, true)) << example;
+  }
+  std::vector<std::string> examples = terms_of(page(man_pages(), "previz.1"), "EXAMPLES");
   EXPECT_GE(examples.size(), 8u);
-  const std::vector<std::string> of_farm = terms_of(page(man_pages(), "previzd-farm.1"), "EXAMPLE");
+  const std::vector<std::string> of_farm = terms_of(page(man_pages(), "previz-farm.1"), "EXAMPLE");
   EXPECT_GE(of_farm.size(), 5u);
   examples.insert(examples.end(), of_farm.begin(), of_farm.end());
   for (const std::string& example : examples) {
     SCOPED_TRACE(example);
-    CLI::App app{"", "previzd"};
-    CommandLine said;
+    CLI::App app{"", "previz"};
+    tools::CommandLine said;
     add_commands(app, said);
     EXPECT_NO_THROW(app.parse(example, true));
     for (const std::string& board : {said.calibrate.observer.board, said.calibrate.light.board})
@@ -188,16 +197,16 @@ std::vector<std::string> completed(const std::string& program,
 }
 
 TEST(BashCompletion, OffersCommandsOptionsAndChoices) {
-  EXPECT_THAT(completed("previzd", {""}),
-              IsSupersetOf({"run", "render", "calibrate", "--log-level", "--help"}));
-  EXPECT_THAT(completed("previzd", {"re"}), ElementsAre("render"));
-  EXPECT_THAT(completed("previzd", {"calibrate", "re"}), ElementsAre("response"));
-  EXPECT_THAT(completed("previzd", {"calibrate", "response", "--m"}), ElementsAre("--method"));
-  EXPECT_THAT(completed("previzd", {"render", "take", "--estimator", ""}),
+  EXPECT_THAT(completed("previz", {""}),
+              IsSupersetOf({"render", "calibrate", "--log-level", "--help"}));
+  EXPECT_THAT(completed("previz", {"re"}), ElementsAre("render"));
+  EXPECT_THAT(completed("previz", {"calibrate", "re"}), ElementsAre("response"));
+  EXPECT_THAT(completed("previz", {"calibrate", "response", "--m"}), ElementsAre("--method"));
+  EXPECT_THAT(completed("previz", {"render", "take", "--estimator", ""}),
               ElementsAre("paired", "difference"));
   EXPECT_THAT(completed("previzd", {"--log-level", "debug", "ch"}), ElementsAre("check"));
   // Files: nothing is offered, and bash then completes names of files itself.
-  EXPECT_THAT(completed("previzd", {"render", "take", "--set", ""}), ElementsAre());
+  EXPECT_THAT(completed("previz", {"render", "take", "--set", ""}), ElementsAre());
   EXPECT_THAT(completed("previzctl", {"mode", "st"}), ElementsAre("standby"));
 }
 

@@ -1,12 +1,12 @@
 // SIGINT and SIGTERM become a stop request that the pipeline sees.
-#include "daemon/signals.hpp"
+#include "daemon/core/program/signals.hpp"
 
 #include <unistd.h>
 
 #include <csignal>
 
-#include "daemon/pipeline/stages.hpp"
-#include "drivers/session/draft.hpp"
+#include "daemon/core/pipeline/stages.hpp"
+#include "daemon/core/session/draft.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 

@@ -1,6 +1,6 @@
 // Adaptive sampling: the estimated error is the true one, and samples go where it is.
-#include "daemon/pipeline/refinement.hpp"
-#include "daemon/render/error_estimate.hpp"
+#include "daemon/core/pipeline/refinement.hpp"
+#include "daemon/core/render/picture/error_estimate.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::adaptive_test {

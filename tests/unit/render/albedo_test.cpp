@@ -1,5 +1,5 @@
 // The tables of directional albedo against an independent quadrature.
-#include "daemon/render/albedo_table.hpp"
+#include "daemon/core/render/world/albedo_table.hpp"
 #include "shaders/lib/render_shared.h"
 #include "tests/support/test.hpp"
 #include "tests/truth/cpu_albedo.hpp"

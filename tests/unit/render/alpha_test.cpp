@@ -1,5 +1,5 @@
 // Surfaces that are not there everywhere, against closed forms.
-#include "daemon/render/device.hpp"
+#include "daemon/core/render/device/device.hpp"
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 

@@ -1,6 +1,6 @@
 // A CPU device that is treated as a graphics card: its pictures are those of a CPU device bit for
 // bit, and no access to memory lacks the barrier that a card would need.
-#include "daemon/render/device.hpp"
+#include "daemon/core/render/device/device.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::as_gpu_test {

@@ -1,6 +1,6 @@
 // Every buffer is made for something, and where a device has no memory for it the error says for
 // what, how much it is, and what to do.
-#include "daemon/render/buffer.hpp"
+#include "daemon/core/render/device/buffer.hpp"
 
 #include <set>
 

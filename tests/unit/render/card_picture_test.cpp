@@ -1,5 +1,5 @@
 // A picture that stays in the card's memory is shown from there, and is the one that comes down.
-#include "daemon/render/card_pictures.hpp"
+#include "daemon/core/render/device/card_pictures.hpp"
 #include "drivers/headless/headless_display.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 

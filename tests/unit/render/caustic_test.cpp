@@ -1,6 +1,6 @@
 // Light that a mirror throws onto a Lambert floor, brought by photons, against closed forms: a
 // plane mirror makes an image of the lamp, so the floor at p receives E(p) + E(p mirrored).
-#include "daemon/render/photon_schedule.hpp"
+#include "daemon/core/render/passes/photon_schedule.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::caustic_test {

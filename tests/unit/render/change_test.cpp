@@ -2,8 +2,8 @@
 // that trembles does not, a lamp that is switched does, and what moves does where it is near.
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "daemon/render/light_change.hpp"
-#include "daemon/render/moved_instances.hpp"
+#include "daemon/core/render/world/light_change.hpp"
+#include "daemon/core/render/world/moved_instances.hpp"
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 

@@ -2,7 +2,7 @@
 // them, and the picture is that of the same mesh in the same shape for good.
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "daemon/render/deformer.hpp"
+#include "daemon/core/render/world/deformer.hpp"
 #include "tests/support/bvh_decode.hpp"
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"

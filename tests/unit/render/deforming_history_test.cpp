@@ -1,6 +1,6 @@
 // What deforms keeps its past: each of its points moves as its own vertices do.
-#include "daemon/render/moved_instances.hpp"
-#include "daemon/scene/bvh_refit.hpp"
+#include "daemon/core/render/world/moved_instances.hpp"
+#include "daemon/core/scene/bvh_refit.hpp"
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/figure.hpp"
 

@@ -1,7 +1,7 @@
 // What a device does not allow is said with both numbers, before a driver is asked for it.
-#include "daemon/render/device_limits.hpp"
+#include "daemon/core/render/device/device_limits.hpp"
 
-#include "daemon/render/buffer.hpp"
+#include "daemon/core/render/device/buffer.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::device_limits_test {

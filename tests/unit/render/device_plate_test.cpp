@@ -1,8 +1,8 @@
 // A device makes the plate's codes of the camera's bytes as the computer does, bit for bit, and
 // pictures are those of the plate.
-#include "daemon/render/device_plate.hpp"
+#include "daemon/core/render/passes/device_plate.hpp"
 
-#include "daemon/render/device.hpp"
+#include "daemon/core/render/device/device.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::device_plate_test {

@@ -1,5 +1,5 @@
 // Direct light of every kind of lamp on a Lambert plane, against closed forms.
-#include "daemon/scene/placement.hpp"
+#include "daemon/core/scene/placement.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::direct_light_test {

@@ -1,6 +1,6 @@
 // Dithering: a difference of the worlds that is less than a code has the right mean, the pattern is
 // of high frequencies, and the plate stays what it is.
-#include "daemon/render/blue_noise.hpp"
+#include "daemon/core/render/picture/blue_noise.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::dither_test {

@@ -1,6 +1,6 @@
 // A rendering that is smaller than the camera's picture is put onto the whole of it, which stays as
 // sharp as the camera gave it.
-#include "daemon/render/enlarge.hpp"
+#include "daemon/core/render/picture/enlarge.hpp"
 
 #include "tests/support/pixels_by_hand.hpp"
 

@@ -1,5 +1,5 @@
 // When a frame needs which feature of the renderer, and what `previzd check` can say of each.
-#include "daemon/render/feature.hpp"
+#include "daemon/core/render/world/feature.hpp"
 
 #include "tests/support/scenes.hpp"
 #include "tests/support/test.hpp"

@@ -1,7 +1,7 @@
 // What a crew is told whose card no Vulkan driver finds.
-#include "daemon/render/graphics_cards.hpp"
+#include "daemon/core/render/device/graphics_cards.hpp"
 
-#include "daemon/render/gpu.hpp"
+#include "daemon/core/render/device/gpu.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 

@@ -1,5 +1,5 @@
 // Rays that the device's own units trace: pictures are those of our trees, but for rounding.
-#include "daemon/render/device.hpp"
+#include "daemon/core/render/device/device.hpp"
 #include "tests/support/figure.hpp"
 #include "tests/support/render_fixture.hpp"
 

@@ -1,6 +1,6 @@
 // What is accumulated over frames: noise falls as the samples add up, a moving camera leaves values
 // where they were, and nothing that has changed is still seen.
-#include "daemon/render/history.hpp"
+#include "daemon/core/render/passes/history.hpp"
 
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"

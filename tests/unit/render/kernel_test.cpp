@@ -1,6 +1,6 @@
 // A compute pass is described by its SPIR-V, takes its buffers by name, and says by its own name
 // what is wrong with a dispatch.
-#include "daemon/render/kernel.hpp"
+#include "daemon/core/render/device/kernel.hpp"
 
 #include "shaders/lib/render_shared.h"
 #include "shaders/prepare_shadow.spv.h"

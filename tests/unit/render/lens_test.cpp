@@ -1,5 +1,5 @@
 // The film camera's lens as the shaders have it: a ray for each corner of a pixel.
-#include "daemon/render/corner_rays.hpp"
+#include "daemon/core/render/corner_rays.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "tests/support/render_fixture.hpp"
 

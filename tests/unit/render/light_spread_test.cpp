@@ -2,10 +2,10 @@
 // their work, and how samples are shared between the sky and the lamps.
 #include <glm/ext/matrix_transform.hpp>
 
-#include "daemon/render/bounds.hpp"
-#include "daemon/render/gpu_environment.hpp"
-#include "daemon/render/gpu_lights.hpp"
-#include "daemon/render/scene_lights.hpp"
+#include "daemon/core/render/world/bounds.hpp"
+#include "daemon/core/render/world/gpu_environment.hpp"
+#include "daemon/core/render/world/gpu_lights.hpp"
+#include "daemon/core/render/world/scene_lights.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::light_spread_test {

@@ -1,6 +1,6 @@
 // A live frame's cost on a graphics card beside its passes is bounded: how often work is handed
 // over and waited for, what is allocated, and what is copied. A CPU device stands in for the card.
-#include "daemon/render/device.hpp"
+#include "daemon/core/render/device/device.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::live_budget_test {

@@ -1,7 +1,7 @@
 // A thousand lamps of which few reach a point: what their light samples find, and how noisily.
 #include <glm/ext/matrix_transform.hpp>
 
-#include "daemon/render/emission_weights.hpp"
+#include "daemon/core/render/world/emission_weights.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::many_lamps_test {

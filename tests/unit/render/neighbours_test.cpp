@@ -1,6 +1,6 @@
 // A frame among its neighbours in time: noise falls as their samples add up, nothing that is only
 // in a neighbour is seen, and the picture depends on these frames alone.
-#include "daemon/render/neighbours.hpp"
+#include "daemon/core/render/picture/neighbours.hpp"
 
 #include "tests/support/averaged_frames.hpp"
 #include "tests/support/pixels_by_hand.hpp"

@@ -1,5 +1,5 @@
 // The device's own clock: what it times is what ran, and it is silent where nobody asked.
-#include "daemon/render/device.hpp"
+#include "daemon/core/render/device/device.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::pass_clock_test {

@@ -4,7 +4,7 @@
 #include <bit>
 #include <functional>
 
-#include "daemon/render/photon_map.hpp"
+#include "daemon/core/render/passes/photon_map.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::photon_sort_test {

@@ -1,6 +1,6 @@
 // Whatever the driver has compiled is kept in a file, and a file that is of no use costs nothing
 // but the time to compile.
-#include "daemon/render/device.hpp"
+#include "daemon/core/render/device/device.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/pixels_by_hand.hpp"

@@ -1,9 +1,9 @@
 // What buttons can reach is compiled before they are pressed, once, and by a thread that stops when
 // it is told to.
-#include "daemon/render/pipelines_ahead.hpp"
+#include "daemon/core/render/passes/pipelines_ahead.hpp"
 
-#include "daemon/render/device.hpp"
-#include "daemon/render/feature.hpp"
+#include "daemon/core/render/device/device.hpp"
+#include "daemon/core/render/world/feature.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 #include "tests/support/wait_until.hpp"
 

@@ -1,5 +1,5 @@
 // Pictures are lent again once nobody holds them, and never while somebody does.
-#include "daemon/render/plate_pool.hpp"
+#include "daemon/core/render/device/plate_pool.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::test::plate_pool_test {

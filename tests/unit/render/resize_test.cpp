@@ -1,6 +1,6 @@
 // A renderer that changes the size of its picture, as the frame rate asks: nothing is made anew,
 // and the pictures are those of a renderer that was made for the size.
-#include "daemon/render/device.hpp"
+#include "daemon/core/render/device/device.hpp"
 #include "tests/support/pixels_by_hand.hpp"
 
 namespace previz::test::resize_test {

@@ -1,11 +1,11 @@
 // Sums of a frame's samples that were made in ranges are those of the whole, to the last bit.
-#include "daemon/render/sample_sums.hpp"
+#include "daemon/core/render/picture/sample_sums.hpp"
 
 #include <bit>
 #include <cstring>
 #include <limits>
 
-#include "daemon/pipeline/refinement.hpp"
+#include "daemon/core/pipeline/refinement.hpp"
 #include "tests/support/averaged_frames.hpp"
 
 namespace previz::test::sample_sums_test {

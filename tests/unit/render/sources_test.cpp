@@ -1,6 +1,6 @@
 // Light sources taken out of the environment light a scene as they did within it.
-#include "daemon/lighting/light_mode.hpp"
-#include "daemon/lighting/source_tracker.hpp"
+#include "daemon/core/lighting/light_mode.hpp"
+#include "daemon/core/lighting/source_tracker.hpp"
 #include "shaders/lib/render_shared.h"
 #include "tests/support/render_fixture.hpp"
 

@@ -1,11 +1,11 @@
 // What a SPIR-V module says about itself, and what is left of it when features are switched off.
-#include "daemon/render/spirv.hpp"
+#include "daemon/core/render/device/spirv.hpp"
 
 #include <spirv-tools/libspirv.hpp>
 
-#include "daemon/render/feature.hpp"
-#include "daemon/render/kernel.hpp"
-#include "daemon/render/passes.hpp"
+#include "daemon/core/render/device/kernel.hpp"
+#include "daemon/core/render/passes/passes.hpp"
+#include "daemon/core/render/world/feature.hpp"
 #include "shaders/accumulate.spv.h"
 #include "shaders/extend.spv.h"
 #include "shaders/generate.spv.h"
@@ -139,7 +139,7 @@ TEST(Spirv, TheLastPassOfASampleAsksOnlyWhetherThereAreACameraTexturesOrPhotons)
 
 // The picture of a scene of plain paint, with only what it needs compiled in and with every feature
 // that can be carried. What is carried is multiplied by nothing and adds no random number, so that
-// the pictures are equal bit for bit (daemon/render/feature.hpp).
+// the pictures are equal bit for bit (daemon/core/render/world/feature.hpp).
 TEST(Spirv, NoPixelDependsOnAFeatureThatIsOnlyCompiledIn) {
   View view = empty_view({0, -2, 1.2}, {0, 0, 0.2}, pinhole(12, 8, 0.8), glm::vec3(0.3f));
   add(view.scene, box_mesh(glm::dvec3(0.5)), diffuse(glm::vec3(0.5)));

@@ -1,6 +1,6 @@
 // Textures that are looked up over the footprint of a sample: the levels of the pyramid, what a
 // footprint covers, and that pictures converge to those of textures looked up at points.
-#include "daemon/render/mip_levels.hpp"
+#include "daemon/core/render/world/mip_levels.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::texture_filter_test {

@@ -1,6 +1,6 @@
 // Objects that get other materials while they are shown: what is uploaded, built and encoded for
 // that, and that the picture is that of a scene which was made so.
-#include "daemon/render/feature.hpp"
+#include "daemon/core/render/world/feature.hpp"
 #include "tests/support/render_fixture.hpp"
 
 namespace previz::test::variants_test {

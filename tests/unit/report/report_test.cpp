@@ -1,13 +1,13 @@
 // What becomes of a report: its priority in the journal, its place on the display, its repetitions.
-#include "daemon/report/report.hpp"
+#include "daemon/core/report/report.hpp"
 
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdarg>
 
-#include "daemon/report/log.hpp"
-#include "daemon/report/reports.hpp"
+#include "daemon/core/report/log.hpp"
+#include "daemon/core/report/reports.hpp"
 #include "tests/support/test.hpp"
 
 namespace {

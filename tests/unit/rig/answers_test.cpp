@@ -92,7 +92,7 @@ TEST_F(RigAnswers, ATakeIsMarkedAtOnceAndReviewedOnceItIsWritten) {
 // The bus knows the rig from its start on, and each set that loads leaves it there.
 TEST_F(RigAnswers, WhileASetLoadsItSaysSo) {
   std::atomic<bool> holds = true, has_begun = false;
-  options_.around_cameras = [&](Cameras&) {
+  options_.around_cameras = [&](live::Cameras&) {
     has_begun = true;
     test::must_come("the set may go on", [&] { return !holds; });
   };

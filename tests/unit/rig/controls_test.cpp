@@ -173,13 +173,13 @@ TEST(Controls, TurnsTheEnvironmentFile) {
 TEST(Controls, TagsThatNoPhantomHasCannotBeHidden) {
   const Outcome outcome = Desk()("tags");
   EXPECT_TRUE(outcome.refused);
-  EXPECT_EQ(outcome.said, "no phantom of this set has printed tags; previzd model makes one");
+  EXPECT_EQ(outcome.said, "no phantom of this set has printed tags; previz model makes one");
 }
 
 TEST(Controls, InAReviewTagsAreHiddenFromWhatTheTakeHas) {
   Desk desk{stage(), tagged()};
-  desk.controls.happened(Event::good_frame);
-  desk.controls.happened(Event::take_finished);
+  desk.controls.happened(live::Event::good_frame);
+  desk.controls.happened(live::Event::take_finished);
   desk("review");
   ASSERT_TRUE(desk.controls.look().of_take);
   desk.controls.use_recorded({.hides_tags = true});
@@ -211,8 +211,8 @@ TEST(Controls, InAReviewVariantsAreSteppedFromThoseOfTheTake) {
   Controls& controls = desk.controls;
   desk("next_variant");
   EXPECT_EQ(controls.look().edits.objects.at("vase").variant, "green");
-  controls.happened(Event::good_frame);
-  controls.happened(Event::take_finished);
+  controls.happened(live::Event::good_frame);
+  controls.happened(live::Event::take_finished);
   desk("review");
   ASSERT_TRUE(controls.look().of_take);
   EXPECT_EQ(desk("previous_variant").said, "vase: variant \"blue\" (3 of 3)")
@@ -385,8 +385,8 @@ TEST(Controls, AFoundLampHasNoNameOfTheSets) {
 TEST(Controls, AReviewHasChangesOfItsOwn) {
   Desk desk;
   desk("move_right");
-  desk.controls.happened(Event::good_frame);
-  desk.controls.happened(Event::take_finished);
+  desk.controls.happened(live::Event::good_frame);
+  desk.controls.happened(live::Event::take_finished);
   desk("review");
   desk("move_up");
   desk("refine");
@@ -403,7 +403,7 @@ TEST(Controls, AReviewHasChangesOfItsOwn) {
   EXPECT_FALSE(desk.controls.look().of_take);
   EXPECT_EQ(desk("keep").request, Request::keep_edits);
   EXPECT_NE(desk.controls.look().take_edits, pipeline::Edits{});
-  desk.controls.happened(Event::take_finished);
+  desk.controls.happened(live::Event::take_finished);
   EXPECT_EQ(desk.controls.look().take_edits, pipeline::Edits{});
 }
 
@@ -439,8 +439,8 @@ TEST(Controls, ATakeThatIsStillWrittenCanBeMarkedAndNotReviewed) {
   EXPECT_EQ(desk("mark_good").request, Request::mark_good);
   EXPECT_EQ(desk("mark_good").said, "12A_take002 is marked good when it is written");
   EXPECT_EQ(desk("review").said, "12A_take002 is still being written: 1.6 s");
-  EXPECT_TRUE(desk.controls.happened(Event::wish_review).refused);
-  desk.controls.happened(Event::take_finished);
+  EXPECT_TRUE(desk.controls.happened(live::Event::wish_review).refused);
+  desk.controls.happened(live::Event::take_finished);
   EXPECT_TRUE(desk("review").refused);
   desk.controls.use_take({.name = "12A_take002"});
   EXPECT_EQ(desk("review").said, "review");
@@ -448,14 +448,14 @@ TEST(Controls, ATakeThatIsStillWrittenCanBeMarkedAndNotReviewed) {
   EXPECT_EQ(desk("review").said, "live");
   desk.controls.use_take({.name = "12A_take002", .is_of_this_set = false});
   EXPECT_THAT(desk("review").said, HasSubstr("recorded with another text of the set"));
-  EXPECT_EQ(desk.controls.look().state.mode, Mode::live);
+  EXPECT_EQ(desk.controls.look().state.mode, live::Mode::live);
   EXPECT_EQ(desk("mark_good").said, "marking 12A_take002 good");
 }
 
 TEST(Controls, ASnapshotOfNoPictureIsRefused) {
   Desk desk;
   EXPECT_EQ(desk("snapshot").said, "no frame with a pose and light yet; nothing to save");
-  desk.controls.happened(Event::good_frame);
+  desk.controls.happened(live::Event::good_frame);
   EXPECT_EQ(desk("snapshot").request, Request::snapshot);
   EXPECT_EQ(desk.controls.look().snapshots, 1u);
   desk("standby");
@@ -466,10 +466,10 @@ TEST(Controls, ASnapshotOfNoPictureIsRefused) {
 TEST(Controls, APushEndsARefinementBeforeItsKindIsKnown) {
   Desk desk;
   EXPECT_TRUE(desk("refine").refused);
-  desk.controls.happened(Event::good_frame);
+  desk.controls.happened(live::Event::good_frame);
   EXPECT_EQ(desk("refine").said, "refine");
   EXPECT_TRUE(desk.controls.pushed());
-  EXPECT_EQ(desk.controls.look().state.mode, Mode::live);
+  EXPECT_EQ(desk.controls.look().state.mode, live::Mode::live);
   EXPECT_FALSE(desk.controls.pushed());
 }
 
@@ -486,7 +486,7 @@ TEST(Controls, AveragingOverFramesIsTheSetsUntilItIsSwitched) {
 
 TEST(Controls, PassTimesBringBackAnOverlayThatIsHidden) {
   Desk desk;
-  const Look& look = desk.controls.look();
+  const live::Look& look = desk.controls.look();
   EXPECT_FALSE(look.pass_times);
   EXPECT_EQ(desk("pass_times").said, "pass times on");
   EXPECT_TRUE(look.pass_times);

@@ -1,5 +1,5 @@
 // What the crew sees, from end to end: a replayed take on a headless display that is read back.
-#include "daemon/output/png.hpp"
+#include "daemon/core/output/png.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/pages.hpp"

@@ -1,7 +1,7 @@
 // The lines over a picture, against where a camera shows the things that they are drawn of.
 #include "daemon/rig/guides.hpp"
 
-#include "daemon/fit/visible_edges.hpp"
+#include "daemon/core/fit/visible_edges.hpp"
 #include "tests/support/real_bodies.hpp"
 
 namespace previz::rig::guides_test {

@@ -4,8 +4,8 @@
 #include <systemd/sd-bus.h>
 
 #include "daemon/control/bus.hpp"
+#include "daemon/core/session/draft.hpp"
 #include "drivers/descriptor.hpp"
-#include "drivers/session/draft.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/other_camera.hpp"
@@ -70,7 +70,7 @@ TEST_F(RigLive, TheCrewSeesThePlateWhileTheRendererIsMadeAnew) {
   options_.rehearse = [&](const std::string& part) {
     if (part == "render" && fails) throw std::runtime_error("lamp fell down");
   };
-  const auto until_plates = [&](Mode mode, int pictures) {
+  const auto until_plates = [&](live::Mode mode, int pictures) {
     const auto is_plate = [mode](const Shown& s) {
       return s.shot.untouched == "the renderer has failed" && s.look.state.mode == mode;
     };
@@ -80,12 +80,12 @@ TEST_F(RigLive, TheCrewSeesThePlateWhileTheRendererIsMadeAnew) {
     fails = false;
   };
   run_rendering([&] {
-    until_plates(Mode::live, 4);
+    until_plates(live::Mode::live, 4);
     until_samples(2);
     press("refine");
-    until_mode(Mode::refine);
+    until_mode(live::Mode::refine);
     until_counted("frames not tracked in this mode");
-    until_plates(Mode::refine, 8);
+    until_plates(live::Mode::refine, 8);
     until_frozen();
   });
   EXPECT_EQ(test::accounted_for(metrics_), metrics_.stages.at("observer").frames);
@@ -97,7 +97,7 @@ TEST_F(RigLive, ACameraOfAnotherSizeBeginsTheNextTakeAndIsShownAsItIs) {
   write_set();
   replace_in_set("samples = 2", "samples = 2\nscale = 0.5");
   std::atomic<bool> is_other = false;
-  options_.around_cameras = [&](Cameras& cameras) {
+  options_.around_cameras = [&](live::Cameras& cameras) {
     test::put_around(
         cameras.observer,
         [&, was_other = false](CameraEvent event, Camera& camera) mutable -> CameraEvent {
@@ -138,7 +138,7 @@ TEST_F(RigLive, ACameraOfAnotherSizeBeginsTheNextTakeAndIsShownAsItIs) {
 TEST_F(RigLive, ACameraThatThrowsIsAskedAgain) {
   write_set();
   std::atomic<bool> throws = false;
-  options_.around_cameras = [&](Cameras& cameras) {
+  options_.around_cameras = [&](live::Cameras& cameras) {
     test::put_around(cameras.light, [&](CameraEvent event, Camera&) -> CameraEvent {
       if (throws.exchange(false)) throw std::runtime_error("lamp fell down");
       return event;
@@ -170,7 +170,7 @@ class StubbornCamera final : public test::OtherCamera {
 
 TEST_F(RigLive, ACameraThatThrowsWhereItsExposureIsSetIsAskedOnce) {
   write_set();
-  options_.around_cameras = [&](Cameras& cameras) {
+  options_.around_cameras = [&](live::Cameras& cameras) {
     cameras.observer = std::make_unique<StubbornCamera>(std::move(cameras.observer));
   };
   run_rendering([&] {
@@ -188,7 +188,7 @@ TEST_F(RigLive, ACameraThatThrowsWhereItsExposureIsSetIsAskedOnce) {
 TEST_F(RigLive, AStageThatEndsTheRigDoesNotEndTheRecording) {
   write_set();
   std::atomic<bool> throws = false;
-  options_.around_cameras = [&](Cameras& cameras) {
+  options_.around_cameras = [&](live::Cameras& cameras) {
     test::put_around(cameras.observer, [&](CameraEvent event, Camera&) -> CameraEvent {
       if (throws) throw 7;  // no error, as C++ libraries throw them
       return event;
@@ -300,7 +300,7 @@ TEST_P(RigStop, ClosesTheTakeBeforeADeviceThatHangs) {
   write_set();
   Gate gate;
   std::atomic<bool> is_over = false;
-  options_.around_cameras = [&](Cameras& cameras) {
+  options_.around_cameras = [&](live::Cameras& cameras) {
     cameras.observer = std::make_unique<HangingCamera>(std::move(cameras.observer), gate,
                                                        [&](CameraEvent event, Camera&) {
                                                          if (is_over && hangs_in_next) gate.wait();
@@ -336,7 +336,9 @@ TEST_F(RigLive, ReviewsThatAreToggledFollowEachOther) {
     end_take();
     for (int times = 0; times < 10; ++times) press(times % 2 == 0 ? "review" : "live");
     press("review");
-    until([](const Shown& s) { return s.look.state.mode == Mode::review && s.shot.samples == 2; });
+    until([](const Shown& s) {
+      return s.look.state.mode == live::Mode::review && s.shot.samples == 2;
+    });
   });
   EXPECT_THAT(log_.text(), Not(HasSubstr("reading interrupted")));
 }

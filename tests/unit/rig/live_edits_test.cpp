@@ -1,5 +1,5 @@
 // Takes in review, and what buttons change in them and in the live picture, from end to end.
-#include "daemon/set/load.hpp"
+#include "daemon/core/set/load.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
@@ -53,7 +53,7 @@ TEST_F(RigLive, ATakeInReviewIsChangedOnTopOfItsRecord) {
 
     press("review");
     const auto in_review = [&](const Shown& s) {  // not a live picture that was on its way
-      return s.look.state.mode == Mode::review && s.shot.samples == 2 &&
+      return s.look.state.mode == live::Mode::review && s.shot.samples == 2 &&
              s.shot.frame->timestamp_ns <= last.shot.frame->timestamp_ns;
     };
     // The first frames may have been captured before the first step.
@@ -71,12 +71,12 @@ TEST_F(RigLive, ATakeInReviewIsChangedOnTopOfItsRecord) {
 
     press("refine");
     const Shown refined = until_frozen();
-    EXPECT_EQ(refined.look.state.mode, Mode::refine);
+    EXPECT_EQ(refined.look.state.mode, live::Mode::refine);
     EXPECT_NEAR(place_of(refined, "card").x, 0.01, 1e-12);
     EXPECT_NEAR(place_of(refined, "card").z, 0.01, 1e-12);
     press("live");
     const Shown live = until([](const Shown& s) {
-      return s.look.state.mode == Mode::live && s.shot.samples == 2 && !s.shot.frozen;
+      return s.look.state.mode == live::Mode::live && s.shot.samples == 2 && !s.shot.frozen;
     });
     EXPECT_NEAR(place_of(live, "card").x, 0.02, 1e-12);
     EXPECT_NEAR(place_of(live, "card").z, 0, 1e-12);
@@ -149,14 +149,15 @@ TEST_F(RigLive, VariantsAreShownRecordedReviewedAndKept) {
 
     press("review");
     const auto reviewed = [&](const Shown& s) {
-      return s.look.state.mode == Mode::review && s.shot.samples == 2 && !s.shot.frozen;
+      return s.look.state.mode == live::Mode::review && s.shot.samples == 2 && !s.shot.frozen;
     };
     until([&](const Shown& s) { return reviewed(s) && variant_of(s) == "black"; });
     press("previous_variant");
     until([&](const Shown& s) { return reviewed(s) && variant_of(s) == "grey"; });
     press("live");
-    until(
-        [&](const Shown& s) { return s.look.state.mode == Mode::live && variant_of(s) == "lamp"; });
+    until([&](const Shown& s) {
+      return s.look.state.mode == live::Mode::live && variant_of(s) == "lamp";
+    });
     press("keep");
     until_said("set.toml has the changes");
     const Shown kept = until([&](const Shown& s) {

@@ -4,8 +4,8 @@
 
 #include <sys/resource.h>
 
-#include "daemon/output/exr.hpp"
-#include "daemon/output/png.hpp"
+#include "daemon/core/output/exr.hpp"
+#include "daemon/core/output/png.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/test.hpp"
@@ -49,7 +49,7 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
     refined = until_frozen(9);
     EXPECT_TRUE(refined.look.state.recording);
     press("snapshot");
-    until_mode(Mode::live);
+    until_mode(live::Mode::live);
     until_said("snapshot_0001");
     end_take();
     press("mark_good");
@@ -61,13 +61,13 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
     const int before = shown_now().count;
     press("review");
     until([&](const Shown& s) {
-      return s.count > before + 2 && s.look.state.mode == Mode::review && s.shot.samples == 3 &&
-             in_take.contains(s.shot.frame->timestamp_ns);
+      return s.count > before + 2 && s.look.state.mode == live::Mode::review &&
+             s.shot.samples == 3 && in_take.contains(s.shot.frame->timestamp_ns);
     });
     press("refine");
     reviewed = until_frozen(6);
     press("snapshot");
-    until_mode(Mode::live);
+    until_mode(live::Mode::live);
     until_said("snapshot_0002");
     press("standby");
     until_said("button standby: standby");
@@ -88,7 +88,7 @@ TEST_F(RigLive, ThroughEveryModeByButtons) {
   EXPECT_TRUE(session.track.back().captured_light);
 
   // Both refinements were saved as they were shown; that of the take's frame is bit for bit what
-  // `previzd render` makes of it. (Which captured light a live frame had depends on when its thread
+  // `previz render` makes of it. (Which captured light a live frame had depends on when its thread
   // was done; ALiveRefinementIsWhatRenderMakesOfItsFrame has light that does not.)
   const auto saved = [&](const char* number) {
     return output::read_exr(directory_ / (std::string("live/snapshot_") + number + ".exr"));
@@ -117,9 +117,9 @@ TEST_F(RigLive, ASetThatIsReadAgainKeepsTheLastTake) {
     end_take();
     reload(1);
     press("review");
-    until_mode(Mode::review);
+    until_mode(live::Mode::review);
     press("live");
-    until_mode(Mode::live);
+    until_mode(live::Mode::live);
     replace_in_set("directory = \"takes\"", "directory = \"others\"");
     reload(2);
     press("review");
@@ -157,7 +157,7 @@ TEST_F(RigLive, TrackingAndLightEstimationRestInARefinement) {
   write_set();
   run_rendering([&] {
     press("refine");
-    until_mode(Mode::refine);
+    until_mode(live::Mode::refine);
     until_counted("frames not tracked in this mode");
     until_counted("light frames not evaluated in this mode");
   });
@@ -172,7 +172,7 @@ TEST_F(RigLive, TrackingDoesNotRestInATake) {
     const Shown begun = until_frozen();
     until([&](const Shown& s) { return s.shot.frozen && s.count > begun.count + 8; });
     press("live");
-    until_mode(Mode::live);
+    until_mode(live::Mode::live);
   });
   EXPECT_FALSE(metrics_.counts.contains("frames not tracked in this mode"));
   EXPECT_FALSE(metrics_.counts.contains("light frames not evaluated in this mode"));
@@ -187,7 +187,7 @@ TEST_F(RigLive, ASnapshotIsOfTheRefinementThatItsPressEnded) {
     press("refine");
     refined = until_frozen(6);
     press("snapshot");
-    until_mode(Mode::live);
+    until_mode(live::Mode::live);
     until_said("snapshot_0001");
     press("snapshot");
     until_said("snapshot_0002");
@@ -217,13 +217,13 @@ TEST_F(RigLive, EveryCapturedFrameIsRenderedOrCounted) {
     press("refine");
     until_frozen(4);
     press("standby");  // only ends the refinement
-    until_mode(Mode::live);
+    until_mode(live::Mode::live);
     press("standby");
     until_said("button standby: standby");
     // A few frames in the dark. Nothing is shown or written of them before the next picture.
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     press("live");
-    until_mode(Mode::live);
+    until_mode(live::Mode::live);
     until_counted("standby");
   });
   EXPECT_GT(metrics_.stages.at("render").dropped.at("standby"), 0u);

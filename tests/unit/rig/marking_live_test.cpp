@@ -1,8 +1,8 @@
 // A crew that marks corners while it records: what the display shows, and what the take has.
 #include <atomic>
 
+#include "daemon/core/session/marks.hpp"
 #include "drivers/plate.hpp"
-#include "drivers/session/marks.hpp"
 #include "tests/support/live_rig.hpp"
 #include "tests/support/pages.hpp"
 #include "tests/support/tracking_synthetic.hpp"
@@ -128,7 +128,7 @@ TEST_F(RigMarking, ShowsTheCrossOverTheLivePictureAlone) {
     test::must_come("the cross is there", [&] { return orange_ > 20; });
     press("guides");
     press("refine");
-    until_mode(Mode::refine);
+    until_mode(live::Mode::refine);
     test::must_come("the cross is gone", [&] { return orange_ == 0; });
     press("live");
     test::must_come("the cross is there", [&] { return orange_ > 20; });

@@ -1,5 +1,5 @@
 // Corners that the crew marks: which is next, where they are, and what the crew is told.
-#include "daemon/rig/marking.hpp"
+#include "daemon/core/live/marking.hpp"
 
 #include <glm/geometric.hpp>
 
@@ -14,7 +14,8 @@ constexpr int width = 640, height = 480;
 constexpr double focal_px = 600;
 
 // The cross on a point, of a camera at `eye` that is turned aside from it by so many pixels.
-Aim aim(const glm::dvec3& eye, const glm::dvec3& at, double off_px = 0, std::int64_t when = 1) {
+live::Aim aim(const glm::dvec3& eye, const glm::dvec3& at, double off_px = 0,
+              std::int64_t when = 1) {
   const glm::dvec3 towards = glm::normalize(at - eye);
   const glm::dvec3 aside = glm::normalize(glm::cross(towards, glm::dvec3(0, 0, 1)));
   return {when,
@@ -26,22 +27,22 @@ Aim aim(const glm::dvec3& eye, const glm::dvec3& at, double off_px = 0, std::int
 const glm::dvec3 corner{0.1, 0.2, 0.3}, left{-1, -1, 1}, right{1, -1, 1}, above{0, 0, 2};
 
 TEST(Marking, FindsACornerWhereItsRaysMeet) {
-  Marking marking;
+  live::Marking marking;
   marking.mark(aim(left, corner));
   EXPECT_FALSE(marking.last()->place());
-  EXPECT_EQ(Marking::words_of(*marking.last()), "marked once");
+  EXPECT_EQ(live::Marking::words_of(*marking.last()), "marked once");
   marking.next_box();  // there and back
   marking.next_box();
   marking.mark(aim(right, corner));
   const auto place = marking.boxes()[0][0].place();
   ASSERT_TRUE(place);
   EXPECT_LT(glm::distance(*place, corner), 1e-12);
-  EXPECT_EQ(Marking::words_of(*marking.last()), "marked twice, within 0.0 px");
+  EXPECT_EQ(live::Marking::words_of(*marking.last()), "marked twice, within 0.0 px");
 }
 
 // Two sides of a table; corners of a box on it are marked from each.
-Marking marked_from_two_sides(const std::vector<glm::dvec3>& corners) {
-  Marking marking;
+live::Marking marked_from_two_sides(const std::vector<glm::dvec3>& corners) {
+  live::Marking marking;
   for (const glm::dvec3& eye : {left, right})
     for (const glm::dvec3& at : corners) marking.mark(aim(eye, at));
   return marking;
@@ -54,23 +55,23 @@ TEST(Marking, SaysWhenABoxIsCompleteAndWhetherItsCornersAreInOrder) {
   EXPECT_EQ(marked_from_two_sides({corner, corner + x + y, corner + x}).words_of_box(),
             "box 1: its corners are not in order around; unmark, and mark them in order");
   EXPECT_EQ(marked_from_two_sides({corner, corner + x}).words_of_box(), "");
-  EXPECT_EQ(Marking().words_of_box(), "");
+  EXPECT_EQ(live::Marking().words_of_box(), "");
 }
 
 // From the left the left corner, from the right the right one: rays that part meet behind the
 // cameras.
 TEST(Marking, TakesNoTwoCornersForOne) {
-  MarkedCorner two;
-  for (const Aim& a :
+  live::MarkedCorner two;
+  for (const live::Aim& a :
        {aim(left, left + glm::dvec3(-0.3, 1, 0)), aim(right, right + glm::dvec3(0.3, 1, 0))})
     two.marks.push_back({1, *a.ray, a.px_per_rad});
   EXPECT_FALSE(two.place());
-  EXPECT_EQ(Marking::words_of(two),
+  EXPECT_EQ(live::Marking::words_of(two),
             "its marks are of different corners; unmark, and mark one of them");
 }
 
 TEST(Marking, GoesAroundTheCornersAndOnToOtherBoxes) {
-  Marking marking;
+  live::Marking marking;
   std::vector<std::string> marked;
   for (int i = 0; i < 4; ++i) marked.push_back(marking.mark(aim(left, corner)).point);
   EXPECT_THAT(marked, testing::ElementsAre("box 1 corner 1", "box 1 corner 2", "box 1 corner 3",
@@ -88,7 +89,7 @@ TEST(Marking, GoesAroundTheCornersAndOnToOtherBoxes) {
 }
 
 TEST(Marking, WithdrawsMarksFromTheLastOneOn) {
-  Marking marking;
+  live::Marking marking;
   EXPECT_FALSE(marking.withdraw());
   marking.mark(aim(left, corner, 0, 7));
   marking.mark(aim(left, corner, 0, 8));
@@ -98,22 +99,23 @@ TEST(Marking, WithdrawsMarksFromTheLastOneOn) {
   EXPECT_EQ(marking.selected(), "box 1 corner 2");
   EXPECT_EQ(marking.withdraw(), first);
   EXPECT_EQ(marking.selected(), "box 1 corner 1");
-  EXPECT_EQ(marking, Marking());
+  EXPECT_EQ(marking, live::Marking());
 }
 
 // Two rays that miss each other are each half of that away from where they are nearest.
 TEST(Marking, SaysWhatIsWrongWithACorner) {
-  MarkedCorner apart;
-  for (const Aim& a : {aim(left, corner, -20), aim(right, corner), aim(above, corner)})
+  live::MarkedCorner apart;
+  for (const live::Aim& a : {aim(left, corner, -20), aim(right, corner), aim(above, corner)})
     apart.marks.push_back({1, *a.ray, a.px_per_rad});
-  EXPECT_THAT(Marking::words_of(apart),
+  EXPECT_THAT(live::Marking::words_of(apart),
               testing::MatchesRegex(
                   "its marks miss each other by [0-9]+ px; unmark, and aim at the same spot"));
-  MarkedCorner near;
+  live::MarkedCorner near;
   for (const glm::dvec3& eye : {left, left + glm::dvec3(0.05, 0, 0)})
     near.marks.push_back({1, *aim(eye, corner).ray, focal_px});
-  EXPECT_EQ(Marking::words_of(near), "marked twice from one place; go aside and mark it again");
-  MarkedCorner same;
+  EXPECT_EQ(live::Marking::words_of(near),
+            "marked twice from one place; go aside and mark it again");
+  live::MarkedCorner same;
   for (int i = 0; i < 2; ++i) same.marks.push_back({1, *aim(left, corner).ray, focal_px});
   EXPECT_FALSE(same.place());
 }
@@ -124,12 +126,12 @@ TEST(Marking, IsAimedWithTheMiddleOfThePictureIfTagsShowTheCamera) {
   Frame frame;
   frame.timestamp_ns = 5;
   shot.frame = std::make_shared<Frame>(frame);
-  EXPECT_FALSE(aim_of(shot, lens).ray);
+  EXPECT_FALSE(live::aim_of(shot, lens).ray);
   shot.track.pose.emplace();
   shot.track.pose->world_from_camera = {{1, 0, 0, 0}, {0, -1, 0, 0}, {0, 0, -1, 0}, {1, 2, 3, 1}};
-  EXPECT_FALSE(aim_of(shot, lens).ray);  // another tracker's
+  EXPECT_FALSE(live::aim_of(shot, lens).ray);  // another tracker's
   shot.track.pose->tags = {3};
-  const Aim middle = aim_of(shot, lens);
+  const live::Aim middle = live::aim_of(shot, lens);
   ASSERT_TRUE(middle.ray);
   EXPECT_EQ(middle.timestamp_ns, 5);
   EXPECT_EQ(middle.px, glm::dvec2(319.5, 239.5));
@@ -166,7 +168,7 @@ TEST(MarkingLines, LeaveTheMiddleFreeAndNameTheCorner) {
 
 TEST(MarkingLines, ShowCornersThatAreFoundAndTheRayOfOneThatIsMarkedOnce) {
   const PinholeIntrinsics lens = test::plain_lens(width, height, focal_px);
-  Marking marking;
+  live::Marking marking;
   marking.mark(aim(left, corner));
   marking.next_box();
   marking.next_box();  // the first corner again
@@ -193,7 +195,7 @@ TEST(MarkingControls, MarkOnlyWhereAMarkIsKeptAndMeansSomething) {
   EXPECT_EQ(desk("mark").said, "marks are kept in a take; start one with record, then mark");
   desk("record");
   EXPECT_EQ(desk("mark").said, "not marked: the picture was not live; aim and mark again");
-  desk.controls.use_aim(Aim{});
+  desk.controls.use_aim(live::Aim{});
   EXPECT_EQ(desk("mark").said, "not marked: no tag in the picture shows where the camera is");
   desk.controls.use_aim(aim(left, corner, 0, 5));
   desk.controls.use_take({.name = "12A_take001"});
@@ -206,7 +208,7 @@ TEST(MarkingControls, MarkOnlyWhereAMarkIsKeptAndMeansSomething) {
   EXPECT_EQ(withdrawn.said, "box 1 corner 1: mark withdrawn, not marked");
   EXPECT_EQ(withdrawn.mark, (session::MarkEvent{5, "box 1 corner 1", {}, true}));
   EXPECT_EQ(desk("unmark").said, "no corner is marked");
-  desk.controls.happened(Event::good_frame);
+  desk.controls.happened(live::Event::good_frame);
   desk("refine");
   EXPECT_EQ(desk("mark").said, "only the live picture can be marked");
   desk("live");

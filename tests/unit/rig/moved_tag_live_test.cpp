@@ -66,7 +66,7 @@ class MovedTagLive : public test::RigLive {
   void run_reporting(const std::function<void()>& script) {
     rig::LiveOptions options;
     options.loop = true;
-    options.on_shown = [&](const pipeline::Shot& shot, const rig::Look&) {
+    options.on_shown = [&](const pipeline::Shot& shot, const live::Look&) {
       const std::lock_guard lock(mutex_);
       used_ = shot.track.pose ? shot.track.pose->tags : std::vector<int>{};
     };
@@ -111,7 +111,7 @@ TEST_F(MovedTagLive, IsNamedAndLeftOutUntilTheSetHasItsPlace) {
       until_noticed(true);
       const std::string text = notice();
       EXPECT_THAT(text, HasSubstr("tag 1 is "));
-      EXPECT_THAT(text, HasSubstr("`previzd calibrate tags TAKE`"));
+      EXPECT_THAT(text, HasSubstr("`previz calibrate tags TAKE`"));
       EXPECT_THAT(text, testing::Not(HasSubstr("tag 0")));
       double off_mm = 0;
       const std::size_t at = text.find("tag 1 is ") + 9;

@@ -113,7 +113,7 @@ class MovingTake : public test::RigLive {
     writer.close();
   }
 
-  // Frames as `previzd render` makes them.
+  // Frames as `previz render` makes them.
   std::vector<Shot> rendered_shots(const std::filesystem::path& take,
                                    const std::filesystem::path& set,
                                    const std::optional<post::FrameRange>& range = {}) {

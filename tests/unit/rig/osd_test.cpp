@@ -19,7 +19,7 @@ PictureFacts tracked() {
   return facts;
 }
 
-RigFacts in(Mode mode) {
+RigFacts in(live::Mode mode) {
   RigFacts rig;
   rig.look.state.mode = mode;
   rig.free_bytes = 412'300'000'000;
@@ -30,7 +30,7 @@ constexpr Pace pace{24.96, 0.0834};
 
 TEST(OsdWords, LivePreview) {
   const PictureFacts picture = tracked();
-  const OsdPage page = osd_page(in(Mode::live), &picture, pace);
+  const OsdPage page = osd_page(in(live::Mode::live), &picture, pace);
   EXPECT_EQ(page.top_left, (Texts{{"LIVE"}}));
   EXPECT_EQ(page.top_right, (Texts{{"412 GB free"}}));
   EXPECT_EQ(page.bottom_left, (Texts{{"8 samples"}, {"25.0 fps · 83 ms"}}));
@@ -42,10 +42,10 @@ TEST(OsdWords, SizeAndHistoryStandBesideTheSamples) {
   PictureFacts picture = tracked();
   picture.width = 1358;
   picture.height = 764;
-  EXPECT_EQ(osd_page(in(Mode::live), &picture, pace).bottom_left.front(),
+  EXPECT_EQ(osd_page(in(live::Mode::live), &picture, pace).bottom_left.front(),
             OsdText{"8 samples · 1358x764"});
   picture.history = 12;
-  EXPECT_EQ(osd_page(in(Mode::live), &picture, pace).bottom_left.front(),
+  EXPECT_EQ(osd_page(in(live::Mode::live), &picture, pace).bottom_left.front(),
             OsdText{"8 samples + 12 frames · 1358x764"});
 }
 
@@ -53,14 +53,14 @@ TEST(OsdWords, RefiningTellsSamplesAndErrorInPlaceOfThePace) {
   PictureFacts picture = tracked();
   picture.samples = 256;
   picture.error = 0.0184;
-  const OsdPage page = osd_page(in(Mode::refine), &picture, pace);
+  const OsdPage page = osd_page(in(live::Mode::refine), &picture, pace);
   EXPECT_EQ(page.top_left, (Texts{{"REFINE", OsdTone::mode}}));
   EXPECT_EQ(page.bottom_left, (Texts{{"256 samples · error 1.8 %"}}));
 }
 
 TEST(OsdWords, ATakeTellsItsTimeInEveryModeItCanRunIn) {
   const PictureFacts picture = tracked();
-  for (const Mode mode : {Mode::live, Mode::refine}) {
+  for (const live::Mode mode : {live::Mode::live, live::Mode::refine}) {
     RigFacts rig = in(mode);
     rig.look.state.recording = true;
     rig.recorded_s = 3600 + 2 * 60 + 3.9;
@@ -74,11 +74,11 @@ TEST(OsdWords, ATakeTellsItsTimeInEveryModeItCanRunIn) {
 
 TEST(OsdWords, ReviewStandbyLightModeAndDebugViews) {
   const PictureFacts picture = tracked();
-  EXPECT_EQ(osd_page(in(Mode::review), &picture, pace).top_left,
+  EXPECT_EQ(osd_page(in(live::Mode::review), &picture, pace).top_left,
             (Texts{{"REVIEW", OsdTone::mode}}));
-  EXPECT_EQ(osd_page(in(Mode::standby), &picture, pace).top_left,
+  EXPECT_EQ(osd_page(in(live::Mode::standby), &picture, pace).top_left,
             (Texts{{"STANDBY", OsdTone::mode}}));
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   rig.look.light_mode = set::LightMode::hybrid;
   EXPECT_EQ(osd_page(rig, &picture, pace).bottom_right.back(), OsdText{"light: hybrid"});
   for (const render::View view : render::all_views) {
@@ -93,7 +93,7 @@ TEST(OsdWords, ReviewStandbyLightModeAndDebugViews) {
 }
 
 TEST(OsdWords, FreeSpaceWarnsBeforeItIsGone) {
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   const auto space = [&](std::uint64_t bytes) {
     rig.free_bytes = bytes;
     return osd_page(rig, nullptr, {}).top_right;
@@ -109,7 +109,7 @@ TEST(OsdWords, TrackingInTrouble) {
   PictureFacts picture = tracked();
   picture.tags = 1;
   picture.tracking_trouble = "tag 7: not where the set file says";
-  OsdPage page = osd_page(in(Mode::live), &picture, pace);
+  OsdPage page = osd_page(in(live::Mode::live), &picture, pace);
   EXPECT_EQ(page.bottom_right.front(), (OsdText{"1 tag · ±0.83 mm", OsdTone::warning}));
   EXPECT_EQ(page.notices,
             (Texts{{"tracking: tag 7: not where the set file says", OsdTone::warning}}));
@@ -117,7 +117,7 @@ TEST(OsdWords, TrackingInTrouble) {
   picture = {};
   picture.tracking_trouble = "no tag in the picture";
   picture.untouched = "pose lost: no tag in the picture";
-  page = osd_page(in(Mode::live), &picture, pace);
+  page = osd_page(in(live::Mode::live), &picture, pace);
   EXPECT_EQ(page.bottom_left.front(), OsdText{"plate only"});
   EXPECT_EQ(page.bottom_right.front(), (OsdText{"tracking lost", OsdTone::alarm}));
   EXPECT_EQ(page.notices,
@@ -126,7 +126,7 @@ TEST(OsdWords, TrackingInTrouble) {
 
 TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
   const PictureFacts picture = tracked();
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   rig.look.state.camera_lost = true;
   const std::string moved = "card moved by +0.010 +0.000 +0.000 m";
   rig.news = {{report::Severity::info, "", moved}};
@@ -151,13 +151,13 @@ TEST(OsdWords, FaultsInPlainWordsAndWhatAButtonDid) {
 
 TEST(OsdWords, ADiskThatAnswersWithinTwoSecondsIsNoNews) {
   const PictureFacts picture = tracked();
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   rig.disk_silent_s = 1.9;
   EXPECT_TRUE(osd_page(rig, &picture, pace).notices.empty());
 }
 
 TEST(OsdWords, BeforeTheFirstPicture) {
-  const OsdPage page = osd_page(in(Mode::live), nullptr, {});
+  const OsdPage page = osd_page(in(live::Mode::live), nullptr, {});
   EXPECT_EQ(page.notices, (Texts{{"waiting for the film camera", OsdTone::warning}}));
   EXPECT_TRUE(page.bottom_left.empty());
 }
@@ -170,7 +170,7 @@ fit::Figure figure_of(double median_px, double most_px, double shift_px) {
 
 TEST(OsdWords, SayHowFarTheModelIsFromThePicture) {
   const PictureFacts picture = tracked();
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   const auto before = osd_page(rig, &picture, pace).bottom_right.size();
   rig.fit = figure_of(0.31, 0.84, 0.5);
   const OsdPage page = osd_page(rig, &picture, pace);
@@ -181,7 +181,7 @@ TEST(OsdWords, SayHowFarTheModelIsFromThePicture) {
 
 TEST(OsdWords, AModelThatIsOffIsAlarming) {
   const PictureFacts picture = tracked();
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   const auto before = osd_page(rig, &picture, pace).bottom_right.size();
   for (const auto& [figure, words] :
        {std::pair{figure_of(0.3, 0.8, 8), "model off by 8.0 px: check phantom or tags"},
@@ -196,7 +196,7 @@ TEST(OsdWords, AModelThatIsOffIsAlarming) {
 
 TEST(OsdWords, AThingThatIsOffIsNamedAndAlarming) {
   const PictureFacts picture = tracked();
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   const auto before = osd_page(rig, &picture, pace).bottom_right.size();
   rig.fit = figure_of(0.1, 4, 0);
   rig.fit->things_off = {{"red cube", 4.14, 20}};
@@ -218,13 +218,13 @@ TEST(OsdWords, AThingThatIsOffIsNamedAndAlarming) {
 
 TEST(OsdWords, SayWhyThereIsNoFigureOfTheModel) {
   const PictureFacts picture = tracked();
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   rig.fit.emplace().why = "too few edges";
   EXPECT_EQ(osd_page(rig, &picture, pace).notices, (Texts{{"model: no figure: too few edges"}}));
 }
 
-PassTimes times_of(std::vector<PassTimes::Pass> passes) {
-  PassTimes times;
+live::PassTimes times_of(std::vector<live::PassTimes::Pass> passes) {
+  live::PassTimes times;
   times.is_timed = true;
   times.passes = std::move(passes);
   times.waited_ms = 12.34;
@@ -233,7 +233,7 @@ PassTimes times_of(std::vector<PassTimes::Pass> passes) {
 
 TEST(OsdWords, ThePassesTimesStandInTheColumnWhileTheyAreAskedFor) {
   const PictureFacts picture = tracked();
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   rig.pass_times = times_of({{"extend", 9.996}, {"shade", 6.1}, {"present", 0.042}});
   EXPECT_TRUE(osd_page(rig, &picture, pace).column.empty());
   rig.look.pass_times = true;
@@ -248,9 +248,9 @@ TEST(OsdWords, ThePassesTimesStandInTheColumnWhileTheyAreAskedFor) {
 }
 
 TEST(OsdWords, PassesBeyondTheSevenLongestAreSummed) {
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   rig.look.pass_times = true;
-  std::vector<PassTimes::Pass> passes;
+  std::vector<live::PassTimes::Pass> passes;
   for (int i = 0; i < 8; ++i) passes.push_back({"pass " + std::to_string(i), 8.0 - i});
   rig.pass_times = times_of(passes);
   const Texts column = osd_page(rig, nullptr, {}).column;
@@ -264,11 +264,11 @@ TEST(OsdWords, PassesBeyondTheSevenLongestAreSummed) {
 }
 
 TEST(OsdWords, PassesWithoutTimes) {
-  RigFacts rig = in(Mode::live);
+  RigFacts rig = in(live::Mode::live);
   rig.look.pass_times = true;
   const auto column = [&] { return osd_page(rig, nullptr, {}).column; };
   EXPECT_EQ(column(), (Texts{{"graphics card: no frame timed yet"}}));
-  rig.pass_times = PassTimes{};
+  rig.pass_times = live::PassTimes{};
   EXPECT_EQ(column(), (Texts{{"this computer does not time its passes"}}));
   rig.device = "llvmpipe (CPU)";
   EXPECT_EQ(column(), (Texts{{"llvmpipe (CPU) does not time its passes"}}));
@@ -301,7 +301,7 @@ TEST(OsdWords, ATrackingThatIsHeld) {
   shot.track.reason = "no tag in the picture";
   shot.shown_pose = tracking::ShownPose{glm::dmat4(1), {}, 0.32};
   const PictureFacts facts = facts_of(shot);
-  const OsdPage page = osd_page(in(Mode::live), &facts, pace);
+  const OsdPage page = osd_page(in(live::Mode::live), &facts, pace);
   EXPECT_EQ(page.bottom_right.at(0), (OsdText{"predicted pose 0.3 s", OsdTone::warning}));
   EXPECT_EQ(page.notices, (Texts{{"tracking: no tag in the picture", OsdTone::warning}}));
 }

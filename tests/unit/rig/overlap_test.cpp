@@ -39,7 +39,7 @@ TEST_F(RigAsAGraphicsCard, ShowsEveryPictureInItsOrderAndRefines) {
     press("refine");
     until_frozen(8);
     press("snapshot");
-    until_mode(Mode::live);
+    until_mode(live::Mode::live);
     until_rendered(3);
   });
   EXPECT_TRUE(std::filesystem::exists(directory_ / "live/snapshot_0001.png"));
@@ -132,7 +132,9 @@ CameraEvent mosaic_of(CameraEvent event, Camera&) {
 
 // The renderer gets what the camera gave, and its device makes the colours; tracking has its own.
 TEST_F(RigAsAGraphicsCard, GivesTheRendererTheCamerasOwnBytes) {
-  options_.around_cameras = [](Cameras& cameras) { test::put_around(cameras.observer, mosaic_of); };
+  options_.around_cameras = [](live::Cameras& cameras) {
+    test::put_around(cameras.observer, mosaic_of);
+  };
   run_rendering([&] {
     const Shown shown = until_rendered(3);
     const FramePtr& camera = pipeline::camera_frame(shown.shot);

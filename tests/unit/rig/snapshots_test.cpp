@@ -1,5 +1,5 @@
 // Snapshots number themselves, and leave takes their space; where the live picture goes.
-#include "daemon/rig/snapshots.hpp"
+#include "daemon/core/live/snapshots.hpp"
 
 #include "daemon/rig/live_files.hpp"
 #include "tests/support/content_of.hpp"
@@ -14,7 +14,7 @@ TEST(Snapshots, HaveTheNumberAfterTheLast) {
   const test::TemporaryDirectory directory;
   const auto put = [&](const fs::path& folder) {
     session::Draft exr(folder / "snapshot.exr");
-    return put_snapshot(exr);
+    return live::put_snapshot(exr);
   };
   fs::create_directory(directory / "new");
   EXPECT_EQ(put(directory / "new"), directory / "new/snapshot_0001");
@@ -40,7 +40,7 @@ TEST(Snapshots, OfManyAtOnceHaveANumberEach) {
         for (int times = 0; times < 25; ++times) {
           session::Draft exr(directory / "snapshot.exr");
           exr.file().append(std::to_string(100 * i + times));
-          const fs::path stem = put_snapshot(exr);
+          const fs::path stem = live::put_snapshot(exr);
           const std::lock_guard lock(mutex);
           contents.insert(test::content_of(stem.string() + ".exr"));
         }
@@ -54,13 +54,13 @@ TEST(Snapshots, LeaveTheSpaceThatTakesKeepFree) {
   const test::TemporaryDirectory directory;
   const std::uint64_t free = fs::space(directory.path()).available;
   const fs::path takes = directory / "takes";  // which is not there yet
-  EXPECT_NO_THROW(check_space(directory.path(), 1'000'000, takes, 0));
-  EXPECT_THROW(check_space(directory.path(), 1'000'000, takes, free), Error);
+  EXPECT_NO_THROW(live::check_space(directory.path(), 1'000'000, takes, 0));
+  EXPECT_THROW(live::check_space(directory.path(), 1'000'000, takes, free), Error);
   // The reserve is of the takes' own disk alone.
   if (fs::exists("/dev/shm")) {
-    EXPECT_NO_THROW(check_space(directory.path(), 1'000'000, "/dev/shm/takes", free));
+    EXPECT_NO_THROW(live::check_space(directory.path(), 1'000'000, "/dev/shm/takes", free));
   }
-  EXPECT_THROW(check_space(directory.path(), 2 * free, "/dev/shm/takes", 0), Error);
+  EXPECT_THROW(live::check_space(directory.path(), 2 * free, "/dev/shm/takes", 0), Error);
 }
 
 // The picture of each second goes into memory where systemd has made a folder there.

@@ -63,7 +63,7 @@ constexpr Line transcript[] = {
     {"reset_object", "button reset_object: card is back as the set file has it"},
     {"play", "button play: this set has no animation (refused)", "", "this set has no animation"},
     {"hold", "button hold: this set has no animation (refused)", "", "this set has no animation"},
-    {"tags", "button tags: no phantom of this set has printed tags; previzd model makes one (refused)", "", "no phantom of this set has printed tags"},
+    {"tags", "button tags: no phantom of this set has printed tags; previz model makes one (refused)", "", "no phantom of this set has printed tags"},
     {"next_light", "button next_light: lamp: fill", "Light=fill"},
     {"previous_light", "button previous_light: lamp: key", "Light=key"},
     {"light_up", "button light_up: key +0.33 stops"},

@@ -2,9 +2,9 @@
 // ends by itself, so that the service starts the new version.
 #include <unistd.h>
 
+#include "daemon/core/session/session.hpp"
 #include "daemon/rig/live.hpp"
 #include "daemon/rig/service.hpp"
-#include "drivers/session/session.hpp"
 #include "tests/support/crewed_rig.hpp"
 #include "tests/support/private_bus.hpp"
 #include "tests/support/small_take.hpp"
@@ -29,7 +29,7 @@ TEST(Upgrade, WaitsForTheEndOfTheTake) {
   report::Reports reports(report::lines_to(out));
   LiveOptions options;
   options.loop = options.bus = true;
-  options.on_shown = [&](const pipeline::Shot&, const Look& look) {
+  options.on_shown = [&](const pipeline::Shot&, const live::Look& look) {
     ++shown;
     if (look.state.recording) ++recorded;
   };

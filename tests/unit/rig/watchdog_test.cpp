@@ -44,7 +44,7 @@ TEST_F(RigLive, TheWatchdogIsFedWhileTheCameraIsSilent) {
   write_set();
   NotifySocket systemd(directory_ / "notify");
   std::atomic<bool> is_silent = false;
-  options_.around_cameras = [&](Cameras& cameras) {
+  options_.around_cameras = [&](live::Cameras& cameras) {
     test::put_around(cameras.observer, [&](CameraEvent event, Camera&) -> CameraEvent {
       if (!is_silent) return event;
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -146,7 +146,7 @@ TEST_F(RigLive, AStopThatComesWithASetThatWasReadOpensNoDevicesForIt) {
   std::stop_source stop;
   int opened = 0;
   options_.loop = true;
-  options_.around_cameras = [&](Cameras& cameras) {
+  options_.around_cameras = [&](live::Cameras& cameras) {
     ++opened;
     cameras.observer = std::make_unique<StoppingCamera>(std::move(cameras.observer), stop);
   };

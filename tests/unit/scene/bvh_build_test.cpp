@@ -1,6 +1,6 @@
 // What the builder writes: every triangle, in boxes that hold it, in a tree of good cost.
 #include "daemon/bench/shapes.hpp"
-#include "daemon/scene/bvh.hpp"
+#include "daemon/core/scene/bvh.hpp"
 #include "shaders/lib/shared.h"
 #include "tests/support/bvh_decode.hpp"
 #include "tests/support/test.hpp"

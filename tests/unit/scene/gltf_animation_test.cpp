@@ -1,7 +1,7 @@
 // glTF animations: what keys mean between them (by hand), what is taken up, what is refused.
 #include <glm/gtc/quaternion.hpp>
 
-#include "daemon/scene/animation.hpp"
+#include "daemon/core/scene/animation.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::gltf_animation_test {

@@ -2,9 +2,9 @@
 // it, what is refused.
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "daemon/scene/bvh_refit.hpp"
-#include "daemon/scene/gltf.hpp"
-#include "daemon/scene/placement.hpp"
+#include "daemon/core/scene/bvh_refit.hpp"
+#include "daemon/core/scene/gltf.hpp"
+#include "daemon/core/scene/placement.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::gltf_deformation_test {

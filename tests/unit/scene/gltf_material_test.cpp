@@ -1,4 +1,4 @@
-#include "daemon/scene/load_log.hpp"
+#include "daemon/core/scene/load_log.hpp"
 #include "tests/support/gltf_test.hpp"
 #include "tests/support/session_fixture.hpp"
 

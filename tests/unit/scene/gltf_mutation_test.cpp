@@ -2,10 +2,10 @@
 // refused with a previz::Error; what loads keeps scene.hpp's promises, and neither costs much.
 #include <sys/resource.h>
 
-#include "daemon/render/feature.hpp"
-#include "daemon/scene/bvh_refit.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/scene/placement.hpp"
+#include "daemon/core/render/world/feature.hpp"
+#include "daemon/core/scene/bvh_refit.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/scene/placement.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/support/gltf_compressed.hpp"
 #include "tests/support/gltf_sample.hpp"

@@ -1,4 +1,4 @@
-#include "daemon/scene/placement.hpp"
+#include "daemon/core/scene/placement.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::gltf_node_test {

@@ -1,4 +1,4 @@
-#include "daemon/scene/gltf_text.hpp"
+#include "daemon/core/scene/gltf_text.hpp"
 
 #include <random>
 

@@ -1,4 +1,4 @@
-#include "daemon/scene/gltf_uri.hpp"
+#include "daemon/core/scene/gltf_uri.hpp"
 
 #include "tests/support/gltf_test.hpp"
 #include "tests/support/session_fixture.hpp"

@@ -1,9 +1,9 @@
 // The scenes of the ground truth sets as set.json states them. The sets lie outside the repository.
 #include <nlohmann/json.hpp>
 
-#include "daemon/render/feature.hpp"
-#include "daemon/scene/load.hpp"
-#include "daemon/scene/scene.hpp"
+#include "daemon/core/render/world/feature.hpp"
+#include "daemon/core/scene/load.hpp"
+#include "daemon/core/scene/scene.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/test.hpp"
 

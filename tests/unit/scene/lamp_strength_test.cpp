@@ -1,5 +1,5 @@
 // Lamps of objects beside the film camera's white, in the units that programs write them in.
-#include "daemon/scene/lamp_strength.hpp"
+#include "daemon/core/scene/lamp_strength.hpp"
 
 #include <numbers>
 

@@ -1,8 +1,8 @@
 // The table of the extensions of materials, against what Khronos specifies and what the reader, the
 // shaders and the renderer take from it.
-#include "daemon/scene/material_extensions.hpp"
+#include "daemon/core/scene/material_extensions.hpp"
 
-#include "daemon/render/feature.hpp"
+#include "daemon/core/render/world/feature.hpp"
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::material_extensions_test {

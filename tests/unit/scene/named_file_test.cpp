@@ -1,4 +1,4 @@
-#include "daemon/scene/named_file.hpp"
+#include "daemon/core/scene/named_file.hpp"
 
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -1,5 +1,5 @@
 // A scene with things moved and relit: what moves, what goes along, and what stays bit for bit.
-#include "daemon/scene/placement.hpp"
+#include "daemon/core/scene/placement.hpp"
 
 #include <glm/gtc/matrix_transform.hpp>
 

@@ -1,4 +1,4 @@
-#include "daemon/scene/seen_backs.hpp"
+#include "daemon/core/scene/seen_backs.hpp"
 
 #include "tests/support/gltf_test.hpp"
 

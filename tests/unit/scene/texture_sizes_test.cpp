@@ -1,4 +1,4 @@
-#include "daemon/scene/texture_sizes.hpp"
+#include "daemon/core/scene/texture_sizes.hpp"
 
 #include "tests/support/gltf_test.hpp"
 

@@ -1,5 +1,5 @@
 // Values that are changed in a set file's text, and what stays as it was.
-#include "daemon/set/file_edit.hpp"
+#include "daemon/core/set/file_edit.hpp"
 
 #include "tests/support/test.hpp"
 

@@ -1,7 +1,7 @@
 // Every kind of mistake in a set file: reported once, at its line and column, with the key and a
 // way out.
-#include "daemon/set/load.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/set.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 
@@ -55,7 +55,7 @@ const Mistake syntax[] = {
     {"\n\n[set]\nname = \"a\n", "4:10: not valid TOML", ""},
     {"[set]\nname = \"\xff\"\n", "2:", "not valid TOML"},
     {"\n{ \"format_version\": 1 }", "2:1: is JSON, and a set file is TOML",
-     "previzd import FILE SESSION"},
+     "previz import FILE SESSION"},
     {TAG "[tag]\nhide=true\n", "4:1: tag: is a list of tables; allowed: [[tag]]",
      "did you mean [tags]?"},
     {"[set]\n  [tag]\nhide=true\n" TAG, "2:3: tag: is a list of tables", "did you mean [tags]?"},

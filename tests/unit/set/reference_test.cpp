@@ -1,8 +1,8 @@
 // config/reference.toml and the example: generated, complete, and true.
-#include "daemon/set/reference.hpp"
-#include "daemon/set/load.hpp"
-#include "daemon/set/set.hpp"
-#include "daemon/set/table.hpp"
+#include "daemon/core/set/reference.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/set.hpp"
+#include "daemon/core/set/table.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
 

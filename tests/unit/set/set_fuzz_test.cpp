@@ -1,8 +1,8 @@
 // Thousands of damaged set files: each is either a set or a list of problems that all name the
 // file.
-#include "daemon/set/load.hpp"
-#include "daemon/set/pose.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/pose.hpp"
+#include "daemon/core/set/set.hpp"
 #include "tests/fuzz/mutators.hpp"
 #include "tests/support/test.hpp"
 

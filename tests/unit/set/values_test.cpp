@@ -1,7 +1,7 @@
 // What a correct set file means: units, poses, corners, paths.
-#include "daemon/set/load.hpp"
-#include "daemon/set/pose.hpp"
-#include "daemon/set/set.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/pose.hpp"
+#include "daemon/core/set/set.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
 

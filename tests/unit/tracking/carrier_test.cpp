@@ -1,7 +1,7 @@
 // Carriers: things with tags that are moved by hand, on pictures whose poses the test knows.
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "daemon/tracking/carrier_pose.hpp"
+#include "daemon/core/tracking/carrier_pose.hpp"
 #include "tests/support/pose_error.hpp"
 #include "tests/support/tracking_fixture.hpp"
 

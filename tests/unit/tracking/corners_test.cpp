@@ -1,10 +1,10 @@
 // Corner refinement against exact, box-filtered pictures: bias, scatter and stated covariance.
-#include "daemon/tracking/corners.hpp"
+#include "daemon/core/tracking/corners.hpp"
 
 #include <opencv2/core.hpp>
 
-#include "daemon/tracking/edge.hpp"
-#include "daemon/tracking/photometry.hpp"
+#include "daemon/core/tracking/edge.hpp"
+#include "daemon/core/tracking/photometry.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 

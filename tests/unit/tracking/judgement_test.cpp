@@ -1,6 +1,6 @@
 // What the pictures of a take say against its tracking: tags of another kind, tags that are there
 // twice, residuals that noise does not explain and their causes.
-#include "daemon/tracking/pose_judgement.hpp"
+#include "daemon/core/tracking/pose_judgement.hpp"
 
 #include <fmt/format.h>
 
@@ -10,8 +10,8 @@
 #include <numbers>
 #include <stop_token>
 
-#include "daemon/set/tag_families.hpp"
-#include "daemon/tracking/other_tags.hpp"
+#include "daemon/core/set/tag_families.hpp"
+#include "daemon/core/tracking/other_tags.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::judgement_test {
@@ -263,7 +263,7 @@ TEST(PoseJudgement, SaysWhyATagIsNotUsed) {
   };
   const std::string moved = doubt([](auto& tags) { tags[3].world_from_tag[3].x += 0.03; });
   EXPECT_THAT(moved, HasSubstr("tag 3 is "));
-  EXPECT_THAT(moved, HasSubstr("`previzd calibrate tags TAKE`"));
+  EXPECT_THAT(moved, HasSubstr("`previz calibrate tags TAKE`"));
   // A corner's kCornerFloorPx is 0.05 mm across the view, at 0.75 m by 450 px of focal length, and
   // more than what four tags leave of the camera's pose: five of it, and half of the last digit.
   EXPECT_NEAR(number_after(moved, "tag 3 is "), 30, 0.3) << moved;
@@ -311,7 +311,7 @@ TEST(TagTrust, NamesTheOneThatTheOthersContradict) {
     EXPECT_THAT(trust.moved(3), IsEmpty()) << moved_m;
     // The tolerance is that of SaysWhyATagIsNotUsed, with two tags that give the pose.
     EXPECT_NEAR(number_after(trust.words(1), "is "), 1000 * moved_m, 0.5) << trust.words(1);
-    EXPECT_THAT(trust.words(1), HasSubstr("`previzd calibrate tags TAKE`"));
+    EXPECT_THAT(trust.words(1), HasSubstr("`previz calibrate tags TAKE`"));
   }
 }
 

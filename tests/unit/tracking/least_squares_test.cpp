@@ -1,5 +1,5 @@
 // The least-squares solver on problems whose minimum is known.
-#include "daemon/tracking/least_squares.hpp"
+#include "daemon/core/tracking/least_squares.hpp"
 
 #include "tests/support/test.hpp"
 

@@ -1,6 +1,6 @@
 // The pose that live pictures show: calm at rest, on time in motion, without jumps, and there while
 // the tags are covered for a moment.
-#include "daemon/tracking/pose_filter.hpp"
+#include "daemon/core/tracking/pose_filter.hpp"
 
 #include "tests/support/pose_error.hpp"
 #include "tests/support/tracking_fixture.hpp"

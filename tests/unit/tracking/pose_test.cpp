@@ -1,7 +1,7 @@
 // The joint pose on corners made by the test: exact recovery, covariance, moved tags, two poses.
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "daemon/tracking/joint_pose.hpp"
+#include "daemon/core/tracking/joint_pose.hpp"
 #include "tests/support/pose_error.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 

@@ -1,5 +1,5 @@
 // Trackers that take no pictures: the poses of a recorded track, by the times of frames.
-#include "daemon/tracking/trackers.hpp"
+#include "daemon/core/tracking/trackers.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::tracking::recorded_test {

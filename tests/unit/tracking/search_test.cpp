@@ -1,7 +1,7 @@
 // Live pictures are searched in parts: the plan of the parts, and what is found in them beside what
 // the whole picture shows.
-#include "daemon/tracking/search_plan.hpp"
-#include "daemon/tracking/tag_detector.hpp"
+#include "daemon/core/tracking/search_plan.hpp"
+#include "daemon/core/tracking/tag_detector.hpp"
 #include "tests/support/tracking_fixture.hpp"
 
 namespace previz::tracking::search_test {

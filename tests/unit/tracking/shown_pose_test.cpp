@@ -1,6 +1,6 @@
 // Pictures of a table with tags, some of them covered for a while, through the tracker and the
 // filter of what is shown.
-#include "daemon/tracking/pose_filter.hpp"
+#include "daemon/core/tracking/pose_filter.hpp"
 #include "tests/support/pose_error.hpp"
 #include "tests/support/tracking_fixture.hpp"
 

@@ -1,5 +1,5 @@
 // The search for settings, on simulated costs and errors.
-#include "daemon/trade/answer.hpp"
+#include "daemon/tools/trade/answer.hpp"
 
 #include "tests/support/test.hpp"
 
@@ -12,9 +12,10 @@ TEST(TradeAnswer, StepsAreThoseThatNoOtherBeats) {
                                                   {{4, 0.5, true}, 0.020, 0.07},
                                                   {{1, 0.25, true}, 0.008, 0.30}});
   ASSERT_EQ(best.size(), 3u);
-  EXPECT_EQ(best[0].making, (Making{4, 1, true}));
-  EXPECT_EQ(best[1].making, (Making{4, 0.5, true}));  // cheaper and nearer than one of the whole
-  EXPECT_EQ(best[2].making, (Making{1, 0.25, true}));
+  EXPECT_EQ(best[0].making, (timing::Making{4, 1, true}));
+  EXPECT_EQ(best[1].making,
+            (timing::Making{4, 0.5, true}));  // cheaper and nearer than one of the whole
+  EXPECT_EQ(best[2].making, (timing::Making{1, 0.25, true}));
 }
 
 TEST(TradeAnswer, ManyStepsAreThinnedAndKeepTheirEnds) {
@@ -79,11 +80,11 @@ class Simulated {
  public:
   TradeProbe probe(double slower = 1) {
     TradeProbe probe;
-    probe.error = [this](const TradeSettings& s, const Making& m, bool) {
+    probe.error = [this](const timing::FrameSettings& s, const timing::Making& m, bool) {
       asked_.push_back(s);
       return SquaredError{0.16 / m.samples / m.scale, 1e-4};
     };
-    probe.curves = [](const TradeSettings&, double) {
+    probe.curves = [](const timing::FrameSettings&, double) {
       StillCurves curves;
       for (int samples = 1; samples <= 64; samples *= 2) {
         curves.noisy.add(samples, {0.16 / samples, 1e-5});
@@ -91,17 +92,19 @@ class Simulated {
       }
       return curves;
     };
-    probe.gain = [this](const TradeSettings& s, bool) {
+    probe.gain = [this](const timing::FrameSettings& s, bool) {
       return s.estimation.max_depth == hopeless_ ? 0.1 : 1.0;
     };
-    probe.cost = [](const TradeSettings&, bool) { return PathCost(0.002, 0.01, 0.001); };
+    probe.cost = [](const timing::FrameSettings&, bool) {
+      return timing::PathCost(0.002, 0.01, 0.001);
+    };
     probe.rehearse = [this, slower](const set::Set& set) {
       rehearsed_.push_back(set);
       // As the governor: the first step that fits, else the last.
       Rehearsal shown;
       for (const set::PreviewStep& step : set.quality.steps) {
         shown.making = {step.samples, step.scale, step.denoise.value_or(true)};
-        shown.frame_s = slower * PathCost(0.002, 0.01, 0.001).seconds(shown.making);
+        shown.frame_s = slower * timing::PathCost(0.002, 0.01, 0.001).seconds(shown.making);
         if (shown.frame_s <= 0.9 / set.quality.fps) break;
       }
       shown.fps = std::min(1 / shown.frame_s, set.quality.fps);
@@ -112,7 +115,7 @@ class Simulated {
     probe.limit = [](std::optional<TradePhase>) {};
     return probe;
   }
-  std::vector<TradeSettings> asked_;
+  std::vector<timing::FrameSettings> asked_;
   std::vector<set::Set> rehearsed_;
   int hopeless_ = -1;
 };
@@ -177,12 +180,13 @@ TEST(TradeAnswer, DoesNotTryWhatWasWorseAlone) {
   simulated.hopeless_ = 2;
   const TradeAxis depth{"depth",
                         "",
-                        {{"2", [](TradeSettings& s) { s.estimation.max_depth = 2; }},
-                         {"4", [](TradeSettings& s) { s.estimation.max_depth = 4; }}},
+                        {{"2", [](timing::FrameSettings& s) { s.estimation.max_depth = 2; }},
+                         {"4", [](timing::FrameSettings& s) { s.estimation.max_depth = 4; }}},
                         ""};
   answer({25, 0.1}, {}, {}, {depth}, simulated.probe());
   std::set<int> depths;
-  for (const TradeSettings& asked : simulated.asked_) depths.insert(asked.estimation.max_depth);
+  for (const timing::FrameSettings& asked : simulated.asked_)
+    depths.insert(asked.estimation.max_depth);
   EXPECT_THAT(depths, AllOf(Contains(4), Not(Contains(2))));
 }
 

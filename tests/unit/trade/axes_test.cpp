@@ -1,13 +1,13 @@
-// What `previzd trade` makes of its table of axes.
-#include "daemon/trade/axes.hpp"
+// What `previz trade` makes of its table of axes.
+#include "daemon/tools/trade/axes.hpp"
 
-#include "daemon/render/feature.hpp"
+#include "daemon/core/render/world/feature.hpp"
 #include "shaders/lib/render_shared.h"
 #include "tests/support/test.hpp"
 
 namespace previz::trade::axes_test {
 
-TradePlan plan_of(const TradeSettings& own, const std::vector<std::string>& wanted = {}) {
+TradePlan plan_of(const timing::FrameSettings& own, const std::vector<std::string>& wanted = {}) {
   return plan_trade(own, trade_axes(own, ~gpu::FEATURE_TEXTURES), wanted);
 }
 
@@ -19,7 +19,7 @@ const TradePlan::Axis* axis_named(const TradePlan& plan, const std::string& name
 
 TEST(TradeAxes, EachHasTheSetsOwnSettingsOnceAndSomethingElse) {
   const TradePlan plan = plan_of({});
-  EXPECT_EQ(plan.methods.front().settings, TradeSettings());
+  EXPECT_EQ(plan.methods.front().settings, timing::FrameSettings());
   for (const TradePlan::Axis& axis : plan.axes) {
     EXPECT_EQ(std::ranges::count(axis.entries, 0u, &TradePlan::Entry::method), 1) << axis.name;
     EXPECT_GT(axis.entries.size(), 1u) << axis.name;
@@ -36,7 +36,7 @@ TEST(TradeAxes, NothingIsMeasuredTwice) {
 }
 
 TEST(TradeAxes, AnOwnValueOutsideTheListIsNamedByItself) {
-  TradeSettings own;
+  timing::FrameSettings own;
   own.estimation.max_depth = 12;
   const TradePlan outside = plan_of(own);
   EXPECT_EQ(axis_named(outside, "depth")->entries.front().variant, "12");
@@ -48,7 +48,7 @@ TEST(TradeAxes, AnOwnValueOutsideTheListIsNamedByItself) {
 }
 
 TEST(TradeAxes, WhereThereIsNothingToTradeThereIsNoAxis) {
-  TradeSettings own;
+  timing::FrameSettings own;
   const TradePlan pinhole = plan_of(own);
   EXPECT_FALSE(axis_named(pinhole, "lens"));
   EXPECT_TRUE(axis_named(pinhole, "light_mode"));
@@ -60,7 +60,7 @@ TEST(TradeAxes, WhereThereIsNothingToTradeThereIsNoAxis) {
 }
 
 TEST(TradeAxes, TheFeaturesOfTheSceneDecideWhichThereAre) {
-  const auto names = [](const TradeSettings& own, std::uint32_t needed) {
+  const auto names = [](const timing::FrameSettings& own, std::uint32_t needed) {
     std::vector<std::string> all;
     for (const TradeAxis& axis : trade_axes(own, needed)) all.push_back(axis.name);
     return all;
@@ -68,7 +68,7 @@ TEST(TradeAxes, TheFeaturesOfTheSceneDecideWhichThereAre) {
   const auto has = [](const std::vector<std::string>& all, const char* name) {
     return std::ranges::count(all, name) > 0;
   };
-  TradeSettings own;
+  timing::FrameSettings own;
   EXPECT_TRUE(has(names(own, gpu::FEATURE_PHOTONS), "caustics"));
   EXPECT_FALSE(has(names(own, gpu::FEATURE_FORKS), "caustics")) << "no mirror, no glass";
   EXPECT_TRUE(has(names(own, gpu::FEATURE_FORKS), "difference_sampling"));

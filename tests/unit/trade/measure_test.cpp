@@ -1,5 +1,5 @@
-// The figures of `previzd trade` on made-up pictures, where they are known in closed form.
-#include "daemon/trade/measure.hpp"
+// The figures of `previz trade` on made-up pictures, where they are known in closed form.
+#include "daemon/tools/trade/measure.hpp"
 
 #include "tests/support/test.hpp"
 

@@ -1,7 +1,7 @@
-// The table and the page of `previzd trade`, of a made-up sweep.
-#include "daemon/trade/page.hpp"
+// The table and the page of `previz trade`, of a made-up sweep.
+#include "daemon/tools/trade/page.hpp"
 
-#include "daemon/trade/chart.hpp"
+#include "daemon/core/output/chart.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/test.hpp"
 

@@ -1,7 +1,7 @@
-// `previzd trade` from end to end on a small take, on whatever Vulkan device there is.
-#include "daemon/trade/trade.hpp"
+// `previz trade` from end to end on a small take, on whatever Vulkan device there is.
+#include "daemon/tools/trade/trade.hpp"
 
-#include "daemon/set/load.hpp"
+#include "daemon/core/set/load.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/temporary_directory.hpp"
@@ -138,7 +138,9 @@ TEST_F(Trade, AnswersWithFilesThatRunAndRenderTake) {
 }
 
 TEST_F(Trade, TakesASessionOrTheNewestTakeOfALiveSet) {
-  const auto frame_of = [](const TradeSource& source) { return TradeFrame(source, {}).index(); };
+  const auto frame_of = [](const timing::FrameSource& source) {
+    return timing::TimedFrame(source, {}).index();
+  };
   EXPECT_EQ(frame_of({directory_ / "session"}), 1u);
   EXPECT_EQ(frame_of({directory_ / "session", directory_ / "set.toml"}), 1u);
   EXPECT_THROW(frame_of({directory_ / "set.toml", directory_ / "set.toml"}), Error);

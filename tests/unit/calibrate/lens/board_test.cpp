@@ -1,10 +1,10 @@
 // Boards as they are written, and found in pictures whose corners are known exactly.
 #include <opencv2/imgproc.hpp>
 
-#include "daemon/calibrate/lens/board.hpp"
-#include "daemon/calibrate/lens/board_finder.hpp"
-#include "daemon/calibrate/lens/board_guess.hpp"
-#include "daemon/calibrate/lens/marker_dictionary.hpp"
+#include "daemon/tools/calibrate/lens/board.hpp"
+#include "daemon/tools/calibrate/lens/board_finder.hpp"
+#include "daemon/tools/calibrate/lens/board_guess.hpp"
+#include "daemon/tools/calibrate/lens/marker_dictionary.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 

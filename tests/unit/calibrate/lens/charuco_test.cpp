@@ -3,11 +3,11 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "daemon/calibrate/lens/board_finder.hpp"
-#include "daemon/calibrate/lens/marker_dictionary.hpp"
-#include "daemon/calibrate/lens/observer.hpp"
-#include "daemon/calibrate/lens/views.hpp"
-#include "daemon/tracking/photometry.hpp"
+#include "daemon/core/tracking/photometry.hpp"
+#include "daemon/tools/calibrate/lens/board_finder.hpp"
+#include "daemon/tools/calibrate/lens/marker_dictionary.hpp"
+#include "daemon/tools/calibrate/lens/observer.hpp"
+#include "daemon/tools/calibrate/lens/views.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::calibrate::charuco_test {

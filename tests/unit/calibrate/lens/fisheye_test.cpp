@@ -1,11 +1,11 @@
 // The light camera's calibration: its lens on boards seen beyond 90 degrees, its pose by tags.
 #include <glm/gtc/quaternion.hpp>
 
-#include "daemon/calibrate/lens/coverage.hpp"
-#include "daemon/calibrate/lens/fisheye.hpp"
-#include "daemon/calibrate/lens/light_pose.hpp"
-#include "daemon/set/load.hpp"
-#include "daemon/set/print.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/print.hpp"
+#include "daemon/tools/calibrate/lens/coverage.hpp"
+#include "daemon/tools/calibrate/lens/fisheye.hpp"
+#include "daemon/tools/calibrate/lens/light_pose.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/tracking_synthetic.hpp"

@@ -3,11 +3,11 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
-#include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/lens/lens_file.hpp"
-#include "daemon/calibrate/lens/lens_file_check.hpp"
-#include "daemon/calibrate/lens/lens_refit.hpp"
-#include "daemon/set/load.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/tools/calibrate/calibrate.hpp"
+#include "daemon/tools/calibrate/lens/lens_file.hpp"
+#include "daemon/tools/calibrate/lens/lens_file_check.hpp"
+#include "daemon/tools/calibrate/lens/lens_refit.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "tests/support/session_fixture.hpp"

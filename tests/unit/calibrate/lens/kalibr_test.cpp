@@ -3,11 +3,11 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/lens/board_finder.hpp"
-#include "daemon/calibrate/lens/observer.hpp"
-#include "daemon/calibrate/lens/views.hpp"
-#include "daemon/tracking/photometry.hpp"
+#include "daemon/core/tracking/photometry.hpp"
+#include "daemon/tools/calibrate/calibrate.hpp"
+#include "daemon/tools/calibrate/lens/board_finder.hpp"
+#include "daemon/tools/calibrate/lens/observer.hpp"
+#include "daemon/tools/calibrate/lens/views.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/tracking_synthetic.hpp"
 

@@ -1,7 +1,7 @@
 // What depth of field needs of the lens, from what is known of it.
-#include "daemon/calibrate/lens/lens_fit.hpp"
-#include "daemon/set/load.hpp"
-#include "daemon/set/print.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/print.hpp"
+#include "daemon/tools/calibrate/lens/lens_fit.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::calibrate::lens_test {

@@ -2,12 +2,12 @@
 // views are missing.
 #include <opencv2/core.hpp>
 
-#include "daemon/calibrate/lens/coverage.hpp"
-#include "daemon/calibrate/lens/observer.hpp"
-#include "daemon/calibrate/lens/report.hpp"
-#include "daemon/calibrate/lens/residual_plot.hpp"
-#include "daemon/set/load.hpp"
-#include "daemon/set/print.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/print.hpp"
+#include "daemon/tools/calibrate/lens/coverage.hpp"
+#include "daemon/tools/calibrate/lens/observer.hpp"
+#include "daemon/tools/calibrate/lens/report.hpp"
+#include "daemon/tools/calibrate/lens/residual_plot.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 

@@ -1,7 +1,7 @@
 // Lens files of photogrammetry and film programs: their numbers are converted as their
 // documentation says, or the refusal names the program and how to convert them.
-#include "daemon/calibrate/lens/lens_file.hpp"
-#include "daemon/calibrate/lens/lens_file_check.hpp"
+#include "daemon/tools/calibrate/lens/lens_file.hpp"
+#include "daemon/tools/calibrate/lens/lens_file_check.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "drivers/calibration/pinhole.hpp"
 #include "tests/support/test.hpp"

@@ -1,10 +1,10 @@
 // The calibrations on real pictures, where they are there.
 #include <opencv2/calib3d.hpp>
 
-#include "daemon/calibrate/lens/coverage.hpp"
-#include "daemon/calibrate/lens/fisheye.hpp"
-#include "daemon/calibrate/lens/observer.hpp"
-#include "daemon/calibrate/lens/source.hpp"
+#include "daemon/tools/calibrate/lens/coverage.hpp"
+#include "daemon/tools/calibrate/lens/fisheye.hpp"
+#include "daemon/tools/calibrate/lens/observer.hpp"
+#include "daemon/tools/calibrate/lens/source.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/test.hpp"
 #include "tests/support/units.hpp"

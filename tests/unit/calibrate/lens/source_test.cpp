@@ -1,6 +1,6 @@
 // Which files of a folder are its pictures.
-#include "daemon/calibrate/lens/source.hpp"
-#include "drivers/session/files.hpp"
+#include "daemon/tools/calibrate/lens/source.hpp"
+#include "daemon/core/session/files.hpp"
 #include "tests/support/test.hpp"
 
 namespace previz::calibrate::source_test {

@@ -1,11 +1,11 @@
 // The code from which on a camera clips, from brackets of cameras that clip at a known one.
 #include <opencv2/imgcodecs.hpp>
 
-#include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/sensor/clip_fit.hpp"
-#include "daemon/lighting/response.hpp"
-#include "daemon/set/load.hpp"
-#include "daemon/set/print.hpp"
+#include "daemon/core/lighting/response.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/print.hpp"
+#include "daemon/tools/calibrate/calibrate.hpp"
+#include "daemon/tools/calibrate/sensor/clip_fit.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/shared_data.hpp"
@@ -63,7 +63,7 @@ std::vector<BracketPicture> bracket_of(const Camera& camera, double first = 1.0 
   return bracket;
 }
 
-// The curve that `previzd calibrate response` would fit, here exactly; only codes below the middle
+// The curve that `previz calibrate response` would fit, here exactly; only codes below the middle
 // one matter.
 ResponseCurve curve_of(const Camera& camera) {
   std::vector<double> signal(256);

@@ -1,11 +1,11 @@
 // Response curves from brackets whose curve is known, and from the real ones.
 #include <opencv2/imgcodecs.hpp>
 
-#include "daemon/calibrate/sensor/brackets.hpp"
-#include "daemon/calibrate/sensor/response_fit.hpp"
-#include "daemon/lighting/response.hpp"
-#include "daemon/set/load.hpp"
-#include "daemon/set/print.hpp"
+#include "daemon/core/lighting/response.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/print.hpp"
+#include "daemon/tools/calibrate/sensor/brackets.hpp"
+#include "daemon/tools/calibrate/sensor/response_fit.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_directory.hpp"

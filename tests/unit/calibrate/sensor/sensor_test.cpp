@@ -1,6 +1,6 @@
 // Dark level and vignetting of the light camera, from pictures made by code.
-#include "daemon/calibrate/sensor/dark_fit.hpp"
-#include "daemon/calibrate/sensor/vignetting_fit.hpp"
+#include "daemon/tools/calibrate/sensor/dark_fit.hpp"
+#include "daemon/tools/calibrate/sensor/vignetting_fit.hpp"
 #include "drivers/calibration/fisheye.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/lighting_pictures.hpp"

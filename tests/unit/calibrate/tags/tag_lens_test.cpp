@@ -1,10 +1,10 @@
 // The lens refined by tags, where boards filled the centre of the picture alone: made by the test
 // from a lens that is known.
-#include "daemon/calibrate/tags/tag_lens.hpp"
-#include "daemon/calibrate/lens/observer.hpp"
-#include "daemon/calibrate/tags/tag_tables.hpp"
-#include "daemon/set/load.hpp"
-#include "daemon/set/print.hpp"
+#include "daemon/tools/calibrate/tags/tag_lens.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/core/set/print.hpp"
+#include "daemon/tools/calibrate/lens/observer.hpp"
+#include "daemon/tools/calibrate/tags/tag_tables.hpp"
 #include "tests/support/calibrate_pictures.hpp"
 #include "tests/support/tag_walks.hpp"
 #include "tests/support/tracking_synthetic.hpp"

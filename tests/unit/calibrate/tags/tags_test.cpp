@@ -4,12 +4,12 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/tags/moved_tags.hpp"
-#include "daemon/calibrate/tags/tag_survey.hpp"
-#include "daemon/calibrate/tags/tag_tables.hpp"
-#include "daemon/calibrate/tags/tag_walk.hpp"
-#include "daemon/set/load.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/tools/calibrate/calibrate.hpp"
+#include "daemon/tools/calibrate/tags/moved_tags.hpp"
+#include "daemon/tools/calibrate/tags/tag_survey.hpp"
+#include "daemon/tools/calibrate/tags/tag_tables.hpp"
+#include "daemon/tools/calibrate/tags/tag_walk.hpp"
 #include "tests/support/content_of.hpp"
 #include "tests/support/tag_walks.hpp"
 #include "tests/support/temporary_directory.hpp"

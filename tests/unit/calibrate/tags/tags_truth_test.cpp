@@ -2,14 +2,14 @@
 // there.
 #include <nlohmann/json.hpp>
 
-#include "daemon/calibrate/calibrate.hpp"
-#include "daemon/calibrate/lens/source.hpp"
-#include "daemon/calibrate/tags/moved_tags.hpp"
-#include "daemon/calibrate/tags/tag_lens.hpp"
-#include "daemon/calibrate/tags/tag_survey.hpp"
-#include "daemon/calibrate/tags/tag_walk.hpp"
-#include "daemon/set/load.hpp"
-#include "drivers/session/session.hpp"
+#include "daemon/core/session/session.hpp"
+#include "daemon/core/set/load.hpp"
+#include "daemon/tools/calibrate/calibrate.hpp"
+#include "daemon/tools/calibrate/lens/source.hpp"
+#include "daemon/tools/calibrate/tags/moved_tags.hpp"
+#include "daemon/tools/calibrate/tags/tag_lens.hpp"
+#include "daemon/tools/calibrate/tags/tag_survey.hpp"
+#include "daemon/tools/calibrate/tags/tag_walk.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
