@@ -14,16 +14,16 @@ class Accumulator {
  public:
   explicit Accumulator(Device& device)
       : device_(device), kernel_(device, "accumulate", accumulate_spv, {0}) {
-    const render::Purpose purpose(device, "a test", "");
+    const render::Purpose purpose{"a test", ""};
     const vk::DeviceSize samples = slots * sizeof(gpu::vec4);
     for (Buffer* buffer : {&mixed_, &real_, &landed_, &aov_, &albedo_})
-      *buffer = render::create_storage_buffer(device, samples);
-    render::upload_storage(device, pixels_, std::vector<gpu::GpuPixel>(1));
-    render::upload_storage(device, control_, std::vector<gpu::GpuControl>(1));
-    render::upload_storage(device, limits_, std::vector{gpu::UNLIMITED});
+      *buffer = render::create_storage_buffer(device, purpose, samples);
+    render::upload_storage(device, purpose, pixels_, std::vector<gpu::GpuPixel>(1));
+    render::upload_storage(device, purpose, control_, std::vector<gpu::GpuControl>(1));
+    render::upload_storage(device, purpose, limits_, std::vector{gpu::UNLIMITED});
     gpu::GpuFrame frame{};
     frame.width = frame.height = 1;
-    render::upload_storage(device, frame_, std::vector{frame});
+    render::upload_storage(device, purpose, frame_, std::vector{frame});
   }
 
   static constexpr std::uint32_t batch_samples = 4096;

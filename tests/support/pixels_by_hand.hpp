@@ -27,26 +27,26 @@ inline render::Layers layers_of(std::span<const gpu::GpuPixel> pixels, std::int6
 inline Plate present(std::span<const gpu::GpuPixel> pixels, const Plate& plate,
                      const lighting::Response& response, double exposure,
                      render::Denoiser& denoiser, bool denoise, int tile_rows) {
-  const render::Purpose purpose(*shared_device(), "a test", "");
+  const render::Purpose purpose{"a test", ""};
   std::vector<render::Buffer> buffers;
   std::vector<std::pair<int, int>> rows;
   for (int row = 0; row < plate.height; row += tile_rows) {
     rows.emplace_back(row, std::min(tile_rows, plate.height - row));
     const auto tile = pixels.subspan(static_cast<std::size_t>(row) * plate.width,
                                      static_cast<std::size_t>(rows.back().second) * plate.width);
-    render::upload_storage(*shared_device(), buffers.emplace_back(),
+    render::upload_storage(*shared_device(), purpose, buffers.emplace_back(),
                            std::vector(tile.begin(), tile.end()));
   }
   const auto samples = static_cast<std::int64_t>(pixels.front().square_high.w);
   render::Buffer codes;
   std::vector<std::uint16_t> padded = plate.samples;
   padded.resize((padded.size() + 2) / 2 * 2);
-  render::upload_storage(*shared_device(), codes, padded);
+  render::upload_storage(*shared_device(), purpose, codes, padded);
   const bool has_plate = !plate.samples.empty();
   const bool is_clipped =
       has_plate && *std::ranges::max_element(plate.samples) >= response.clipping().from;
   render::Buffer control;
-  render::upload_storage(*shared_device(), control, std::vector{gpu::GpuControl{}});
+  render::upload_storage(*shared_device(), purpose, control, std::vector{gpu::GpuControl{}});
   render::ToPresent what{{},         plate.width, plate.height, control, codes,  has_plate,
                          is_clipped, exposure,    {},           samples, denoise};
   for (std::size_t i = 0; i < rows.size(); ++i)

@@ -111,8 +111,9 @@ void Renderer::Impl::make_wavefront() {
 
 void Renderer::Impl::upload_rays() {
   const PinholeIntrinsics& lens = calibration.intrinsics;
-  const Purpose purpose(*device, "the rays", "make the picture smaller", lens.width, lens.height);
-  upload_texels(*device, rays, corner_rays(calibration.intrinsics), vk::Format::eR32G32Sfloat);
+  const Purpose purpose{"the rays", "make the picture smaller", lens.width, lens.height};
+  upload_texels(*device, purpose, rays, corner_rays(calibration.intrinsics),
+                vk::Format::eR32G32Sfloat);
 }
 
 void Renderer::Impl::upload_frame() {
@@ -131,8 +132,8 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.keeps_albedo = (needed() & patterned) != 0 ? 1 : 0;
   gpu_frame.clip_from = is_clipped ? response->clipping().from : gpu::NO_INDEX;
   scene.describe(gpu_frame, needed());
-  const Purpose purpose(*device, "the frame's settings", "close other programs");
-  upload_storage(*device, frame_buffer, std::vector{gpu_frame});
+  const Purpose purpose{"the frame's settings", "close other programs"};
+  upload_storage(*device, purpose, frame_buffer, std::vector{gpu_frame});
 }
 
 std::uint32_t Renderer::Impl::photons() const {

@@ -55,8 +55,8 @@ GpuTracer::GpuTracer(render::Device& device, const std::vector<glm::uvec4>& texe
       distances_pass_(device, "closest_distances", closest_distances_spv, {0, bits}),
       blocked_pass_(device, "blocked_worlds", blocked_worlds_spv, {0, bits}),
       structures_(device) {
-  const render::Purpose purpose(device, "the triangles' tree", "use fewer triangles");
-  render::upload_texels(device, bvh_, texels, vk::Format::eR32G32B32A32Uint);
+  const render::Purpose purpose{"the triangles' tree", "use fewer triangles"};
+  render::upload_texels(device, purpose, bvh_, texels, vk::Format::eR32G32B32A32Uint);
 }
 
 GpuTracer::GpuTracer(render::Device& device, const scene::Scene& scene, scene::BvhQuality quality)
@@ -80,9 +80,9 @@ void GpuTracer::build_structures(const scene::Scene& scene) {
     for (const glm::vec3& position : from.positions)
       vertices.insert(vertices.end(), {glm::vec4(position, 0), glm::vec4(0)});
   }
-  const render::Purpose purpose(device_, "the vertices", "use fewer triangles");
+  const render::Purpose purpose{"the vertices", "use fewer triangles"};
   render::Buffer buffer;
-  render::upload_texels(device_, buffer, vertices, vk::Format::eR32G32B32A32Sfloat);
+  render::upload_texels(device_, purpose, buffer, vertices, vk::Format::eR32G32B32A32Sfloat);
   structures_.build(meshes, buffer);
   std::vector<render::RayStructures::Instance> instances;
   for (const scene::Instance& instance : scene.instances)
@@ -94,12 +94,12 @@ void GpuTracer::build_structures(const scene::Scene& scene) {
 
 void GpuTracer::set_rays(std::span<const Ray> rays) {
   count_ = static_cast<std::uint32_t>(rays.size());
-  const render::Purpose purpose(device_, "the rays", "use fewer rays");
-  render::upload_texels(device_, rays_, std::vector<Ray>(rays.begin(), rays.end()),
+  const render::Purpose purpose{"the rays", "use fewer rays"};
+  render::upload_texels(device_, purpose, rays_, std::vector<Ray>(rays.begin(), rays.end()),
                         vk::Format::eR32G32B32A32Sfloat);
   const vk::DeviceSize size = rays.size() * sizeof(TracedHit);
   if (!results_.buffer || results_.size < size)
-    results_ = render::create_storage_buffer(device_, size);
+    results_ = render::create_storage_buffer(device_, purpose, size);
 }
 
 void GpuTracer::dispatch(render::Kernel& pass, std::uint32_t worlds) {

@@ -22,9 +22,11 @@ struct Alone {
       texels.emplace_back(mesh.positions[i], 0.25f);
       texels.emplace_back(mesh.normals[i], 0.75f);
     }
-    const render::Purpose purpose(*shared_device(), "a test", "");
-    render::upload_texels(*shared_device(), records, bvh.texels, vk::Format::eR32G32B32A32Uint);
-    render::upload_texels(*shared_device(), vertices, texels, vk::Format::eR32G32B32A32Sfloat);
+    const render::Purpose purpose{"a test", ""};
+    render::upload_texels(*shared_device(), purpose, records, bvh.texels,
+                          vk::Format::eR32G32B32A32Uint);
+    render::upload_texels(*shared_device(), purpose, vertices, texels,
+                          vk::Format::eR32G32B32A32Sfloat);
     deformer.upload({{&bvh, 0, 0}});
   }
 

@@ -81,8 +81,9 @@ TEST(DeviceLimits, OfThisDeviceRefuseABufferByName) {
   EXPECT_GE(allows.allocation_bytes, 1u << 30);
   EXPECT_GE(allows.push_bytes, push_bytes);
   const auto create_past_it = [&] {
-    const render::Purpose purpose(device, "the texels of a test", "use fewer");
-    render::create_texel_buffer(device, std::max(16 * allows.texels, allows.storage_bytes) + 16,
+    const render::Purpose purpose{"the texels of a test", "use fewer"};
+    render::create_texel_buffer(device, purpose,
+                                std::max(16 * allows.texels, allows.storage_bytes) + 16,
                                 vk::Format::eR32G32B32A32Sfloat);
   };
   EXPECT_THAT(error_of(create_past_it),

@@ -22,8 +22,8 @@ Buffer control_with(std::uint32_t shadow_rays, Device& device = *shared_device()
   gpu::GpuControl control{};
   control.shadow_count = shadow_rays;
   Buffer buffer;
-  const render::Purpose purpose(device, "a test", "");
-  render::upload_storage(device, buffer, std::vector{control});
+  const render::Purpose purpose{"a test", ""};
+  render::upload_storage(device, purpose, buffer, std::vector{control});
   return buffer;
 }
 
@@ -98,7 +98,7 @@ struct Compiler {
   int calls = 0;
 
   std::shared_ptr<const render::Program> program(int shader, std::uint32_t constant) {
-    return device.program(&shaders[shader], std::array{constant}, [&] {
+    return device.programs().get(&shaders[shader], std::array{constant}, [&] {
       ++calls;
       return std::make_shared<const render::Program>();
     });
@@ -118,7 +118,7 @@ TEST(Programs, OfTheSameShaderAndConstantsAreCompiledOnce) {
 TEST(Programs, ThatWereNotWantedForLongAreForgotten) {
   Device device({.validation = true, .name = ""});
   Compiler compiler{device};
-  constexpr int most = Device::most_programs;
+  constexpr int most = render::Programs::most;
   for (int i = 0; i < most; ++i) compiler.program(0, static_cast<std::uint32_t>(i));
   compiler.program(0, 0);  // wanted again, so that 1 is the oldest
   EXPECT_EQ(compiler.calls, most);

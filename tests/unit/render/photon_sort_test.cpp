@@ -26,10 +26,10 @@ std::vector<Photons> sort_photons(render::Device& device, const std::vector<std:
   std::vector<gpu::GpuPhoton> photons(keys.size());
   for (std::size_t i = 0; i < photons.size(); ++i) photons[i].mixed.x = static_cast<float>(i);
   Buffer frames, photon_buffer, key_buffer;
-  const render::Purpose purpose(device, "a test", "");
-  render::upload_storage(device, frames, std::vector{frame});
-  render::upload_storage(device, photon_buffer, photons);
-  render::upload_storage(device, key_buffer, keys);
+  const render::Purpose purpose{"a test", ""};
+  render::upload_storage(device, purpose, frames, std::vector{frame});
+  render::upload_storage(device, purpose, photon_buffer, photons);
+  render::upload_storage(device, purpose, key_buffer, keys);
   Buffers buffers;
   map.add_to(buffers);
   buffers["frame"] = &frames;

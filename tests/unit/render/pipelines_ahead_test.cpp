@@ -108,22 +108,22 @@ TEST(PipelinesAhead, ThatAPictureNeedsMeanwhileAreMadeOnceAndHoldUpNoOther) {
   const auto make = [] { return std::make_shared<const render::Program>(); };
   std::promise<void> begun, is_to_end;
   const std::jthread ahead([&] {
-    device->program_ahead(&shader, {}, [&] {
+    device->programs().ahead(&shader, {}, [&] {
       begun.set_value();
       is_to_end.get_future().wait();
       return make();
     });
   });
   begun.get_future().wait();
-  device->program_ahead(&shader, {}, make);  // which returns at once
-  EXPECT_TRUE(device->program(&other_shader, {}, make));
-  std::future<render::Device::ProgramPtr> waits =
-      std::async(std::launch::async, [&] { return device->program(&shader, {}, make); });
+  device->programs().ahead(&shader, {}, make);  // which returns at once
+  EXPECT_TRUE(device->programs().get(&other_shader, {}, make));
+  std::future<render::Programs::Ptr> waits =
+      std::async(std::launch::async, [&] { return device->programs().get(&shader, {}, make); });
   EXPECT_TRUE(
       wait_until("both are awaited", [&] { return device->work().pipelines_awaited == 2; }));
   is_to_end.set_value();
-  const render::Device::ProgramPtr waited_for = waits.get();
-  EXPECT_EQ(waited_for, device->program(&shader, {}, make));
+  const render::Programs::Ptr waited_for = waits.get();
+  EXPECT_EQ(waited_for, device->programs().get(&shader, {}, make));
   EXPECT_EQ(device->made().programs, 2u);
   EXPECT_EQ(device->work().pipelines_awaited, 2u);
 }
@@ -132,16 +132,17 @@ TEST(PipelinesAhead, ThatCouldNotBeMadeAreMadeByThePictureThatWaits) {
   const auto device = render::open_device({});
   std::promise<void> begun, is_to_fail;
   const std::jthread ahead([&] {
-    const auto fail = [&]() -> render::Device::ProgramPtr {
+    const auto fail = [&]() -> render::Programs::Ptr {
       begun.set_value();
       is_to_fail.get_future().wait();
       throw Error("no memory");
     };
-    EXPECT_EQ(error_of([&] { device->program_ahead(&shader, {}, fail); }), "no memory");
+    EXPECT_EQ(error_of([&] { device->programs().ahead(&shader, {}, fail); }), "no memory");
   });
   begun.get_future().wait();
-  std::future<render::Device::ProgramPtr> waits = std::async(std::launch::async, [&] {
-    return device->program(&shader, {}, [] { return std::make_shared<const render::Program>(); });
+  std::future<render::Programs::Ptr> waits = std::async(std::launch::async, [&] {
+    return device->programs().get(&shader, {},
+                                  [] { return std::make_shared<const render::Program>(); });
   });
   EXPECT_TRUE(wait_until("it is awaited", [&] { return device->work().pipelines_awaited == 1; }));
   is_to_fail.set_value();

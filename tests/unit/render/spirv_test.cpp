@@ -123,7 +123,7 @@ TEST(Spirv, APassIsCompiledOnceForFeaturesThatItDoesNotAskAbout) {
   const render::Kernel kernel(*shared_device(), "extend", extend_spv,
                               {gpu::FEATURE_ALPHA | gpu::FEATURE_PHOTONS});
   const std::array<std::uint32_t, 1> masked = {gpu::FEATURE_ALPHA};
-  const auto compiled = shared_device()->program(extend_spv, masked, [] {
+  const auto compiled = shared_device()->programs().get(extend_spv, masked, [] {
     ADD_FAILURE() << "it is compiled again";
     return std::make_shared<const render::Program>();
   });

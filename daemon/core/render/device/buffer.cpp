@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cassert>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -23,21 +22,16 @@ std::string size_words(vk::DeviceSize bytes) {
 }
 
 // "a buffer of 34.1 MB for the photons"
-std::string buffer_words(Device& device, vk::DeviceSize size) {
-  assert(device.purpose());
-  return "a buffer of " + size_words(size) +
-         (device.purpose() ? " for " + device.purpose()->what() : "");
-}
-
-std::string advice_words(Device& device) {
-  return device.purpose() ? std::string("; ") + device.purpose()->advice() : "";
+std::string buffer_words(const Purpose& purpose, vk::DeviceSize size) {
+  return "a buffer of " + size_words(size) + " for " + purpose.words();
 }
 
 // Throws previz::Error where the device does not allow so large a buffer.
-void check_buffer(Device& device, const BufferNeed& need) {
+void check_buffer(const Device& device, const Purpose& purpose, const BufferNeed& need) {
   if (const auto past = past_limits(device.allows(), need))
-    throw Error("Vulkan: " + buffer_words(device, need.bytes) + " needs " + past->asked + ", but " +
-                device.name() + " allows " + std::to_string(past->allowed) + advice_words(device));
+    throw Error("Vulkan: " + buffer_words(purpose, need.bytes) + " needs " + past->asked +
+                ", but " + device.name() + " allows " + std::to_string(past->allowed) + "; " +
+                purpose.advice);
 }
 
 std::uint64_t next_id() {
@@ -45,10 +39,10 @@ std::uint64_t next_id() {
   return ++last;
 }
 
-Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage,
-                     vk::MemoryPropertyFlags wanted, vk::MemoryPropertyFlags preferred) {
+Buffer create_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
+                     vk::BufferUsageFlags usage, vk::MemoryPropertyFlags wanted,
+                     vk::MemoryPropertyFlags preferred) {
   using Usage = vk::BufferUsageFlagBits;
-  assert(device.purpose());
   device.submissions().finish();  // what is no longer needed is freed first
   Buffer result;
   result.size = std::max<vk::DeviceSize>((size + 15) / 16 * 16, 16);
@@ -60,11 +54,11 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
     const auto requirements = parts.buffer.getMemoryRequirements();
     std::uint32_t types = requirements.memoryTypeBits;
     const bool is_own = static_cast<bool>(wanted & vk::MemoryPropertyFlagBits::eDeviceLocal);
-    if (is_own && (types & device.mapped_types()) != 0) {
-      types &= device.mapped_types();
+    if (is_own && (types & device.memory().mapped_types()) != 0) {
+      types &= device.memory().mapped_types();
       wanted |= vk::MemoryPropertyFlagBits::eHostVisible;
     }
-    const auto type = device.memory_type(types, wanted, preferred);
+    const auto type = device.memory().type(types, wanted, preferred);
     const vk::MemoryAllocateFlagsInfo with_address(vk::MemoryAllocateFlagBits::eDeviceAddress);
     vk::MemoryAllocateInfo allocate(requirements.size, type);
     if (usage & vk::BufferUsageFlagBits::eShaderDeviceAddress) allocate.pNext = &with_address;
@@ -77,8 +71,8 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
   } catch (const vk::SystemError& error) {
     const bool is_full = error.code() == vk::Result::eErrorOutOfDeviceMemory;
     throw Error("Vulkan: " + device.name() + (is_full ? " is out of memory" : " has no room") +
-                " for " + buffer_words(device, result.size) +
-                (is_full ? "" : std::string(": ") + error.what()) + advice_words(device));
+                " for " + buffer_words(purpose, result.size) +
+                (is_full ? "" : std::string(": ") + error.what()) + "; " + purpose.advice);
   }
   ++device.submissions().work.allocations;
   result.buffer = *result.parts->buffer;
@@ -89,22 +83,24 @@ Buffer create_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags u
 using Memory = vk::MemoryPropertyFlagBits;
 
 // Where the host works in the device's memory, or can write it, it is mapped.
-Buffer create_device_buffer(Device& device, vk::DeviceSize size, vk::BufferUsageFlags usage) {
+Buffer create_device_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
+                            vk::BufferUsageFlags usage) {
   using Usage = vk::BufferUsageFlagBits;
-  device.count_buffer();
+  device.memory().count_buffer();
   if (device.traces_in_hardware())
     usage |= Usage::eShaderDeviceAddress | Usage::eAccelerationStructureBuildInputReadOnlyKHR;
   const vk::MemoryPropertyFlags host = Memory::eHostVisible | Memory::eHostCoherent;
   return device.shares_host_memory()
-             ? create_buffer(device, size, usage, host, Memory::eDeviceLocal)
-             : create_buffer(device, size, usage, Memory::eDeviceLocal, {});
+             ? create_buffer(device, purpose, size, usage, host, Memory::eDeviceLocal)
+             : create_buffer(device, purpose, size, usage, Memory::eDeviceLocal, {});
 }
 
 Buffer create_staging_buffer(Device& device, vk::DeviceSize size,
                              vk::MemoryPropertyFlags preferred) {
-  const Purpose purpose(device, "copies to and from the graphics card",
-                        "close other programs, or make the picture smaller");
-  return create_buffer(device, size, {}, Memory::eHostVisible | Memory::eHostCoherent, preferred);
+  constexpr Purpose purpose{"copies to and from the graphics card",
+                            "close other programs, or make the picture smaller"};
+  return create_buffer(device, purpose, size, {}, Memory::eHostVisible | Memory::eHostCoherent,
+                       preferred);
 }
 
 vk::DeviceSize texel_bytes_of(vk::Format format) {
@@ -124,8 +120,9 @@ vk::DeviceSize texel_bytes_of(vk::Format format) {
 }
 
 Staging& staging_of(Device& device) {
-  if (!device.staging()) device.staging() = std::make_shared<Staging>(device);
-  return *device.staging();
+  std::shared_ptr<Staging>& staging = device.memory().staging();
+  if (!staging) staging = std::make_shared<Staging>(device);
+  return *staging;
 }
 
 // Returns whether the host can write the buffer in place. A card may still be working with it,
@@ -155,58 +152,40 @@ void record_copy_down(Device& device, const Buffer& from, const Buffer& to, vk::
 
 }  // namespace
 
-Purpose::Purpose(Device& device, const char* what, const char* advice, int width, int height)
-    : device_(device),
-      what_(what),
-      advice_(advice),
-      width_(width),
-      height_(height),
-      around_(std::exchange(device.purpose(), this)) {}
-
-Purpose::~Purpose() {
-  device_.purpose() = around_;
+Buffer create_storage_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size) {
+  check_buffer(device, purpose, {size, 0, true});
+  return create_device_buffer(device, purpose, size, vk::BufferUsageFlagBits::eStorageBuffer);
 }
 
-std::string Purpose::what() const {
-  return width_ == 0 ? what_
-                     : std::string(what_) + " of a picture of " + std::to_string(width_) + "x" +
-                           std::to_string(height_);
-}
-
-Buffer create_storage_buffer(Device& device, vk::DeviceSize size) {
-  check_buffer(device, {size, 0, true});
-  return create_device_buffer(device, size, vk::BufferUsageFlagBits::eStorageBuffer);
-}
-
-Buffer create_indirect_buffer(Device& device, vk::DeviceSize size) {
+Buffer create_indirect_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size) {
   return create_device_buffer(
-      device, size,
+      device, purpose, size,
       vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eIndirectBuffer);
 }
 
-Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format,
-                           bool is_storage) {
+Buffer create_texel_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
+                           vk::Format format, bool is_storage) {
   using Usage = vk::BufferUsageFlagBits;
-  if (device.reads_storage()) return create_storage_buffer(device, size);
-  check_buffer(device, {size, size / texel_bytes_of(format), is_storage});
-  Buffer result =
-      create_device_buffer(device, size, Usage::eUniformTexelBuffer | Usage::eStorageBuffer);
+  if (device.reads_storage()) return create_storage_buffer(device, purpose, size);
+  check_buffer(device, purpose, {size, size / texel_bytes_of(format), is_storage});
+  Buffer result = create_device_buffer(device, purpose, size,
+                                       Usage::eUniformTexelBuffer | Usage::eStorageBuffer);
   result.parts->view =
       vk::raii::BufferView(device.vk(), {{}, result.buffer, format, 0, VK_WHOLE_SIZE});
   result.view = *result.parts->view;
   return result;
 }
 
-Buffer create_structure_memory(Device& device, vk::DeviceSize size) {
-  check_buffer(device, {size, 0, false});
-  return create_device_buffer(device, size,
+Buffer create_structure_memory(Device& device, const Purpose& purpose, vk::DeviceSize size) {
+  check_buffer(device, purpose, {size, 0, false});
+  return create_device_buffer(device, purpose, size,
                               vk::BufferUsageFlagBits::eStorageBuffer |
                                   vk::BufferUsageFlagBits::eAccelerationStructureStorageKHR);
 }
 
-Buffer create_structure_buffer(Device& device, vk::DeviceSize size,
+Buffer create_structure_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
                                vk::AccelerationStructureTypeKHR type) {
-  Buffer result = create_structure_memory(device, size);
+  Buffer result = create_structure_memory(device, purpose, size);
   result.parts->structure = vk::raii::AccelerationStructureKHR(
       device.vk(), vk::AccelerationStructureCreateInfoKHR({}, result.buffer, 0, result.size, type));
   result.structure = *result.parts->structure;
@@ -340,8 +319,8 @@ void record_clear(Device& device, const vk::raii::CommandBuffer& commands, const
 std::optional<CopySpeed> copy_speed(Device& device) {
   if (device.shares_host_memory()) return std::nullopt;
   std::vector<std::byte> bytes(std::size_t{64} << 20);
-  const Purpose purpose(device, "the measurement of copies", "close other programs");
-  Buffer buffer = create_storage_buffer(device, bytes.size());
+  constexpr Purpose purpose{"the measurement of copies", "close other programs"};
+  Buffer buffer = create_storage_buffer(device, purpose, bytes.size());
   const auto bytes_a_second = [&](const auto& copy) {
     copy();  // makes the staging memory
     const auto start = std::chrono::steady_clock::now();

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "daemon/core/render/device/device.hpp"
+#include "daemon/core/render/device/purpose.hpp"
 
 namespace previz::render {
 
@@ -37,45 +38,22 @@ struct Buffer {
   std::unique_ptr<Parts, Retire<Parts>> parts;
 };
 
-// Says what the buffers are for that are made while it lives, so that the error of one that does
-// not fit can say it too, and what to do. There must be one wherever a buffer is made; the
-// innermost counts.
-class Purpose {
- public:
-  // `what` completes "a buffer for" in the crew's words, and `advice` is an order. The texts must
-  // stay where they are. `width` and `height` are added to `what` where they are given: those of a
-  // picture.
-  Purpose(Device& device, const char* what, const char* advice, int width = 0, int height = 0);
-  ~Purpose();
-  Purpose(const Purpose&) = delete;
-  Purpose& operator=(const Purpose&) = delete;
-
-  std::string what() const;  // "the paths of a picture of 1920x1080"
-  const char* advice() const { return advice_; }
-
- private:
-  Device& device_;
-  const char *what_, *advice_;
-  int width_, height_;
-  const Purpose* around_;
-};
-
 // These throw previz::Error, with the device's name, the size and the purpose, where the device
 // does not allow so large a buffer or has no memory for it.
-Buffer create_storage_buffer(Device& device, vk::DeviceSize size);
-Buffer create_indirect_buffer(Device& device, vk::DeviceSize size);
+Buffer create_storage_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size);
+Buffer create_indirect_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size);
 // Creates a buffer that shaders fetch from (shaders/lib/fetch.glsl), as texels where the device
 // reads texels. It is written by uploads, or with `is_storage` by shaders, for which a device may
 // allow less.
-Buffer create_texel_buffer(Device& device, vk::DeviceSize size, vk::Format format,
-                           bool is_storage = false);
+Buffer create_texel_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
+                           vk::Format format, bool is_storage = false);
 
 // Creates memory for acceleration structures (daemon/core/render/world/ray_structures.hpp), or in
 // which one is built. Where rays are traced in hardware, these can be built from all buffers of the
 // device.
-Buffer create_structure_memory(Device& device, vk::DeviceSize size);
+Buffer create_structure_memory(Device& device, const Purpose& purpose, vk::DeviceSize size);
 // Creates such memory with one structure in it, which is still to be built.
-Buffer create_structure_buffer(Device& device, vk::DeviceSize size,
+Buffer create_structure_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
                                vk::AccelerationStructureTypeKHR type);
 
 // The host's memory that copies go through, where the device's own is out of its reach. What goes
@@ -146,15 +124,18 @@ class Downloads {
 
 // (Re)create `buffer` where it is too small, then upload.
 template <typename T>
-void upload_storage(Device& device, Buffer& buffer, const std::vector<T>& data) {
+void upload_storage(Device& device, const Purpose& purpose, Buffer& buffer,
+                    const std::vector<T>& data) {
   const vk::DeviceSize size = data.size() * sizeof(T);
-  if (!buffer.buffer || buffer.size < size) buffer = create_storage_buffer(device, size);
+  if (!buffer.buffer || buffer.size < size) buffer = create_storage_buffer(device, purpose, size);
   upload_bytes(device, buffer, std::as_bytes(std::span(data)));
 }
 template <typename T>
-void upload_texels(Device& device, Buffer& buffer, const std::vector<T>& data, vk::Format format) {
+void upload_texels(Device& device, const Purpose& purpose, Buffer& buffer,
+                   const std::vector<T>& data, vk::Format format) {
   const vk::DeviceSize size = data.size() * sizeof(T);
-  if (!buffer.buffer || buffer.size < size) buffer = create_texel_buffer(device, size, format);
+  if (!buffer.buffer || buffer.size < size)
+    buffer = create_texel_buffer(device, purpose, size, format);
   upload_bytes(device, buffer, std::as_bytes(std::span(data)));
 }
 template <typename T>

@@ -40,8 +40,8 @@ bool CardPictures::create(int width, int height) {
     vk::ExportMemoryAllocateInfo exported(handle_type);
     exported.pNext = &dedicated;
     vk::MemoryAllocateInfo allocation(
-        requirements.size, device_.memory_type(requirements.memoryTypeBits,
-                                               vk::MemoryPropertyFlagBits::eDeviceLocal, {}));
+        requirements.size, device_.memory().type(requirements.memoryTypeBits,
+                                                 vk::MemoryPropertyFlagBits::eDeviceLocal, {}));
     allocation.pNext = &exported;
     slot.shared->memory = vk::raii::DeviceMemory(device_.vk(), allocation);
     slot.shared->image.bindMemory(*slot.shared->memory, 0);

@@ -31,14 +31,14 @@ std::vector<std::uint32_t> codes_near_bins(const std::vector<double>& signals) {
 }  // namespace
 
 CodeTables::CodeTables(Device& device, const lighting::Response& response) : bits(response.bits()) {
-  const Purpose purpose(device, "the camera's response", "close other programs");
+  const Purpose purpose{"the camera's response", "close other programs"};
   const std::vector<double>& inverse = response.inverse();
-  upload_storage(device, signal_of, std::vector<float>(inverse.begin(), inverse.end()));
+  upload_storage(device, purpose, signal_of, std::vector<float>(inverse.begin(), inverse.end()));
   std::vector<float> least;
   for (std::size_t code = 0; code < inverse.size(); ++code)
     least.push_back(static_cast<float>(response.least_signal(static_cast<std::uint16_t>(code))));
-  upload_storage(device, least_of, least);
-  upload_storage(device, codes_near, codes_near_bins(inverse));
+  upload_storage(device, purpose, least_of, least);
+  upload_storage(device, purpose, codes_near, codes_near_bins(inverse));
 }
 
 void CodeTables::add_to(Buffers& buffers) const {

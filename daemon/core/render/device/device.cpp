@@ -104,24 +104,6 @@ bool has_extension(const vk::raii::PhysicalDevice& physical, std::string_view na
                              });
 }
 
-// Returns a bit for each type of the device's own memory that the host can write without flushing.
-// Its heap is no smaller than any other of the device: neither a window into one nor a small part.
-std::uint32_t types_to_map(const vk::raii::PhysicalDevice& physical) {
-  using Property = vk::MemoryPropertyFlagBits;
-  constexpr auto wanted = Property::eDeviceLocal | Property::eHostVisible | Property::eHostCoherent;
-  const vk::PhysicalDeviceMemoryProperties memory = physical.getMemoryProperties();
-  vk::DeviceSize most = 0;
-  for (const vk::MemoryHeap& heap : std::span(memory.memoryHeaps).first(memory.memoryHeapCount))
-    if (heap.flags & vk::MemoryHeapFlagBits::eDeviceLocal) most = std::max(most, heap.size);
-  std::uint32_t types = 0;
-  for (std::uint32_t i = 0; i < memory.memoryTypeCount; ++i) {
-    const vk::MemoryType& type = memory.memoryTypes[i];
-    const bool fits = memory.memoryHeaps[type.heapIndex].size == most;
-    if (fits && (type.propertyFlags & wanted) == wanted) types |= 1u << i;
-  }
-  return types;
-}
-
 bool has_uniform_subgroups(const vk::raii::PhysicalDevice& physical) {
   if (!has_extension(physical, VK_KHR_SHADER_SUBGROUP_UNIFORM_CONTROL_FLOW_EXTENSION_NAME))
     return false;
@@ -193,9 +175,7 @@ Device::~Device() {
 }
 
 void Device::keep_programs() {
-  if (!is_open()) return;
-  const std::uint64_t made = made_programs_;
-  if (kept_programs_ != made && pipelines_.save()) kept_programs_ = made;
+  if (is_open()) programs_.save();
 }
 
 void Device::reopen(bool cpu_instead) {
@@ -212,9 +192,8 @@ void Device::publish(Drawing drawing) {
 void Device::close() {
   publish({});
   keep_programs();
-  programs_.clear();
-  pipelines_ = {};
-  staging_.reset();
+  programs_.close();
+  memory_.close();
   submissions_.reset();
   device_.clear();
   physical_.clear();
@@ -222,69 +201,10 @@ void Device::close() {
   instance_.clear();
 }
 
-bool Device::Compiled::is(const std::uint32_t* other_spirv,
-                          std::span<const std::uint32_t> others) const {
-  return spirv == other_spirv && std::ranges::equal(constants, others);
-}
-
-Device::Wanted Device::want(const std::uint32_t* spirv, std::span<const std::uint32_t> constants) {
-  const std::lock_guard lock(programs_mutex_);
-  const auto found = std::ranges::find_if(
-      programs_, [&](const Compiled& each) { return each.is(spirv, constants); });
-  if (found != programs_.end()) {
-    std::rotate(found, found + 1, programs_.end());
-    return {programs_.back().program, std::nullopt};
-  }
-  std::promise<ProgramPtr> promise;
-  programs_.push_back({spirv, {constants.begin(), constants.end()}, promise.get_future().share()});
-  if (programs_.size() > most_programs) programs_.erase(programs_.begin());
-  return {programs_.back().program, std::move(promise)};
-}
-
-// Compiles without the lock, so that nobody waits who wants another program.
-Device::ProgramPtr Device::make(const std::uint32_t* spirv,
-                                std::span<const std::uint32_t> constants,
-                                std::promise<ProgramPtr> promise, const Compile& compile) {
-  try {
-    ProgramPtr made = compile();
-    ++made_programs_;
-    promise.set_value(made);
-    return made;
-  } catch (...) {
-    {
-      const std::lock_guard lock(programs_mutex_);
-      std::erase_if(programs_, [&](const Compiled& each) { return each.is(spirv, constants); });
-    }
-    promise.set_value(nullptr);
-    throw;
-  }
-}
-
-Device::ProgramPtr Device::program(const std::uint32_t* spirv,
-                                   std::span<const std::uint32_t> constants,
-                                   const Compile& compile) {
-  for (;;) {
-    Wanted wanted = want(spirv, constants);
-    const bool is_there =
-        wanted.program.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
-    if (!is_there) ++awaited_programs_;
-    if (wanted.to_make) return make(spirv, constants, *std::move(wanted.to_make), compile);
-    if (ProgramPtr program = wanted.program.get()) return program;
-  }
-}
-
-void Device::program_ahead(const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
-                           const Compile& compile) {
-  Wanted wanted = want(spirv, constants);
-  if (!wanted.to_make) return;
-  make(spirv, constants, *std::move(wanted.to_make), compile);
-  ++ahead_programs_;
-}
-
 DeviceWork Device::work() const {
   DeviceWork work = submissions_->work;
-  work.pipelines_awaited = awaited_programs_;
-  work.pipelines_ahead = ahead_programs_;
+  work.pipelines_awaited = programs_.awaited();
+  work.pipelines_ahead = programs_.made_ahead();
   return work;
 }
 
@@ -361,13 +281,12 @@ void Device::pick_physical_device(const std::string& wanted_name, bool cpu_too) 
     is_integrated = properties.deviceType == vk::PhysicalDeviceType::eIntegratedGpu;
   }
   note_missing_drivers(vendors);
-  mapped_types_ = 0;
-  if (best < 1000 && !shares_host_memory() && (is_integrated || options_.as_integrated))
-    mapped_types_ = types_to_map(physical_);
   if (best == 1000)
     throw Error("Vulkan: no usable device" +
                 (wanted_name.empty() ? "" : " named \"" + wanted_name + "\"") +
                 "; found:" + (found.empty() ? " none" : found) + missing_lines());
+  memory_.open(physical_, name_, is_cpu_,
+               !shares_host_memory() && (is_integrated || options_.as_integrated));
 }
 
 void Device::note_missing_drivers(std::span<const std::uint32_t> vendors) {
@@ -437,7 +356,7 @@ void Device::create_device() {
   }
   info.setPEnabledExtensionNames(extensions);
   device_ = vk::raii::Device(physical_, info);
-  pipelines_ = PipelineCache(physical_, device_, options_.cache);
+  programs_.open(PipelineCache(physical_, device_, options_.cache));
   // How much a card gets at once depends on how long it takes.
   const bool can_time = !is_cpu_ && families[queue_family_].timestampValidBits > 0;
   submissions_.emplace(physical_, device_, queue_family_,
@@ -445,20 +364,8 @@ void Device::create_device() {
                                             .times_passes = options_.times_passes || can_time,
                                             .most_work = is_cpu_ ? cpu_work : first_work,
                                             .adapts = !is_cpu_,
-                                            .host_writes = mapped_types_ != 0,
+                                            .host_writes = memory_.mapped_types() != 0,
                                             .builds_structures = traces_in_hardware()});
-}
-
-std::uint32_t Device::memory_type(std::uint32_t allowed_bits, vk::MemoryPropertyFlags wanted,
-                                  vk::MemoryPropertyFlags preferred) const {
-  const auto properties = physical_.getMemoryProperties();
-  for (const auto flags : {wanted | preferred, wanted}) {
-    for (std::uint32_t i = 0; i < properties.memoryTypeCount; ++i) {
-      const bool has_flags = (properties.memoryTypes[i].propertyFlags & flags) == flags;
-      if ((allowed_bits & (1u << i)) != 0 && has_flags) return i;
-    }
-  }
-  throw Error("Vulkan: " + name_ + " has no suitable memory type");
 }
 
 std::string Device::driver() const {
@@ -467,19 +374,6 @@ std::string Device::driver() const {
   const auto& driver = properties.get<vk::PhysicalDeviceDriverProperties>();
   const std::string name = driver.driverName, info = driver.driverInfo;
   return info.starts_with(name) ? info : name + " " + info;
-}
-
-std::uint64_t Device::memory_bytes() const {
-  // Lavapipe's heap is 2 GiB whatever the computer has.
-  if (is_cpu_)
-    return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
-           static_cast<std::uint64_t>(sysconf(_SC_PAGE_SIZE));
-  std::uint64_t most = 0;
-  const auto properties = physical_.getMemoryProperties();
-  for (std::uint32_t i = 0; i < properties.memoryHeapCount; ++i)
-    if (properties.memoryHeaps[i].flags & vk::MemoryHeapFlagBits::eDeviceLocal)
-      most = std::max<std::uint64_t>(most, properties.memoryHeaps[i].size);
-  return most;
 }
 
 void Device::record(const std::function<void(const vk::raii::CommandBuffer&)>& record) {
@@ -527,7 +421,7 @@ DeviceFacts facts_of(const Device& device) {
   return {.name = device.name(),
           .driver = device.driver(),
           .is_gpu = !device.is_cpu(),
-          .memory_bytes = device.memory_bytes(),
+          .memory_bytes = device.memory().bytes(),
           .shares_host_memory = device.shares_host_memory(),
           .traces_in_hardware = device.traces_in_hardware(),
           .missing_drivers = device.missing_drivers()};
@@ -539,7 +433,7 @@ void keep_programs(Device& device) {
 PictureMemory memory_of(const Device& device) {
   const DeviceLimits& allows = device.allows();
   return {
-      .bytes = device.memory_bytes(),
+      .bytes = device.memory().bytes(),
       .pixels = device.reads_storage() ? allows.storage_bytes / whole_pixel_bytes : allows.texels,
       .read_back = device.shares_host_memory()};
 }

@@ -5,26 +5,21 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 #include <vulkan/vulkan_raii.hpp>
 
 #include "daemon/core/render/device/device_limits.hpp"
+#include "daemon/core/render/device/device_memory.hpp"
 #include "daemon/core/render/device/gpu.hpp"
-#include "daemon/core/render/device/pipeline_cache.hpp"
+#include "daemon/core/render/device/programs.hpp"
 #include "daemon/core/render/device/submissions.hpp"
 #include "drivers/card_picture.hpp"
 
 namespace previz::render {
-
-struct Program;  // a compute pass compiled for a device: daemon/core/render/device/kernel.hpp
-class Purpose;   // daemon/core/render/device/buffer.hpp
-class Staging;   // likewise
 
 // The images of pictures that are shared with a display (drivers/card_picture.hpp).
 inline constexpr vk::Format card_picture_format = vk::Format::eR8G8B8A8Unorm;
@@ -72,9 +67,6 @@ class Device {
   bool reads_storage() const {
     return !shares_host_memory() || limits_.maxTexelBufferElements < enough_texels;
   }
-  // Returns a bit for each type of the device's own memory that the host can write: of a graphics
-  // card that is part of the processor. Reading it may be slow.
-  std::uint32_t mapped_types() const { return mapped_types_; }
   // Returns whether rays are traced by the device's own units, through RayStructures.
   bool traces_in_hardware() const { return scratch_alignment_ > 0; }
   // Returns the alignment, in bytes, of the memory in which a structure is built.
@@ -91,17 +83,14 @@ class Device {
   // Returns what names the device for displays that its pictures can be shown on; nothing where the
   // driver shares no memory, or there is nothing to be saved because the host works in it.
   const std::optional<CardIdentity>& card() const { return card_; }
-  // Returns how many bytes all buffers together may take: the device's own memory, or the
-  // computer's for a CPU device.
-  std::uint64_t memory_bytes() const;
   std::uint64_t validation_messages() const { return validation_messages_; }
   // Returns whether debug labels, which GPU debuggers show, can be recorded.
   bool has_labels() const { return has_labels_; }
 
-  // Returns the index of a memory type of `allowed_bits` with all properties of `wanted`, and with
-  // those of `preferred` if there is one.
-  std::uint32_t memory_type(std::uint32_t allowed_bits, vk::MemoryPropertyFlags wanted,
-                            vk::MemoryPropertyFlags preferred) const;
+  const DeviceMemory& memory() const { return memory_; }
+  DeviceMemory& memory() { return memory_; }
+  Programs& programs() { return programs_; }
+  const Programs& programs() const { return programs_; }
 
   // Calls `record` to add to what the device is to do. Where the host works in the device's memory
   // it is handed over and waited for at once; otherwise submissions() hands it over, with more. If
@@ -117,48 +106,12 @@ class Device {
     std::uint64_t buffers = 0, programs = 0;
     friend bool operator==(const Made&, const Made&) = default;
   };
-  Made made() const { return {made_buffers_, made_programs_}; }
-  void count_buffer() { ++made_buffers_; }
-  // What buffers are made for at the moment; null: nothing is to be made.
-  const Purpose*& purpose() { return purpose_; }
-  // The memory through which copies go up and come down; empty until it is needed.
-  std::shared_ptr<Staging>& staging() { return staging_; }
-
-  // Returns what `compile` made for the same SPIR-V and constants before, or calls it: compiling
-  // may take longer than a picture, and a renderer that is made anew mostly wants what the last one
-  // had. What another thread is compiling is waited for, and tried again if that failed. The 256
-  // programs that were wanted last are kept; a reopened device has none. `spirv` is known by its
-  // address and must stay there. This and program_ahead() may be called on any thread while the
-  // device is open; `compile` too is called by several threads at once.
-  using ProgramPtr = std::shared_ptr<const Program>;
-  using Compile = std::function<ProgramPtr()>;
-  ProgramPtr program(const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
-                     const Compile& compile);
-  static constexpr std::size_t most_programs = 256;
-  // Does the same before the program is needed, and waits for no other thread.
-  void program_ahead(const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
-                     const Compile& compile);
+  Made made() const { return {memory_.made_buffers(), programs_.made()}; }
   // Returns what submissions() were given, and how programs were made.
   DeviceWork work() const;
-  const PipelineCache& pipelines() const { return pipelines_; }
   void keep_programs();
 
  private:
-  struct Compiled {
-    const std::uint32_t* spirv;
-    std::vector<std::uint32_t> constants;
-    std::shared_future<ProgramPtr> program;  // null: it could not be compiled
-
-    bool is(const std::uint32_t* other_spirv, std::span<const std::uint32_t> others) const;
-  };
-  struct Wanted {
-    std::shared_future<ProgramPtr> program;
-    std::optional<std::promise<ProgramPtr>> to_make;  // absent: another one makes or has made it
-  };
-
-  Wanted want(const std::uint32_t* spirv, std::span<const std::uint32_t> constants);
-  ProgramPtr make(const std::uint32_t* spirv, std::span<const std::uint32_t> constants,
-                  std::promise<ProgramPtr> promise, const Compile& compile);
   void open(bool cpu_too);
   void close();
   void publish(Drawing drawing);
@@ -172,13 +125,10 @@ class Device {
   const DeviceOptions options_;
   vk::raii::Context context_;
   std::atomic<std::uint64_t> validation_messages_ = 0;
-  std::atomic<std::uint64_t> made_buffers_ = 0, made_programs_ = 0;
-  std::atomic<std::uint64_t> awaited_programs_ = 0, ahead_programs_ = 0;
   vk::raii::Instance instance_{nullptr};
   vk::raii::DebugUtilsMessengerEXT messenger_{nullptr};
   vk::raii::PhysicalDevice physical_{nullptr};
   std::uint32_t queue_family_ = 0;
-  std::uint32_t mapped_types_ = 0;
   std::string name_;
   std::optional<CardIdentity> card_;
   vk::PhysicalDeviceLimits limits_;
@@ -193,13 +143,9 @@ class Device {
   mutable std::mutex drawing_mutex_;
   Drawing drawing_;
   vk::raii::Device device_{nullptr};
-  PipelineCache pipelines_;
-  std::uint64_t kept_programs_ = 0;  // of made_programs_
-  std::mutex programs_mutex_;
-  std::vector<Compiled> programs_;  // in the order in which they were last wanted
+  Programs programs_;
   std::optional<Submissions> submissions_;
-  std::shared_ptr<Staging> staging_;
-  const Purpose* purpose_ = nullptr;
+  DeviceMemory memory_;
 };
 
 // Deletes what the device may be working with: once that is done.

@@ -54,7 +54,7 @@ std::shared_ptr<const Program> compile(const Device& device, const std::string& 
   const vk::raii::ShaderModule module(device.vk(), {{}, spirv});
   const vk::PipelineShaderStageCreateInfo stage({}, compute_stage, *module, "main");
   program->pipeline =
-      vk::raii::Pipeline(device.vk(), device.pipelines().get(),
+      vk::raii::Pipeline(device.vk(), device.programs().cache().get(),
                          vk::ComputePipelineCreateInfo({}, stage, *program->layout));
   return program;
 }
@@ -130,8 +130,10 @@ Kernel::Kernel(Device& device, const Pass& pass, std::uint32_t features)
 
 void Kernel::use(const Pass& pass, std::vector<std::uint32_t> constants) {
   const ToCompile wanted(*device_, pass, std::move(constants));
-  state_ = {new State{device_->program(wanted.spirv.data(), wanted.values, wanted.compile_now), {}},
-            Retire<State>{device_}};
+  state_ = {
+      new State{device_->programs().get(wanted.spirv.data(), wanted.values, wanted.compile_now),
+                {}},
+      Retire<State>{device_}};
 }
 
 void make_kernels(std::initializer_list<Kernel*> kernels, Device& device,
@@ -149,7 +151,7 @@ std::vector<std::uint32_t> module_of(const Pass& pass, std::uint32_t features,
 
 void compile_ahead(Device& device, const Pass& pass, std::uint32_t features) {
   const ToCompile wanted(device, pass, values_of(pass, features, device_bits(device)));
-  device.program_ahead(wanted.spirv.data(), wanted.values, wanted.compile_now);
+  device.programs().ahead(wanted.spirv.data(), wanted.values, wanted.compile_now);
 }
 
 Kernel::BoundSet Kernel::create_set() const {

@@ -28,7 +28,7 @@ class PipelineCache {
   void finish();
 
   // The largest file; a device whose passes take more has none. The 25 passes of a set take up to
-  // 2 MB, and Device::most_programs a tenth of this.
+  // 2 MB, and Programs::most a tenth of this.
   static constexpr std::uintmax_t most_bytes = 256u << 20;
   // The folder keeps the files of the devices and drivers that were used last.
   static constexpr std::size_t most_files = 4;

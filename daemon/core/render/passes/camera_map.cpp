@@ -6,19 +6,20 @@
 #include "shaders/camera_usable.spv.h"
 
 namespace previz::render {
+namespace {
 
-Purpose CameraMap::for_radiance() const {
-  return {device_, "the camera's radiance",
-          "make the picture smaller, or set estimator.real_radiance to \"traced\""};
-}
+constexpr Purpose for_radiance{
+    "the camera's radiance",
+    "make the picture smaller, or set estimator.real_radiance to \"traced\""};
+
+}  // namespace
 
 void CameraMap::resize(std::uint32_t pixels) {
   if (pixels <= pixels_) return;  // a smaller picture uses a part
   pixels_ = pixels;
-  const Purpose purpose = for_radiance();
-  plate_ = create_texel_buffer(device_, pixels * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat,
-                               true);
-  seen_ = create_storage_buffer(device_, pixels * sizeof(gpu::GpuSeen));
+  plate_ = create_texel_buffer(device_, for_radiance, pixels * sizeof(gpu::vec4),
+                               vk::Format::eR32G32B32A32Sfloat, true);
+  seen_ = create_storage_buffer(device_, for_radiance, pixels * sizeof(gpu::GpuSeen));
 }
 
 std::span<const Pass> CameraMap::passes() {
@@ -42,8 +43,7 @@ void CameraMap::add_to(Buffers& buffers) const {
 void CameraMap::use(std::uint32_t pixels, const std::vector<float>& radiance_of_codes) {
   resize(pixels);
   if (radiance_ == radiance_of_codes) return;
-  const Purpose purpose = for_radiance();
-  upload_storage(device_, radiance_of_, radiance_of_codes);
+  upload_storage(device_, for_radiance, radiance_of_, radiance_of_codes);
   radiance_ = radiance_of_codes;
 }
 

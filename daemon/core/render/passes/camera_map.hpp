@@ -29,7 +29,6 @@ class CameraMap {
               const Buffers& buffers);
 
  private:
-  Purpose for_radiance() const;
   void resize(std::uint32_t pixels);
 
   Device& device_;

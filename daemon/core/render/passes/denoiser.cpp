@@ -28,9 +28,12 @@ static_assert(gpu::DENOISE_VARIANCE_REACH >= 2);
 constexpr int caustic_levels = 3;
 static_assert(caustic_levels <= wavelet_levels);
 
+constexpr Purpose for_filter{"the noise filter",
+                             "make the picture smaller, or set quality.denoise to false"};
+
 Buffer texels_for(Device& device, std::size_t count) {
-  return create_texel_buffer(device, count * sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat,
-                             true);
+  return create_texel_buffer(device, for_filter, count * sizeof(gpu::vec4),
+                             vk::Format::eR32G32B32A32Sfloat, true);
 }
 
 }  // namespace
@@ -61,8 +64,6 @@ std::span<const Pass> Denoiser::passes() {
 
 void Denoiser::reserve(std::size_t pixels, bool companions, bool caustics) {
   has_caustics_ = caustics;
-  const Purpose purpose(device_, "the noise filter",
-                        "make the picture smaller, or set quality.denoise to false");
   for (Buffer& side : caustic_)
     if (const std::size_t count = caustics ? pixels : 1; side.size < count * sizeof(gpu::vec4))
       side = texels_for(device_, count);
@@ -75,7 +76,7 @@ void Denoiser::reserve(std::size_t pixels, bool companions, bool caustics) {
       variance_[side] = texels(pixels);
     }
     for (Buffer* other : {&surface_, &guide_}) *other = texels(pixels);
-    albedo_ = create_texel_buffer(device_, pixels * 4 * sizeof(std::uint16_t),
+    albedo_ = create_texel_buffer(device_, for_filter, pixels * 4 * sizeof(std::uint16_t),
                                   vk::Format::eR16G16B16A16Sfloat, true);
     // composite.comp and present.comp use side 0 of the companions, filtered or not.
     uncovered_[0] = texels(pixels);

@@ -12,6 +12,8 @@
 namespace previz::render {
 namespace {
 
+constexpr Purpose for_plate{"the plate", "choose a smaller picture of the camera"};
+
 // Devices may allow no more than 65535 work groups at once.
 constexpr std::uint32_t most_pairs = 1u << 21;
 
@@ -101,21 +103,16 @@ std::span<const Pass> DevicePlate::passes() {
   return all;
 }
 
-Purpose DevicePlate::for_plate() const {
-  return {device_, "the plate", "choose a smaller picture of the camera"};
-}
-
 DevicePlate::DevicePlate(Device& device) : device_(device) {
   make_kernels({&codes_of_bytes_, &scale_}, device, passes());
   reserve(codes_, 0);
 }
 
 void DevicePlate::reserve(Buffer& codes, std::size_t pixels) {
-  const Purpose purpose = for_plate();
   // Two pixels are written at once.
   const vk::DeviceSize size =
       std::max<std::size_t>((pixels + 1) / 2, 1) * 6 * sizeof(std::uint16_t);
-  if (codes.size < size) codes = create_storage_buffer(device_, size);
+  if (codes.size < size) codes = create_storage_buffer(device_, for_plate, size);
 }
 
 // Runs a kernel that works on two pixels of the picture in each invocation.
@@ -159,7 +156,6 @@ void DevicePlate::make_codes(const Frame& frame, Buffer& codes) {
   check_size(frame);
   const std::span<const std::byte> bytes = std::as_bytes(std::span(frame.bytes));
   const std::size_t pixels = static_cast<std::size_t>(frame.width) * frame.height;
-  const Purpose purpose = for_plate();
   reserve(codes, pixels);
   if (frame.format == PixelFormat::rgb16) return upload_bytes(device_, codes, bytes);
   // A processor makes a plate in a twentieth of the time if it does so by itself.
@@ -167,9 +163,9 @@ void DevicePlate::make_codes(const Frame& frame, Buffer& codes) {
     const std::vector<std::uint16_t> made = to_plate(frame).samples;
     return upload_bytes(device_, codes, std::as_bytes(std::span(made)));
   }
-  if (!yuv_terms_.buffer) upload_storage(device_, yuv_terms_, yuv_of_plates().terms());
+  if (!yuv_terms_.buffer) upload_storage(device_, for_plate, yuv_terms_, yuv_of_plates().terms());
   const vk::DeviceSize size = (bytes.size() + 3) / 4 * 4;
-  if (bytes_.size < size) bytes_ = create_storage_buffer(device_, size);
+  if (bytes_.size < size) bytes_ = create_storage_buffer(device_, for_plate, size);
   upload_bytes(device_, bytes_, bytes);
   dispatch(codes_of_bytes_, constants_of(frame), pixels,
            {{"camera_bytes", &bytes_}, {"yuv_terms", &yuv_terms_}, {"plate_samples", &codes}});

@@ -32,7 +32,6 @@ class DevicePlate {
   const Buffer& whole() const { return whole_; }
 
  private:
-  Purpose for_plate() const;
   void reserve(Buffer& codes, std::size_t pixels);
   void make_codes(const Frame& frame, Buffer& codes);
   template <typename Constants>

@@ -52,6 +52,12 @@ void set_rotation(gpu::vec4 (&rows)[3], const glm::dmat3& rotation) {
     rows[r] = glm::vec4(rotation[0][r], rotation[1][r], rotation[2][r], 0.0);
 }
 
+Purpose for_average(const PinholeIntrinsics& lens) {
+  return {"the average over frames",
+          "make the picture smaller, or turn off averaging (quality.accumulate or --neighbours 0)",
+          lens.width, lens.height};
+}
+
 }  // namespace
 
 History::History(Device& device) : device_(device), show_(device, show_pass, 0) {}
@@ -89,19 +95,13 @@ void History::light_with(std::vector<set::Light> lamps) {
   light_.see(std::move(lamps));
 }
 
-Purpose History::for_average(const PinholeIntrinsics& lens) const {
-  return {device_, "the average over frames",
-          "make the picture smaller, or turn off averaging (quality.accumulate or --neighbours 0)",
-          lens.width, lens.height};
-}
-
 void History::reserve(Frame& frame) {
   const std::size_t points = deforming_points(frame.stances);
   const std::size_t pixels = static_cast<std::size_t>(frame.view.lens.width) *
                              static_cast<std::size_t>(frame.view.lens.height);
   const Purpose purpose = for_average(frame.view.lens);
   const auto grow = [&](Buffer& buffer, std::size_t bytes) {
-    if (buffer.size < bytes) buffer = create_storage_buffer(device_, bytes);
+    if (buffer.size < bytes) buffer = create_storage_buffer(device_, purpose, bytes);
   };
   constexpr std::size_t point_bytes = 2 * sizeof(gpu::vec4);
   grow(frame.points, std::max<std::size_t>(points, 1) * point_bytes);
@@ -111,12 +111,12 @@ void History::reserve(Frame& frame) {
   if (pixels <= frame.pixels) return;
   frame.pixels = 0;  // stays 0 if an allocation below throws
   for (Buffer* buffer : {&frame.places, &frame.lights})
-    *buffer = create_texel_buffer(device_, pixels * sizeof(gpu::vec4),
+    *buffer = create_texel_buffer(device_, purpose, pixels * sizeof(gpu::vec4),
                                   vk::Format::eR32G32B32A32Sfloat, true);
   for (Buffer* buffer :
        {&frame.things, &frame.spreads, &frame.albedos, &frame.others, &frame.caustics})
-    *buffer =
-        create_texel_buffer(device_, pixels * sizeof(gpu::uvec2), vk::Format::eR32G32Uint, true);
+    *buffer = create_texel_buffer(device_, purpose, pixels * sizeof(gpu::uvec2),
+                                  vk::Format::eR32G32Uint, true);
   frame.pixels = pixels;
 }
 
@@ -229,10 +229,10 @@ void History::find_surfaces(const Buffers& scene, std::uint32_t features, std::i
   gpu::GpuHistory values = constants(samples, moved_now);
   values.arrival_count = static_cast<std::uint32_t>(from.size());
   const Purpose purpose = for_average(now.view.lens);
-  upload_storage(device_, history_, std::vector{values});
-  upload_storage(device_, moves_, moved_now.moved);
-  upload_storage(device_, arrivals_, from);
-  upload_storage(device_, motions_, motions());
+  upload_storage(device_, purpose, history_, std::vector{values});
+  upload_storage(device_, purpose, moves_, moved_now.moved);
+  upload_storage(device_, purpose, arrivals_, from);
+  upload_storage(device_, purpose, motions_, motions());
   Buffers buffers = scene;
   buffers["history"] = &history_;
   buffers["motions"] = &motions_;

@@ -66,7 +66,6 @@ class History {
     Buffer points;  // position and normal of each vertex that deforms
   };
 
-  Purpose for_average(const PinholeIntrinsics& lens) const;
   void reserve(Frame& frame);
   void keep_points(const vk::raii::CommandBuffer& commands, const Buffer& vertices);
   double frames_that_stay() const;

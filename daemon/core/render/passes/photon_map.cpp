@@ -26,17 +26,19 @@ void PhotonMap::resize(std::uint32_t photons) {
   bucket_count_ = std::bit_ceil(2 * photons);
   if (photons <= room_) return;  // fewer photons use a part of the buffers
   room_ = 0;                     // stays 0 if an allocation below throws
-  const Purpose purpose(device_, "the photons", "lower estimator.photons");
+  const Purpose purpose{"the photons", "lower estimator.photons"};
   const vk::DeviceSize slots = 2 * static_cast<vk::DeviceSize>(photons);
-  photon_buffer_ = create_storage_buffer(device_, slots * sizeof(gpu::GpuPhoton));
-  keys_ = create_storage_buffer(device_, slots * sizeof(std::uint32_t));
-  order_ = create_storage_buffer(device_, 2 * slots * sizeof(gpu::uvec2));
-  counts_ = create_storage_buffer(device_, vk::DeviceSize{sort_block_count(photons)} *
-                                               gpu::PHOTON_DIGITS * sizeof(std::uint32_t));
-  control_ = create_storage_buffer(device_, sizeof(gpu::GpuPhotonControl));
-  sorted_ = create_texel_buffer(device_, slots * gpu::TEXELS_PER_PHOTON * sizeof(gpu::vec4),
-                                vk::Format::eR32G32B32A32Sfloat, true);
-  buckets_ = create_texel_buffer(device_, bucket_count_ * sizeof(gpu::GpuPhotonBucket),
+  photon_buffer_ = create_storage_buffer(device_, purpose, slots * sizeof(gpu::GpuPhoton));
+  keys_ = create_storage_buffer(device_, purpose, slots * sizeof(std::uint32_t));
+  order_ = create_storage_buffer(device_, purpose, 2 * slots * sizeof(gpu::uvec2));
+  counts_ = create_storage_buffer(
+      device_, purpose,
+      vk::DeviceSize{sort_block_count(photons)} * gpu::PHOTON_DIGITS * sizeof(std::uint32_t));
+  control_ = create_storage_buffer(device_, purpose, sizeof(gpu::GpuPhotonControl));
+  sorted_ =
+      create_texel_buffer(device_, purpose, slots * gpu::TEXELS_PER_PHOTON * sizeof(gpu::vec4),
+                          vk::Format::eR32G32B32A32Sfloat, true);
+  buckets_ = create_texel_buffer(device_, purpose, bucket_count_ * sizeof(gpu::GpuPhotonBucket),
                                  vk::Format::eR32G32Uint, true);
   room_ = photons;
 }

@@ -65,8 +65,8 @@ Presenter::Presenter(Device& device, const lighting::Response& response)
       tables_(device, response) {
   make_kernels({&composite_, &present_, &sides_, &enlarge_, &scan_out_}, device, passes());
   static const std::vector<float> pattern = blue_noise(gpu::DITHER_SIDE);
-  const Purpose purpose(device, "the dither pattern", "close other programs");
-  upload_storage(device, thresholds_, pattern);
+  const Purpose purpose{"the dither pattern", "close other programs"};
+  upload_storage(device, purpose, thresholds_, pattern);
 }
 
 std::span<const Pass> Presenter::passes() {
@@ -81,9 +81,9 @@ std::span<const Pass> Presenter::passes() {
 void Presenter::reserve(std::size_t pixels) {
   if (pixels <= pixels_) return;
   pixels_ = 0;  // stays 0 if an allocation below throws
-  const Purpose purpose(device_, "the shown picture", "make the picture smaller");
-  composites_ = create_storage_buffer(device_, pixels * sizeof(gpu::vec4));
-  highlights_ = create_storage_buffer(device_, pixels * sizeof(std::uint32_t));
+  const Purpose purpose{"the shown picture", "make the picture smaller"};
+  composites_ = create_storage_buffer(device_, purpose, pixels * sizeof(gpu::vec4));
+  highlights_ = create_storage_buffer(device_, purpose, pixels * sizeof(std::uint32_t));
   pixels_ = pixels;
 }
 
@@ -91,9 +91,10 @@ void Presenter::reserve(std::size_t pixels) {
 void Presenter::reserve_shown(std::size_t pixels) {
   if (pixels <= shown_pixels_) return;
   shown_pixels_ = 0;  // likewise
-  const Purpose purpose(device_, "the shown picture", "make the picture smaller");
-  picture_ = create_storage_buffer(device_, words_of(pixels) * sizeof(std::uint32_t));
-  if (device_.card()) screen_ = create_storage_buffer(device_, pixels * sizeof(std::uint32_t));
+  const Purpose purpose{"the shown picture", "make the picture smaller"};
+  picture_ = create_storage_buffer(device_, purpose, words_of(pixels) * sizeof(std::uint32_t));
+  if (device_.card())
+    screen_ = create_storage_buffer(device_, purpose, pixels * sizeof(std::uint32_t));
   shown_pixels_ = pixels;
 }
 
@@ -102,9 +103,9 @@ void Presenter::reserve_additions(const ToPresent& what) {
   const vk::DeviceSize size = sizeof(gpu::vec4) * static_cast<std::size_t>(what.width) *
                               static_cast<std::size_t>(what.height);
   if (!what.whole || size <= additions_.size) return;
-  const Purpose purpose(device_, "the shown picture", "make the picture smaller");
-  additions_ = create_storage_buffer(device_, size);
-  sides_of_ = create_storage_buffer(device_, size);
+  const Purpose purpose{"the shown picture", "make the picture smaller"};
+  additions_ = create_storage_buffer(device_, purpose, size);
+  sides_of_ = create_storage_buffer(device_, purpose, size);
 }
 
 // Composites the rows of the band that each tile holds.

@@ -83,15 +83,18 @@ Wavefront::Wavefront(Device& device, int width, int height, std::uint32_t paths_
       paths_a_slot_(paths_a_slot),
       photons_(device),
       camera_(device) {
-  const Purpose purpose(device, "the counters of paths", "close other programs");
-  control_ = create_indirect_buffer(device, sizeof(gpu::GpuControl));
+  const Purpose purpose{"the counters of paths", "close other programs"};
+  control_ = create_indirect_buffer(device, purpose, sizeof(gpu::GpuControl));
   resize(width, height);
+}
+
+Purpose Wavefront::for_paths() const {
+  return {"the paths", "make the picture smaller", width_, height_};
 }
 
 void Wavefront::resize(int width, int height) {
   width_ = width;
   height_ = height;
-  const Purpose purpose(device_, "the paths", "make the picture smaller", width, height);
   create_tiles();
   create_paths();
 }
@@ -124,13 +127,14 @@ void Wavefront::create_tiles() {
   if (fits()) return;
   divide(fewest);
   pixels_.clear();  // frees the old memory before the new is allocated
-  for (const Tile& tile : tiles_) pixels_.push_back(create_storage_buffer(device_, bytes_of(tile)));
+  for (const Tile& tile : tiles_)
+    pixels_.push_back(create_storage_buffer(device_, for_paths(), bytes_of(tile)));
 }
 
 void Wavefront::create_paths() {
   const vk::DeviceSize limits = sizeof(std::uint32_t) * gpu::SAMPLED_PARTS *
                                 sampled_blocks(width_) * vk::DeviceSize{sampled_blocks(height_)};
-  if (limits_.size < limits) limits_ = create_storage_buffer(device_, limits);
+  if (limits_.size < limits) limits_ = create_storage_buffer(device_, for_paths(), limits);
   std::uint32_t most = 0;
   for (const Tile& tile : tiles_) most = std::max(most, slots_of(tile.batch));
   const std::uint32_t slots = std::max(most, max_slots_ / most * most);
@@ -145,19 +149,19 @@ void Wavefront::create_path_buffers(std::uint32_t slots) {
                       &shadow_rays_, &sample_mixed_, &sample_real_, &sample_landed_, &sample_aov_,
                       &sample_albedo_, &sample_caustic_})
     *old = Buffer{};  // frees the old memory before the new is allocated
-  ray_origin_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
-  ray_direction_ = create_storage_buffer(device_, paths * sizeof(gpu::vec4));
-  throughput_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuThroughput));
-  receivers_ = create_storage_buffer(device_, paths * sizeof(std::uint32_t));
-  hits_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuHit));
-  queue_ = create_storage_buffer(device_, 2 * paths * sizeof(std::uint32_t));
-  shadow_rays_ = create_storage_buffer(device_, paths * sizeof(gpu::GpuShadowRay));
-  sample_mixed_ = create_storage_buffer(device_, slots * sizeof(gpu::vec4));
-  sample_real_ = create_storage_buffer(device_, slots * sizeof(gpu::vec4));
-  sample_landed_ =
-      create_storage_buffer(device_, (paths_a_slot_ > 2 ? slots : 1) * sizeof(gpu::vec4));
-  sample_aov_ = create_storage_buffer(device_, slots * sizeof(gpu::vec4));
-  sample_albedo_ = create_storage_buffer(device_, slots * sizeof(gpu::uvec2));
+  ray_origin_ = create_storage_buffer(device_, for_paths(), paths * sizeof(gpu::vec4));
+  ray_direction_ = create_storage_buffer(device_, for_paths(), paths * sizeof(gpu::vec4));
+  throughput_ = create_storage_buffer(device_, for_paths(), paths * sizeof(gpu::GpuThroughput));
+  receivers_ = create_storage_buffer(device_, for_paths(), paths * sizeof(std::uint32_t));
+  hits_ = create_storage_buffer(device_, for_paths(), paths * sizeof(gpu::GpuHit));
+  queue_ = create_storage_buffer(device_, for_paths(), 2 * paths * sizeof(std::uint32_t));
+  shadow_rays_ = create_storage_buffer(device_, for_paths(), paths * sizeof(gpu::GpuShadowRay));
+  sample_mixed_ = create_storage_buffer(device_, for_paths(), slots * sizeof(gpu::vec4));
+  sample_real_ = create_storage_buffer(device_, for_paths(), slots * sizeof(gpu::vec4));
+  sample_landed_ = create_storage_buffer(device_, for_paths(),
+                                         (paths_a_slot_ > 2 ? slots : 1) * sizeof(gpu::vec4));
+  sample_aov_ = create_storage_buffer(device_, for_paths(), slots * sizeof(gpu::vec4));
+  sample_albedo_ = create_storage_buffer(device_, for_paths(), slots * sizeof(gpu::uvec2));
   slots_ = slots;
 }
 
@@ -187,17 +191,17 @@ Buffers Wavefront::buffers_of(std::size_t tile) const {
 
 // Makes room for the light of photons, or for nothing where there is none.
 void Wavefront::create_caustics(bool has_photons) {
-  const Purpose purpose(device_, "the light of photons",
+  const Purpose purpose{"the light of photons",
                         "make the picture smaller, or set estimator.caustics to \"none\"", width_,
-                        height_);
+                        height_};
   const vk::DeviceSize slots = has_photons ? 2 * vk::DeviceSize{slots_} : 1;
   if (sample_caustic_.size < slots * sizeof(gpu::vec4))
-    sample_caustic_ = create_storage_buffer(device_, slots * sizeof(gpu::vec4));
+    sample_caustic_ = create_storage_buffer(device_, for_paths(), slots * sizeof(gpu::vec4));
   caustics_.resize(pixels_.size());
   for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const vk::DeviceSize pixels = has_photons ? pixels_[i].size / sizeof(gpu::GpuPixel) : 1;
     if (caustics_[i].size < pixels * sizeof(gpu::vec4))
-      caustics_[i] = create_storage_buffer(device_, pixels * sizeof(gpu::vec4));
+      caustics_[i] = create_storage_buffer(device_, purpose, pixels * sizeof(gpu::vec4));
   }
 }
 

@@ -80,6 +80,7 @@ class Wavefront {
     std::uint32_t limit = 0;  // the largest limit in its blocks
   };
 
+  Purpose for_paths() const;
   void create_tiles();
   void create_paths();
   void create_path_buffers(std::uint32_t slots);

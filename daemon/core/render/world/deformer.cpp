@@ -12,6 +12,8 @@
 namespace previz::render {
 namespace {
 
+constexpr Purpose for_deformation{"the meshes that deform", "simplify the meshes that deform"};
+
 // A tree is built anew once a ray is expected to visit this many times the records that it visited
 // when the tree was built. Building costs about as much as a frame of a small picture.
 constexpr double most_growth = 1.5;
@@ -78,10 +80,6 @@ scene::MeshBvh Deformer::add(const scene::Scene& scene, const scene::Deformation
   return std::move(built.bvh);
 }
 
-Purpose Deformer::for_deformation() const {
-  return {device_, "the meshes that deform", "simplify the meshes that deform"};
-}
-
 void Deformer::upload(std::vector<Place> places) {
   if (meshes_.empty()) return;
   if (!has_kernels_) {
@@ -96,9 +94,9 @@ void Deformer::upload(std::vector<Place> places) {
     meshes_[i].first_box = boxes;
     boxes += meshes_[i].room;
   }
-  const Purpose purpose = for_deformation();
-  boxes_ = create_storage_buffer(device_, boxes * sizeof(gpu::GpuRefitBox));
-  roots_ = create_storage_buffer(device_, meshes_.size() * sizeof(gpu::GpuRefitBox));
+  boxes_ = create_storage_buffer(device_, for_deformation, boxes * sizeof(gpu::GpuRefitBox));
+  roots_ =
+      create_storage_buffer(device_, for_deformation, meshes_.size() * sizeof(gpu::GpuRefitBox));
   upload_undeformed();
   upload_plans();
 }
@@ -130,9 +128,9 @@ void Deformer::upload_undeformed() {
         offsets.push_back(
             {target.positions[v], target.normals.empty() ? glm::vec3(0) : target.normals[v]});
   }
-  upload_storage(device_, undeformed_, undeformed);
-  upload_storage(device_, influences_, influences);
-  upload_storage(device_, offsets_, offsets);
+  upload_storage(device_, for_deformation, undeformed_, undeformed);
+  upload_storage(device_, for_deformation, influences_, influences);
+  upload_storage(device_, for_deformation, offsets_, offsets);
 }
 
 void Deformer::upload_plans() {
@@ -144,8 +142,8 @@ void Deformer::upload_plans() {
     leaves.insert(leaves.end(), mesh.plan.leaves.begin(), mesh.plan.leaves.end());
     nodes.insert(nodes.end(), mesh.plan.nodes.begin(), mesh.plan.nodes.end());
   }
-  upload_storage(device_, leaves_, leaves);
-  upload_storage(device_, nodes_, nodes);
+  upload_storage(device_, for_deformation, leaves_, leaves);
+  upload_storage(device_, for_deformation, nodes_, nodes);
 }
 
 // Uploads the joints and the weights of all meshes that have a shape yet. Targets of no weight are
@@ -167,9 +165,8 @@ void Deformer::upload_shapes() {
       ++mesh.push.weights;
     }
   }
-  const Purpose purpose = for_deformation();
-  upload_storage(device_, joints_, rows);
-  upload_storage(device_, weights_, weights);
+  upload_storage(device_, for_deformation, joints_, rows);
+  upload_storage(device_, for_deformation, weights_, weights);
 }
 
 void Deformer::record(const vk::raii::CommandBuffer& commands, Mesh& mesh, const Buffers& buffers) {

@@ -67,7 +67,6 @@ class Deformer {
     std::future<scene::RefittableBvh> better;
   };
 
-  Purpose for_deformation() const;
   void upload_undeformed();
   void upload_plans();
   void upload_shapes();

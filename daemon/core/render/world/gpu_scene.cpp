@@ -160,8 +160,8 @@ void GpuScene::find_bounds(const Spheres& spheres) {
 }
 
 void GpuScene::upload_tree(const std::vector<glm::uvec4>& bvh) {
-  const Purpose purpose(device_, "the triangles' tree", "simplify the meshes of the set");
-  upload_texels(device_, bvh_, bvh, vk::Format::eR32G32B32A32Uint);
+  const Purpose purpose{"the triangles' tree", "simplify the meshes of the set"};
+  upload_texels(device_, purpose, bvh_, bvh, vk::Format::eR32G32B32A32Uint);
 }
 
 void GpuScene::upload_meshes() {
@@ -199,10 +199,10 @@ void GpuScene::upload_meshes() {
     }
   }
   upload_tree(bvh);
-  const Purpose purpose(device_, "the triangles", "simplify the meshes of the set");
-  upload_texels(device_, vertices_, vertices, vk::Format::eR32G32B32A32Sfloat);
-  upload_texels(device_, triangles_, triangles, vk::Format::eR32G32B32A32Uint);
-  upload_texels(device_, extras_, extras, vk::Format::eR32G32Uint);
+  const Purpose purpose{"the triangles", "simplify the meshes of the set"};
+  upload_texels(device_, purpose, vertices_, vertices, vk::Format::eR32G32B32A32Sfloat);
+  upload_texels(device_, purpose, triangles_, triangles, vk::Format::eR32G32B32A32Uint);
+  upload_texels(device_, purpose, extras_, extras, vk::Format::eR32G32Uint);
   if (!scene_.deformations.empty()) check_deforming();
   std::vector<Deformer::Place> deformed;
   for (const scene::Deformation& deformation : scene_.deformations) {
@@ -241,9 +241,9 @@ void GpuScene::upload_materials(double specular_alpha) {
   for (const scene::Material& material : scene_.materials)
     as_read.push_back(this->as_read(material));
   const EncodedMaterials encoded = encode_materials(as_read, specular_alpha);
-  const Purpose purpose(device_, "the materials", "use fewer materials");
-  upload_storage(device_, materials_, encoded.materials);
-  upload_texels(device_, albedo_, encoded.albedo, vk::Format::eR32Sfloat);
+  const Purpose purpose{"the materials", "use fewer materials"};
+  upload_storage(device_, purpose, materials_, encoded.materials);
+  upload_texels(device_, purpose, albedo_, encoded.albedo, vk::Format::eR32Sfloat);
 }
 
 // Returns the material with the textures as it reads them: where they are filtered they are there
@@ -291,12 +291,12 @@ void GpuScene::upload_textures() {
     textures.push_back(texture);
   }
   append(textures, levels);
-  const Purpose purpose(device_, "the scene's textures",
+  const Purpose purpose{"the scene's textures",
                         filters_textures_
                             ? "use smaller textures, or set estimator.filter_textures to false"
-                            : "use smaller textures");
-  upload_storage(device_, textures_, textures);
-  upload_texels(device_, texels_, texels, vk::Format::eR32G32Uint);
+                            : "use smaller textures"};
+  upload_storage(device_, purpose, textures_, textures);
+  upload_texels(device_, purpose, texels_, texels, vk::Format::eR32G32Uint);
 }
 
 void GpuScene::set_environment(const EncodedEnvironment& encoded, set::LightSampling sampling) {
@@ -305,9 +305,9 @@ void GpuScene::set_environment(const EncodedEnvironment& encoded, set::LightSamp
   environment_mean_ = encoded.mean;
   environment_spread_ = encoded.spread;
   sampling_ = sampling;
-  const Purpose purpose(device_, "the environment light", "use a smaller environment map");
-  upload_texels(device_, environment_, encoded.radiance, vk::Format::eR32G32B32A32Sfloat);
-  upload_texels(device_, importance_, encoded.importance, vk::Format::eR32G32B32A32Sfloat);
+  const Purpose purpose{"the environment light", "use a smaller environment map"};
+  upload_texels(device_, purpose, environment_, encoded.radiance, vk::Format::eR32G32B32A32Sfloat);
+  upload_texels(device_, purpose, importance_, encoded.importance, vk::Format::eR32G32B32A32Sfloat);
 }
 
 void GpuScene::set_sources(std::optional<std::vector<set::Light>> sources) {
@@ -330,8 +330,8 @@ void GpuScene::upload_bounds(const glm::dvec3& camera_position) {
   for (const Bounds& part : {difference_bounds_, specular_bounds_})
     for (const glm::dvec4& bound : part)
       bounds.emplace_back(glm::dvec3(bound) - camera_position, bound.w);
-  const Purpose purpose(device_, "the bounds of virtual objects", "use fewer objects");
-  upload_storage(device_, bounds_buffer_, bounds);
+  const Purpose purpose{"the bounds of virtual objects", "use fewer objects"};
+  upload_storage(device_, purpose, bounds_buffer_, bounds);
 }
 
 // The extent does not depend on the camera, to the last bit, so that lights need not be weighed
@@ -379,8 +379,8 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
   }
   const scene::TopBvh top_bvh = scene::build_top_bvh(top);
   upload_bytes(device_, bvh_, std::as_bytes(std::span(top_bvh.texels)));
-  const Purpose purpose(device_, "the scene's objects", "use fewer objects");
-  upload_storage(device_, instances_, instances);
+  const Purpose purpose{"the scene's objects", "use fewer objects"};
+  upload_storage(device_, purpose, instances_, instances);
   if (device_.traces_in_hardware()) place_structures(top);
 }
 

@@ -8,6 +8,11 @@
 namespace previz::render {
 namespace {
 
+constexpr Purpose for_rays{
+    "the rays that the graphics card traces in hardware",
+    "simplify the meshes of the set, or set quality.hardware_rays to false and start previzd "
+    "again"};
+
 using Type = vk::AccelerationStructureTypeKHR;
 using BuildFlag = vk::BuildAccelerationStructureFlagBitsKHR;
 using BuildInfo = vk::AccelerationStructureBuildGeometryInfoKHR;
@@ -61,12 +66,6 @@ RayStructures::Mesh RayStructures::mesh_of(const scene::Mesh& from, std::uint32_
   return mesh;
 }
 
-Purpose RayStructures::for_rays() const {
-  return {device_, "the rays that the graphics card traces in hardware",
-          "simplify the meshes of the set, or set quality.hardware_rays to false and start previzd "
-          "again"};
-}
-
 void RayStructures::clear() {
   meshes_.clear();
   for (Buffer* buffer : {&indices_, &bottom_, &scratch_}) *buffer = {};
@@ -83,11 +82,10 @@ void RayStructures::upload_indices(std::span<const Mesh> meshes) {
                        .deforms = from.deforms});
     indices.insert(indices.end(), from.triangles.begin(), from.triangles.end());
   }
-  upload_storage(device_, indices_, indices);
+  upload_storage(device_, for_rays, indices_, indices);
 }
 
 void RayStructures::build(std::span<const Mesh> meshes, const Buffer& vertices) {
-  const Purpose purpose = for_rays();
   clear();
   upload_indices(meshes);
   std::vector<vk::DeviceSize> sizes;
@@ -101,7 +99,7 @@ void RayStructures::build(std::span<const Mesh> meshes, const Buffer& vertices) 
     most_scratch = std::max(most_scratch, needed.buildScratchSize);
     if (mesh.deforms) most_later = std::max(most_later, needed.buildScratchSize);
   }
-  bottom_ = create_structure_memory(device_, all);
+  bottom_ = create_structure_memory(device_, for_rays, all);
   reserve_scratch(most_scratch);
   vk::DeviceSize offset = 0;
   for (std::size_t i = 0; i < meshes_.size(); ++i) {
@@ -140,7 +138,6 @@ void RayStructures::reshape(std::size_t index, const Buffer& vertices) {
 }
 
 void RayStructures::place(std::span<const Instance> instances) {
-  const Purpose purpose = for_rays();
   std::vector<vk::AccelerationStructureInstanceKHR> records;
   for (std::uint32_t i = 0; i < instances.size(); ++i) {
     const Instance& instance = instances[i];
@@ -157,7 +154,7 @@ void RayStructures::place(std::span<const Instance> instances) {
       record.accelerationStructureReference =
           device_.vk().getAccelerationStructureAddressKHR({**mesh.structure});
   }
-  upload_storage(device_, instances_, records);
+  upload_storage(device_, for_rays, instances_, records);
   const vk::AccelerationStructureGeometryKHR geometry(
       vk::GeometryTypeKHR::eInstances,
       vk::AccelerationStructureGeometryInstancesDataKHR(VK_FALSE, in(device_, instances_)));
@@ -166,7 +163,8 @@ void RayStructures::place(std::span<const Instance> instances) {
   const auto sizes = sizes_of(device_, info, count);
   if (!top_.buffer || top_.size < sizes.accelerationStructureSize) {
     top_ = {};
-    top_ = create_structure_buffer(device_, sizes.accelerationStructureSize, Type::eTopLevel);
+    top_ = create_structure_buffer(device_, for_rays, sizes.accelerationStructureSize,
+                                   Type::eTopLevel);
   }
   reserve_scratch(sizes.buildScratchSize);
   device_.record([&](const vk::raii::CommandBuffer& commands) {
@@ -178,7 +176,7 @@ void RayStructures::reserve_scratch(vk::DeviceSize bytes) {
   bytes += device_.scratch_alignment();
   if (scratch_.buffer && scratch_.size >= bytes) return;
   scratch_ = {};
-  scratch_ = create_structure_memory(device_, bytes);
+  scratch_ = create_structure_memory(device_, for_rays, bytes);
 }
 
 // One build after another uses the scratch memory.

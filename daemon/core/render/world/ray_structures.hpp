@@ -54,7 +54,6 @@ class RayStructures {
     bool deforms = false;
   };
 
-  Purpose for_rays() const;
   void upload_indices(std::span<const Mesh> meshes);
   vk::AccelerationStructureGeometryKHR geometry_of(const MeshStructure& mesh,
                                                    const Buffer& vertices) const;

@@ -11,6 +11,9 @@
 namespace previz::render {
 namespace {
 
+constexpr Purpose for_lights{"the lamps and the triangles that emit light",
+                             "simplify the meshes that emit light"};
+
 // Lights have no padding, so that equal ones have equal bytes.
 static_assert(sizeof(gpu::GpuLight) == 160);
 
@@ -135,11 +138,6 @@ void SceneLights::place(const scene::Scene& scene, const std::vector<set::Light>
   if (is_new || camera_position != seen_from_) upload_positions(camera_position);
 }
 
-Purpose SceneLights::for_lights() const {
-  return {device_, "the lamps and the triangles that emit light",
-          "simplify the meshes that emit light"};
-}
-
 void SceneLights::encode(const scene::Scene& scene) {
   ++encoded_;
   PlacedLights all = state_->lamps;
@@ -168,9 +166,8 @@ void SceneLights::encode(const scene::Scene& scene) {
   differ_ = std::any_of(all.lights.begin(), all.lights.end(), [](const gpu::GpuLight& light) {
     return light.gain_mixed != light.gain_real;
   });
-  const Purpose purpose = for_lights();
-  upload_storage(device_, lights_, all.lights);
-  upload_texels(device_, light_tree_, tree.nodes, vk::Format::eR32G32B32A32Uint);
+  upload_storage(device_, for_lights, lights_, all.lights);
+  upload_texels(device_, for_lights, light_tree_, tree.nodes, vk::Format::eR32G32B32A32Uint);
   positions_ = std::move(all.positions);
 }
 
@@ -179,8 +176,7 @@ void SceneLights::upload_positions(const glm::dvec3& camera_position) {
   std::vector<glm::vec3> positions;
   positions.reserve(positions_.size());
   for (const glm::dvec3& position : positions_) positions.emplace_back(position - camera_position);
-  const Purpose purpose = for_lights();
-  upload_storage(device_, light_positions_, positions);
+  upload_storage(device_, for_lights, light_positions_, positions);
 }
 
 void SceneLights::describe(gpu::GpuFrame& frame) const {

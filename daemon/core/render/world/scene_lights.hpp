@@ -67,7 +67,6 @@ class SceneLights {
   State state_of(const scene::Scene& scene, const std::vector<set::Light>& lamps,
                  double lit_radius) const;
   static bool are_equal(const State& a, const State& b);
-  Purpose for_lights() const;
   void encode(const scene::Scene& scene);
   void upload_positions(const glm::dvec3& camera_position);
 
