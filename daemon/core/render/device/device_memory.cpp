@@ -6,7 +6,6 @@
 #include <span>
 #include <utility>
 
-#include "daemon/core/render/device/buffer.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
