@@ -99,7 +99,7 @@ void LiveGuides::measure(const Seen& seen) {
   const ModelPtr model = *model_->get();
   fit::Measurement measurement(model->real(), model->camera(), std::move(things_));
   measurement.look(*seen.frame, *seen.world_from_camera);
-  things_ = measurement.things();
+  things_ = measurement.parts();
   publish(measurement.figure());
   parts_.kept.metrics.worked(stage_name,
                              std::chrono::duration<double>(Clock::now() - begin).count());
@@ -112,7 +112,7 @@ void LiveGuides::publish(const std::optional<fit::Figure>& figure) {
     fit.emplace();
     if (figure->off)
       fit->all = {figure->off->median_px, figure->off->most_px, figure->off->shift_px};
-    for (const fit::ThingOff& thing : figure->things_off)
+    for (const fit::PartOff& thing : figure->things_off)
       fit->things_off.emplace_back(thing.name, thing.shift_px);
   }
   parts_.kept.metrics.model_fit(fit);

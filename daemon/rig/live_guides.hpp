@@ -63,7 +63,7 @@ class LiveGuides {
   const std::shared_ptr<pipeline::Newest<ModelPtr>> model_;
   pipeline::Newest<std::optional<fit::Figure>> figure_{std::nullopt};
   pipeline::Mailbox<Seen> seen_;
-  fit::Things things_;  // of the pictures that were measured last; the thread's own
+  fit::Parts things_;  // of the pictures that were measured last; the thread's own
   std::chrono::steady_clock::time_point offered_;
   std::jthread thread_;  // last: it uses all of the above
 };

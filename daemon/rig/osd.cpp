@@ -128,7 +128,7 @@ std::string pixels(double px) {
   return fmt::format("{:.{}f} px", px, px < 9.95 ? 1 : 0);
 }
 
-std::string words_of(const std::vector<fit::ThingOff>& things) {
+std::string words_of(const std::vector<fit::PartOff>& things) {
   std::string text = fmt::format("\"{}\" off by {}: moved, or misplaced in the model",
                                  set::printable(things[0].name), pixels(things[0].shift_px));
   if (things.size() > 1)

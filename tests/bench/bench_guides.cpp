@@ -55,7 +55,7 @@ void run(const Options& options) {
   const output::GuidePainter painter(mode.width, mode.height, DisplayScale::letterbox);
   pipeline::TrackStage track(take);
   Spent spent;
-  fit::Things things;
+  fit::Parts things;
   std::size_t found = 0;
   for (std::size_t i = 0; i < take.observer_stream->records().size(); ++i) {
     pipeline::Shot shot;
@@ -84,7 +84,7 @@ void run(const Options& options) {
                              fit::Measurement measurement(model->real(), take.observer, things);
                              measurement.look(*shot.frame, shot.track.pose->world_from_camera);
                              found += measurement.figure().found;
-                             things = measurement.things();
+                             things = measurement.parts();
                            }).cpu_ms);
   }
   if (found == 0) std::printf("no edge of light was found\n");

@@ -97,7 +97,7 @@ void describe_fit(const fit::Figure& figure, const set::Set& set, std::ostream& 
 
 void remark_on_fit(const fit::Figure& figure, const set::Set& set, set::Findings& findings) {
   if (!has_real(set)) return;
-  for (const fit::ThingOff& thing : figure.things_off)
+  for (const fit::PartOff& thing : figure.things_off)
     findings.remarks.push_back(fmt::format(
         "\"{}\" is {:.1f} px beside the pictures' edges, by {} of it, while the rest of the model "
         "fits: it was moved, or its place in the model is wrong. Put it back, or measure its place "

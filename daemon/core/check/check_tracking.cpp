@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <string>
 
-#include "daemon/core/fit/things.hpp"
+#include "daemon/core/fit/parts.hpp"
 #include "daemon/core/pipeline/track_stage.hpp"
 #include "daemon/core/set/problems.hpp"
 #include "daemon/core/tracking/pose_judgement.hpp"

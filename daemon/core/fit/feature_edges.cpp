@@ -66,12 +66,12 @@ using Ends = std::pair<std::uint32_t, std::uint32_t>;  // the lower number first
 struct Side {
   Ends ends;
   glm::dvec3 into{0};
-  std::size_t thing = no_thing;
+  std::size_t part = no_part;
 };
 
 // Returns the sides of all triangles that have an area, sorted by their ends.
 std::vector<Side> sides_of(const std::vector<glm::dvec3>& triangles,
-                           const std::vector<std::size_t>& things, Welder& welder) {
+                           const std::vector<std::size_t>& parts, Welder& welder) {
   std::vector<Side> sides;
   for (std::size_t t = 0; t + 2 < triangles.size(); t += 3) {
     std::array<std::uint32_t, 3> corner{};
@@ -86,7 +86,7 @@ std::vector<Side> sides_of(const std::vector<glm::dvec3>& triangles,
       if (glm::length(across) > weld_m)
         sides.push_back({{std::min(a, b), std::max(a, b)},
                          glm::normalize(across),
-                         things.empty() ? no_thing : things[t / 3]});
+                         parts.empty() ? no_part : parts[t / 3]});
     }
   }
   std::ranges::stable_sort(sides, {}, &Side::ends);
@@ -94,10 +94,10 @@ std::vector<Side> sides_of(const std::vector<glm::dvec3>& triangles,
 }
 
 // An edge between two corners.
-struct Part {
+struct Stretch {
   Ends ends;
   std::vector<glm::dvec3> into;
-  std::size_t thing = no_thing;
+  std::size_t part = no_part;
   bool is_used = false;
 };
 
@@ -111,74 +111,75 @@ std::vector<glm::dvec3> directions(const Side* side, const Side* end) {
   return different;
 }
 
-std::size_t thing_of(const Side* side, const Side* end) {
+std::size_t part_of(const Side* side, const Side* end) {
   const bool is_one =
-      std::all_of(side, end, [side](const Side& other) { return other.thing == side->thing; });
-  return is_one ? side->thing : no_thing;
+      std::all_of(side, end, [side](const Side& other) { return other.part == side->part; });
+  return is_one ? side->part : no_part;
 }
 
 bool is_feature(const std::vector<glm::dvec3>& into) {
   return into.size() != 2 || glm::dot(into[0], into[1]) > -cos_fold;
 }
 
-std::vector<Part> parts_of(const std::vector<Side>& sides) {
-  std::vector<Part> parts;
+std::vector<Stretch> stretches_of(const std::vector<Side>& sides) {
+  std::vector<Stretch> stretches;
   const Side* const end = sides.data() + sides.size();
   for (const Side* side = sides.data(); side != end;) {
     const Side* next = side;
     while (next != end && next->ends == side->ends) ++next;
     if (auto into = directions(side, next); is_feature(into))
-      parts.push_back({side->ends, std::move(into), thing_of(side, next)});
+      stretches.push_back({side->ends, std::move(into), part_of(side, next)});
     side = next;
   }
-  return parts;
+  return stretches;
 }
 
 class Joiner {
  public:
-  Joiner(std::vector<Part> parts, const std::vector<glm::dvec3>& places)
-      : parts_(std::move(parts)), places_(places) {
-    for (std::size_t i = 0; i < parts_.size(); ++i) {
-      at_.emplace(parts_[i].ends.first, i);
-      at_.emplace(parts_[i].ends.second, i);
+  Joiner(std::vector<Stretch> stretches, const std::vector<glm::dvec3>& places)
+      : stretches_(std::move(stretches)), places_(places) {
+    for (std::size_t i = 0; i < stretches_.size(); ++i) {
+      at_.emplace(stretches_[i].ends.first, i);
+      at_.emplace(stretches_[i].ends.second, i);
     }
   }
 
   std::vector<FeatureEdge> joined() {
     std::vector<FeatureEdge> edges;
-    for (Part& part : parts_) {
-      if (std::exchange(part.is_used, true)) continue;
-      const auto [a, b] = part.ends;
+    for (Stretch& stretch : stretches_) {
+      if (std::exchange(stretch.is_used, true)) continue;
+      const auto [a, b] = stretch.ends;
       const glm::dvec3 along = glm::normalize(places_[b] - places_[a]);
-      edges.push_back({places_[last(a, -along, part.thing)], places_[last(b, along, part.thing)],
-                       part.into, part.thing});
+      edges.push_back({places_[last(a, -along, stretch.part)],
+                       places_[last(b, along, stretch.part)], stretch.into, stretch.part});
     }
     return edges;
   }
 
  private:
   // Returns the corner at which a line ends that goes on from this one.
-  std::uint32_t last(std::uint32_t corner, const glm::dvec3& along, std::size_t thing) {
-    while (const auto next = after(corner, along, thing)) corner = *next;
+  std::uint32_t last(std::uint32_t corner, const glm::dvec3& along, std::size_t part) {
+    while (const auto next = after(corner, along, part)) corner = *next;
     return corner;
   }
 
   std::optional<std::uint32_t> after(std::uint32_t corner, const glm::dvec3& along,
-                                     std::size_t thing) {
+                                     std::size_t part) {
     const auto [begin, end] = at_.equal_range(corner);
     for (auto at = begin; at != end; ++at) {
-      Part& part = parts_[at->second];
-      if (part.is_used || part.thing != thing) continue;
-      const std::uint32_t other = part.ends.first == corner ? part.ends.second : part.ends.first;
+      Stretch& stretch = stretches_[at->second];
+      if (stretch.is_used || stretch.part != part) continue;
+      const std::uint32_t other =
+          stretch.ends.first == corner ? stretch.ends.second : stretch.ends.first;
       if (glm::dot(glm::normalize(places_[other] - places_[corner]), along) < cos_straight)
         continue;
-      part.is_used = true;
+      stretch.is_used = true;
       return other;
     }
     return {};
   }
 
-  std::vector<Part> parts_;
+  std::vector<Stretch> stretches_;
   const std::vector<glm::dvec3>& places_;
   std::unordered_multimap<std::uint32_t, std::size_t> at_;  // parts by their corners
 };
@@ -186,10 +187,10 @@ class Joiner {
 }  // namespace
 
 std::vector<FeatureEdge> feature_edges(const std::vector<glm::dvec3>& triangles,
-                                       const std::vector<std::size_t>& things) {
+                                       const std::vector<std::size_t>& parts) {
   Welder welder;
-  std::vector<Part> parts = parts_of(sides_of(triangles, things, welder));
-  return Joiner(std::move(parts), welder.places()).joined();
+  std::vector<Stretch> stretches = stretches_of(sides_of(triangles, parts, welder));
+  return Joiner(std::move(stretches), welder.places()).joined();
 }
 
 }  // namespace previz::fit

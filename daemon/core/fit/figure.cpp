@@ -70,36 +70,36 @@ void Measurement::look(const Frame& frame, const glm::dmat4& world_from_camera) 
   const tracking::Photometry photometry(camera_.response);
   const auto luminance = [&](int x, int y) { return photometry.luminance(frame, x, y); };
   ++frames_;
-  std::vector<Looked> found;
-  std::map<std::size_t, ThingVotes> things;
+  std::vector<EdgeSample> found;
+  std::map<std::size_t, PartVotes> parts;
   for (const Segment& piece : measurable_pieces(model_, lens, world_from_camera)) {
     ++looked_at_;
-    ThingVotes& thing = things[piece.thing];
-    ++thing.looked_at;
+    PartVotes& part = parts[piece.part];
+    ++part.looked_at;
     const glm::dvec2 along = glm::normalize(piece.b - piece.a), normal(-along.y, along.x);
-    Looked looked{normal,
-                  look_near(luminance, lens, piece, normal),
-                  0.5 * (piece.a + piece.b),
-                  piece.thing,
-                  {}};
-    looked.px_per_m = px_per_m(lens, world_from_camera, looked.at, piece.depth_m);
-    if (looked.lights.empty()) continue;
-    thing.votes.add(looked);
-    found.push_back(std::move(looked));
+    EdgeSample sample{normal,
+                      look_near(luminance, lens, piece, normal),
+                      0.5 * (piece.a + piece.b),
+                      piece.part,
+                      {}};
+    sample.px_per_m = px_per_m(lens, world_from_camera, sample.at, piece.depth_m);
+    if (sample.lights.empty()) continue;
+    part.votes.add(sample);
+    found.push_back(std::move(sample));
   }
   Votes all;
-  for (const auto& [number, thing] : things) all.add(thing.votes);
-  things_.look(things, all, found);
+  for (const auto& [number, part] : parts) all.add(part.votes);
+  parts_.look(parts, all, found);
   const glm::dvec2 shift = all.best();
-  for (const Looked& looked : found) off_px_.push_back(nearest(looked, shift).off_px);
+  for (const EdgeSample& sample : found) off_px_.push_back(nearest(sample, shift).off_px);
   if (!found.empty()) shift_px_.push_back(glm::length(shift));
 }
 
 Figure Measurement::figure() const {
   Figure figure{frames_, looked_at_, off_px_.size(), {}, refused_, {}, {}};
   if (!refused_.empty()) return figure;
-  figure.things_off = things_.off(model_.things());
-  figure.not_judged = things_.not_judged(model_.things());
+  figure.things_off = parts_.off(model_.parts());
+  figure.not_judged = parts_.not_judged(model_.parts());
   if (frames_ == 0)
     figure.why = "none of the pictures looked at has a pose";
   else if (looked_at_ < least_pieces)

@@ -60,24 +60,24 @@ void rename_alike(std::vector<std::string>& names, Rename rename) {
       rename(numbers[i], i + 1, numbers.size());
 }
 
-// Gives the things of a scene numbers.
+// Gives the parts of a scene numbers.
 class Naming {
  public:
   std::size_t number_of(const scene::Instance& instance) {
-    if (instance.tag != scene::TagPart::none) return no_thing;
+    if (instance.tag != scene::TagPart::none) return no_part;
     const auto [at, is_new] =
-        numbers_.try_emplace({instance.object, instance.placed}, things_.size());
-    if (is_new) things_.push_back({instance.object, instance.node}), ++of_object_[instance.object];
+        numbers_.try_emplace({instance.object, instance.placed}, parts_.size());
+    if (is_new) parts_.push_back({instance.object, instance.node}), ++of_object_[instance.object];
     return at->second;
   }
 
   std::vector<std::string> names(const set::Set& set) const {
     std::vector<std::string> names;
-    for (const Thing& thing : things_)
-      names.push_back(is_object(thing) ? set.objects[thing.object].name : thing.node);
+    for (const Part& part : parts_)
+      names.push_back(is_object(part) ? set.objects[part.object].name : part.node);
     rename_alike(names, [&](std::size_t number, std::size_t, std::size_t) {
-      const Thing& thing = things_[number];
-      if (!is_object(thing)) names[number] = set.objects[thing.object].name + ": " + thing.node;
+      const Part& part = parts_[number];
+      if (!is_object(part)) names[number] = set.objects[part.object].name + ": " + part.node;
     });
     rename_alike(names, [&](std::size_t number, std::size_t which, std::size_t of) {
       names[number] += " (" + std::to_string(which) + " of " + std::to_string(of) + ')';
@@ -86,19 +86,19 @@ class Naming {
   }
 
  private:
-  struct Thing {
+  struct Part {
     std::uint32_t object = 0;
     std::string node;
   };
 
-  // Returns whether a thing has the name of its object.
-  bool is_object(const Thing& thing) const {
-    return thing.node.empty() || of_object_.at(thing.object) == 1;
+  // Returns whether a part has the name of its object.
+  bool is_object(const Part& part) const {
+    return part.node.empty() || of_object_.at(part.object) == 1;
   }
 
-  std::vector<Thing> things_;
+  std::vector<Part> parts_;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> numbers_;  // by object, placed
-  std::map<std::uint32_t, std::size_t> of_object_;                          // things
+  std::map<std::uint32_t, std::size_t> of_object_;                          // parts
 };
 
 }  // namespace
@@ -118,20 +118,20 @@ void append(const scene::Scene& scene, const scene::Instance& instance,
 
 RealModel::RealModel(const scene::Scene& scene, const set::Set& set) {
   lighting::Triangles all, opaque;
-  std::vector<std::size_t> things;  // of the triangles of `opaque`
+  std::vector<std::size_t> parts;  // of the triangles of `opaque`
   Naming naming;
   for (const scene::Instance& instance : scene.instances) {
     if (!(instance.presence & scene::world_real) || !stands_still(instance, set)) continue;
     append(scene, instance, all);
     if (!has_edges(scene.materials[instance.material])) continue;
     append(scene, instance, opaque);
-    things.resize(opaque.size() / 3, naming.number_of(instance));
+    parts.resize(opaque.size() / 3, naming.number_of(instance));
   }
   if (all.empty()) return;
   surface_.emplace(all, middle_of(all));
-  for (const FeatureEdge& edge : feature_edges(opaque, things))
-    edges_.push_back({edge.a, edge.b, is_touched(*surface_, edge), edge.thing});
-  things_ = naming.names(set);
+  for (const FeatureEdge& edge : feature_edges(opaque, parts))
+    edges_.push_back({edge.a, edge.b, is_touched(*surface_, edge), edge.part});
+  parts_ = naming.names(set);
 }
 
 bool RealModel::is_seen(const glm::dvec3& eye, const glm::dvec3& point) const {

@@ -26,7 +26,7 @@ struct ModelEdge {
   // Something of the model touches it: a shadow begins there, which moves the edge of light by half
   // a pixel and more.
   bool is_touched = false;
-  std::size_t thing = no_thing;  // in RealModel::things()
+  std::size_t part = no_part;  // in RealModel::parts()
 };
 
 // The parts of a scene that exist in the real world and stand still: phantoms and removed objects
@@ -40,11 +40,11 @@ class RealModel {
   // These are the edges of feature_edges().
   const std::vector<ModelEdge>& edges() const { return edges_; }
 
-  // Returns the names of the things that the model consists of: the nodes of the files, or the
+  // Returns the names of the parts that the model consists of: the nodes of the files, or the
   // object itself where its file has one node, or where a node has no name. Every copy of a node is
-  // a thing. Names that would be alike begin with the object's, as "crates: lid", or end with a
-  // number, as "chair (2 of 5)". Printed tags, and what is under them, are no things.
-  const std::vector<std::string>& things() const { return things_; }
+  // a part. Names that would be alike begin with the object's, as "crates: lid", or end with a
+  // number, as "chair (2 of 5)". Printed tags, and what is under them, are no parts.
+  const std::vector<std::string>& parts() const { return parts_; }
 
   // Returns whether the model does not hide a point of an edge from an eye, to one part in a
   // thousand of the distance.
@@ -53,7 +53,7 @@ class RealModel {
  private:
   std::optional<lighting::Room> surface_;  // absent: nothing is real
   std::vector<ModelEdge> edges_;
-  std::vector<std::string> things_;
+  std::vector<std::string> parts_;
 };
 
 }  // namespace previz::fit

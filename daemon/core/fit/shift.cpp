@@ -17,24 +17,24 @@ glm::dvec2 shift_of(int x, int y) {
 
 }  // namespace
 
-const Light& nearest(const Looked& looked, const glm::dvec2& shift) {
-  const double at = glm::dot(looked.normal, shift);
+const Light& nearest(const EdgeSample& sample, const glm::dvec2& shift) {
+  const double at = glm::dot(sample.normal, shift);
   return *std::ranges::min_element(
-      looked.lights, {}, [&](const Light& light) { return std::abs(light.along_normal_px - at); });
+      sample.lights, {}, [&](const Light& light) { return std::abs(light.along_normal_px - at); });
 }
 
-double agreement(const Looked& looked, const glm::dvec2& shift, double within_px) {
-  const double off = nearest(looked, shift).along_normal_px - glm::dot(looked.normal, shift);
+double agreement(const EdgeSample& sample, const glm::dvec2& shift, double within_px) {
+  const double off = nearest(sample, shift).along_normal_px - glm::dot(sample.normal, shift);
   return std::max(0.0, 1 - off * off / (within_px * within_px));
 }
 
 Votes::Votes() : sums_(std::size_t(votes_aside) * votes_aside) {}
 
-void Votes::add(const Looked& looked) {
+void Votes::add(const EdgeSample& sample) {
   ++pieces_;
   std::size_t i = 0;
   for (int y = 0; y < votes_aside; ++y)
-    for (int x = 0; x < votes_aside; ++x) sums_[i++] += agreement(looked, shift_of(x, y));
+    for (int x = 0; x < votes_aside; ++x) sums_[i++] += agreement(sample, shift_of(x, y));
 }
 
 void Votes::add(const Votes& others) {
@@ -56,7 +56,7 @@ glm::dvec2 Votes::best() const {
   for (int y = 0; y < votes_aside; ++y)
     for (int x = 0; x < votes_aside; ++x) {
       const glm::dvec2 shift = shift_of(x, y);
-      const double sum = sums_[i++] - share_a_px * double(pieces_) * glm::length(shift);
+      const double sum = sums_[i++] - share_per_px * double(pieces_) * glm::length(shift);
       if (sum > most) most = sum, best = shift;
     }
   return best;

@@ -19,26 +19,26 @@ struct Light {
 };
 
 // A piece of an edge that has edges of light nearby.
-struct Looked {
+struct EdgeSample {
   glm::dvec2 normal{0};
   std::vector<Light> lights;  // not empty
   glm::dvec2 at{0};           // the middle of the piece, on the pinhole plane
-  std::size_t thing = 0;      // in RealModel::things(), or no_thing
-  // How the piece moves in the picture, right and down, if its thing does in the world.
+  std::size_t part = 0;       // in RealModel::parts(), or no_part
+  // How the piece moves in the picture, right and down, if its part does in the world.
   std::array<glm::dvec3, 2> px_per_m{};
 };
 
 // Returns the edge of light that is nearest to where the piece is after a shift.
-const Light& nearest(const Looked& looked, const glm::dvec2& shift);
+const Light& nearest(const EdgeSample& sample, const glm::dvec2& shift);
 
 // Edges agree on a shift within this.
 inline constexpr double agree_px = 1;
 // A shift that is a pixel longer must convince so many more of the pieces.
-inline constexpr double share_a_px = 0.005;
+inline constexpr double share_per_px = 0.005;
 
 // Returns 1 for a piece that has light where a shift brings it, less for one that has it nearby,
 // and 0 for one that has none within a distance.
-double agreement(const Looked& looked, const glm::dvec2& shift, double within_px = agree_px);
+double agreement(const EdgeSample& sample, const glm::dvec2& shift, double within_px = agree_px);
 
 // What pieces say about every shift within reach_px, to half a pixel on either axis. A picture has
 // edges of light that are not the model's, and each piece alone would take the nearest: of a model
@@ -47,7 +47,7 @@ class Votes {
  public:
   Votes();
 
-  void add(const Looked& looked);
+  void add(const EdgeSample& sample);
   void add(const Votes& others);
   // Returns the votes of all pieces but `some` of them.
   Votes without(const Votes& some) const;

@@ -28,7 +28,7 @@ struct Sample {
 struct SampledEdge {
   bool is_touched = false;
   std::vector<Sample> samples;  // at even distances on the pinhole plane
-  std::size_t thing = no_thing;
+  std::size_t part = no_part;
 };
 
 // Cuts a line to where it is `from` or more in front of a plane through the camera; returns false
@@ -69,7 +69,7 @@ class Camera {
   }
 
   SampledEdge see(const ModelEdge& edge) const {
-    SampledEdge seen{edge.is_touched, {}, edge.thing};
+    SampledEdge seen{edge.is_touched, {}, edge.part};
     glm::dvec3 a = in_camera(edge.a), b = in_camera(edge.b);
     if (!clip_to_picture(lens_, a, b)) return seen;
     const auto pa = on_pinhole(lens_, a), pb = on_pinhole(lens_, b);
@@ -200,7 +200,7 @@ std::vector<Segment> measurable_pieces(const RealModel& model, const PinholeIntr
           for (const Share& share : cut(glm::distance(a, b), corner_px)) {
             // In a picture, the inverse of the depth changes evenly along a line.
             const double middle = 0.5 * (share.from + share.to);
-            pieces.push_back({a + share.from * (b - a), a + share.to * (b - a), edges[e].thing,
+            pieces.push_back({a + share.from * (b - a), a + share.to * (b - a), edges[e].part,
                               1 / ((1 - middle) / from.depth_m + middle / to.depth_m)});
           }
         });

@@ -14,8 +14,8 @@ namespace previz::fit {
 struct Segment {
   glm::dvec2 a{0}, b{0};
   // These are of measurable_pieces().
-  std::size_t thing = no_thing;  // in RealModel::things()
-  double depth_m = 0;            // of its middle, from the camera's plane
+  std::size_t part = no_part;  // in RealModel::parts()
+  double depth_m = 0;          // of its middle, from the camera's plane
 };
 
 // Returns the edges that the model does not hide as segments in pixels of the picture, to draw over

@@ -98,7 +98,7 @@ std::string Marking::words_of_box() const {
     places[i] = *place;
   }
   const std::string name = fmt::format("box {}", order_.back().first + 1);
-  return tracking::are_around_a_rectangle(places)
+  return tracking::fit_a_rectangle(places)
              ? name + " is complete"
              : name + ": its corners are not in order around; unmark, and mark them in order";
 }

@@ -47,7 +47,7 @@ Meeting meeting_of(const std::vector<Ray>& rays) {
   return meeting;
 }
 
-bool are_around_a_rectangle(const std::array<glm::dvec3, 3>& corners) {
+bool fit_a_rectangle(const std::array<glm::dvec3, 3>& corners) {
   constexpr double most_off_rad = 25 * std::numbers::pi / 180;
   const double angle = angle_between(corners[0] - corners[1], corners[2] - corners[1]);
   return std::abs(angle - 0.5 * std::numbers::pi) < most_off_rad;

@@ -37,6 +37,6 @@ Meeting meeting_of(const std::vector<Ray>& rays);
 // Returns whether three corners of a rectangle are in order around: the angle at the second is a
 // right one within 25 degrees, which leaves room for marks; at the wrong corner of a square it is
 // off by 45.
-bool are_around_a_rectangle(const std::array<glm::dvec3, 3>& corners);
+bool fit_a_rectangle(const std::array<glm::dvec3, 3>& corners);
 
 }  // namespace previz::tracking

@@ -174,7 +174,7 @@ void hand_over(const FarmOptions& options, const JobFolder& folder, const Job& j
 }
 
 // Returns the wishes of the plan with those that are given now.
-Wishes wishes_with(Wishes planned, const Wishes& now) {
+Wishes merged_wishes(Wishes planned, const Wishes& now) {
   if (now.at_once > 0) planned.at_once = now.at_once;
   if (!now.partition.empty()) planned.partition = now.partition;
   if (!now.time.empty()) planned.time = now.time;
@@ -244,7 +244,7 @@ void cancel(const JobOptions& options, std::ostream& out) {
 void retry(const JobOptions& options, std::ostream& out) {
   const JobFolder folder(options.job);
   Job job = folder.read_plan();
-  job.wishes = wishes_with(job.wishes, options.wishes);
+  job.wishes = merged_wishes(job.wishes, options.wishes);
   check_paths(folder, job, options.any_paths);
   const JobStatus status = status_of(folder, job);
   refuse_while_queued(status, folder);

@@ -40,9 +40,9 @@ class Task {
  private:
   bool begin();
   void refuse_if_stopped() const;
-  bool is_told_mine() const;
+  bool has_my_claim() const;
   bool is_at_another() const;
-  bool is_left_to_me();
+  bool is_mine_to_render();
   bool is_rendered() const;
   bool take();
   void wait(std::chrono::seconds time) const;
@@ -84,7 +84,7 @@ bool Task::begin() {
   if (const std::string why = why_not_here(folder_, job_, chunk_, machine_); !why.empty())
     throw Error(why);
   while (!is_complete()) {
-    if (!is_left_to_me()) return false;
+    if (!is_mine_to_render()) return false;
     refuse_if_stopped();  // while it waited
     if (!take()) continue;
     if (const std::string why = why_nothing_to_merge(); !why.empty()) throw MissingSums(why);
@@ -99,8 +99,8 @@ void Task::refuse_if_stopped() const {
     throw JobFault("the job was stopped: " + on_one_line(why) + "; `previz farm retry` goes on");
 }
 
-// Returns whether the last word on the chunk is that it runs here.
-bool Task::is_told_mine() const {
+// Returns whether the chunk's state says that this process renders it.
+bool Task::has_my_claim() const {
   const std::optional<TaskState> state = folder_.read_state(options_.chunk);
   return state && state->outcome == TaskOutcome::running && state->host == machine_.host &&
          state->pid == ::getpid();
@@ -109,12 +109,12 @@ bool Task::is_told_mine() const {
 // Returns whether another process is at the chunk, while this one renders nothing.
 bool Task::is_at_another() const {
   const Taken taken = folder_.taken(options_.chunk);
-  return taken == Taken::shared || (taken == Taken::alone && !is_told_mine());
+  return taken == Taken::shared || (taken == Taken::alone && !has_my_claim());
 }
 
 // Returns whether the chunk is to be rendered here. Waits for a machine that is at it, unless it is
 // to be left alone, or its frames can be shared.
-bool Task::is_left_to_me() {
+bool Task::is_mine_to_render() {
   if (options_.not_if_taken && is_at_another()) {
     out_ << "another machine is rendering it" << std::endl;
     return false;
@@ -150,7 +150,7 @@ bool Task::take() {
   say(TaskOutcome::running, "");
   if (!folder_.has_locks() && !is_rendered()) {
     wait(for_another_to_tell);
-    if (!is_told_mine()) return false;
+    if (!has_my_claim()) return false;
   }
   signs_.emplace(folder_.state_file(options_.chunk));
   return true;

@@ -95,7 +95,7 @@ std::optional<std::string> find_top(std::size_t box, const CornerRays& rays, Top
     if (met.off_rad > 0.1) return name + " was another corner in one of its pictures";
     top[corner] = met.at;
   }
-  if (!tracking::are_around_a_rectangle(top))
+  if (!tracking::fit_a_rectangle(top))
     return "its corners were not marked in order around its upper side";
   return std::nullopt;
 }

@@ -39,7 +39,7 @@ SquaredError Probes::error(const timing::FrameSettings& settings, const timing::
   probed.denoise = making.denoise;
   probed.adaptive = false;
   const auto wanted = static_cast<std::size_t>(stated ? parts_.rounds : 1);
-  std::vector<SquaredError>& rounds = memory_.point(words(probed), making.samples).squared;
+  std::vector<SquaredError>& rounds = cache_.point(words(probed), making.samples).squared;
   while (rounds.size() < wanted) {
     try {
       rounds.push_back(measure(probed, making.samples, static_cast<int>(rounds.size())));
@@ -54,14 +54,14 @@ SquaredError Probes::error(const timing::FrameSettings& settings, const timing::
 StillCurves Probes::curves(const timing::FrameSettings& settings, double wanted) {
   timing::FrameSettings probed = settings;
   probed.adaptive = false;
-  if (probed == own_ || settings == own_) return memory_.reference.curves;
+  if (probed == own_ || settings == own_) return cache_.reference.curves;
   const std::string name = words(probed);
-  const auto known = std::ranges::find(memory_.curves, name, &KeptCurves::settings);
+  const auto known = std::ranges::find(cache_.curves, name, &KeptCurves::settings);
   StillCurves curves =
-      known != memory_.curves.end() ? known->curves : measure_curves(probed, wanted);
-  if (known == memory_.curves.end()) memory_.curves.push_back({name, curves});
-  curves.noisy.extend(memory_.reference.curves.noisy);
-  curves.denoised.extend(memory_.reference.curves.denoised);
+      known != cache_.curves.end() ? known->curves : measure_curves(probed, wanted);
+  if (known == cache_.curves.end()) cache_.curves.push_back({name, curves});
+  curves.noisy.extend(cache_.reference.curves.noisy);
+  curves.denoised.extend(cache_.reference.curves.denoised);
   return curves;
 }
 
@@ -71,7 +71,7 @@ StillCurves Probes::measure_curves(const timing::FrameSettings& settings, double
   MethodRenderer renderer(parts_.device, parts_.frame, parts_.scene, settings, parts_.scale);
   renderer.begin(parts_.seed(0));
   StillCurves curves;
-  const ErrorCurve& own = memory_.reference.curves.noisy;
+  const ErrorCurve& own = cache_.reference.curves.noisy;
   const int most = own.empty() ? most_curve_samples : static_cast<int>(own.points().back().samples);
   for (int samples = 1; samples <= most; samples *= 2) {
     if (samples > least_curve_samples && is_over()) break;
@@ -87,7 +87,7 @@ StillCurves Probes::measure_curves(const timing::FrameSettings& settings, double
 timing::PathCost Probes::cost(const timing::FrameSettings& settings, bool is_live) {
   const auto known = [&](const timing::FrameSettings& wanted) -> const KeptCost* {
     const std::string name = words(wanted);
-    for (const KeptCost& cost : memory_.costs)
+    for (const KeptCost& cost : cache_.costs)
       if (cost.is_live == is_live && cost.settings == name) return &cost;
     return nullptr;
   };
@@ -97,7 +97,7 @@ timing::PathCost Probes::cost(const timing::FrameSettings& settings, bool is_liv
   const KeptCost* own = known(own_);
   const timing::PathCost cost = own ? timing::PathCost(timer, is_live, own->cost)
                                     : timing::PathCost(timer, is_live, parts_.live_limit_s);
-  memory_.costs.push_back({words(settings), is_live, cost});
+  cache_.costs.push_back({words(settings), is_live, cost});
   return cost;
 }
 

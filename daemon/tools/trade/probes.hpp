@@ -13,8 +13,8 @@
 #include "daemon/core/timing/frame.hpp"
 #include "daemon/tools/trade/answer.hpp"
 #include "daemon/tools/trade/budget.hpp"
+#include "daemon/tools/trade/cache.hpp"
 #include "daemon/tools/trade/measure.hpp"
-#include "daemon/tools/trade/memory.hpp"
 #include "daemon/tools/trade/method.hpp"
 
 namespace previz::trade {
@@ -37,8 +37,8 @@ class Probes {
     std::stop_token stop;
   };
   // What is measured goes into `memory`, and what is there is not measured again.
-  Probes(Parts parts, timing::FrameSettings own, TradeMemory& memory)
-      : parts_(std::move(parts)), own_(std::move(own)), memory_(memory) {}
+  Probes(Parts parts, timing::FrameSettings own, TradeCache& cache)
+      : parts_(std::move(parts)), own_(std::move(own)), cache_(cache) {}
 
   // Everything below compares with it.
   void use(const TradeReference& reference) { reference_ = &reference; }
@@ -67,7 +67,7 @@ class Probes {
   Parts parts_;
   const timing::FrameSettings own_;
   const TradeReference* reference_ = nullptr;
-  TradeMemory& memory_;
+  TradeCache& cache_;
   std::optional<MethodRenderer> probing_;  // with these settings
   timing::FrameSettings probed_;
   std::optional<TradePhase> phase_;

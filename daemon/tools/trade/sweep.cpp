@@ -68,12 +68,12 @@ double squared_after(const std::vector<TradePoint>& points, double seconds, doub
 }  // namespace
 
 Sweep::Sweep(const TradeOptions& options, timing::TimedFrame& frame, const scene::Scene& scene,
-             std::shared_ptr<render::Device> device, TradeMemory& memory)
+             std::shared_ptr<render::Device> device, TradeCache& cache)
     : options_(options),
       frame_(frame),
       scene_(scene),
       device_(std::move(device)),
-      memory_(memory),
+      cache_(cache),
       budget_(options.minutes ? std::optional(60 * *options.minutes) : std::nullopt, steady_s(),
               options.answers),
       probes_({.device = device_,
@@ -86,7 +86,7 @@ Sweep::Sweep(const TradeOptions& options, timing::TimedFrame& frame, const scene
                .seed = [this](int round) { return seed(round); },
                .now_s = steady_s,
                .stop = options.stop},
-              own_settings(frame), memory),
+              own_settings(frame), cache),
       start_s_(steady_s()),
       last_s_(start_s_) {
   const PinholeIntrinsics& full = frame.calibration().intrinsics;
@@ -123,7 +123,7 @@ void Sweep::plan() {
   best_.resize(report_.methods.size());
   for (std::size_t m = 0; m < report_.methods.size(); ++m)
     if (const KeptMethod* kept =
-            memory_.method(settings_words(frame_.set(), report_.plan.methods[m].settings))) {
+            cache_.method(settings_words(frame_.set(), report_.plan.methods[m].settings))) {
       report_.methods[m].bias = kept->bias;
       report_.methods[m].changed_pixels = kept->changed_pixels;
     }
@@ -197,7 +197,7 @@ bool Sweep::is_enough(const KeptReference& reference) const {
 void Sweep::make_reference() {
   constexpr std::uint32_t beyond_all_rounds = 1u << 20;
   constexpr double step_s = 1;
-  const KeptReference before = memory_.reference;
+  const KeptReference before = cache_.reference;
   const int samples = report_.reference_samples / 2, most = std::max(samples / parts_of_half, 1);
   std::vector<OnTheWay> seen;
   int done = 0;
@@ -221,27 +221,27 @@ void Sweep::make_reference() {
           budget_.is_over(is_short ? TradePhase::least_reference : TradePhase::reference,
                           steady_s());
       if (done < next && !is_over) continue;
-      memory_.reference = before;
-      memory_.reference.add(done, {&halves[0].layers(), &halves[1].layers()});
+      cache_.reference = before;
+      cache_.reference.add(done, {&halves[0].layers(), &halves[1].layers()});
       if (done == next) seen.push_back({done, halves[0].picture(), halves[0].denoised_picture()});
       next *= 2;
-      if (is_over || is_enough(memory_.reference)) break;
+      if (is_over || is_enough(cache_.reference)) break;
     }
-    if (memory_.reference.samples < before.samples + done) {
-      memory_.reference = before;
-      memory_.reference.add(done, {&halves[0].layers(), &halves[1].layers()});
+    if (cache_.reference.samples < before.samples + done) {
+      cache_.reference = before;
+      cache_.reference.add(done, {&halves[0].layers(), &halves[1].layers()});
     }
   }
-  if (2 * memory_.reference.samples < least_reference_samples) {
+  if (2 * cache_.reference.samples < least_reference_samples) {
     stop_if_asked();
     refuse_short_reference(2 * done, began);
   }
   use_reference();
   const StillCurves now = curves_of(seen);
-  if (memory_.reference.curves.noisy.points().size() < now.noisy.points().size())
-    memory_.reference.curves = now;
+  if (cache_.reference.curves.noisy.points().size() < now.noisy.points().size())
+    cache_.reference.curves = now;
   // Both halves together are another point of it.
-  ErrorCurve& curve = memory_.reference.curves.noisy;
+  ErrorCurve& curve = cache_.reference.curves.noisy;
   if (curve.empty() || report_.reference_samples > curve.points().back().samples)
     curve.add(report_.reference_samples, reference_->squared_noise());
   progress_->step_done("reference of " + std::to_string(report_.reference_samples) + " samples" +
@@ -252,11 +252,11 @@ void Sweep::make_reference() {
 }
 
 void Sweep::use_reference() {
-  const KeptReference& kept = memory_.reference;
+  const KeptReference& kept = cache_.reference;
   report_.reference_samples = 2 * kept.samples;
   reference_.emplace(picture_of(kept.halves[0]), picture_of(kept.halves[1]));
   report_.noise = reference_->noise();
-  memory_.change_noise(report_.noise);
+  cache_.change_noise(report_.noise);
   report_.reference = displayed(reference_->picture());
   const auto& added = reference_->picture().added;
   if (std::ranges::all_of(added, [](const glm::vec3& light) { return light == glm::vec3(0); }))
@@ -275,8 +275,8 @@ StillCurves Sweep::curves_of(const std::vector<OnTheWay>& seen) const {
 }
 
 KeptPoint& Sweep::kept(std::size_t method, std::size_t point) {
-  return memory_.point(settings_words(frame_.set(), report_.plan.methods[method].settings),
-                       options_.samples[point]);
+  return cache_.point(settings_words(frame_.set(), report_.plan.methods[method].settings),
+                      options_.samples[point]);
 }
 
 int Sweep::rounds_of(std::size_t method) {
@@ -368,7 +368,7 @@ void Sweep::conclude() {
   std::vector<TradePoint*> candidates;
   std::vector<TradeCost> costs;
   report_.unmeasured.clear();
-  memory_.methods.clear();
+  cache_.methods.clear();
   for (std::size_t m = 0; m < report_.methods.size(); ++m) {
     TradeMethod& method = report_.methods[m];
     if (rounds_of(m) == 0) {
@@ -389,8 +389,8 @@ void Sweep::conclude() {
     }
     const auto [pictures, own] = alike(m);
     if (pictures.size() >= 3) method.bias = reference_->bias(pictures, own);
-    memory_.methods.push_back({settings_words(frame_.set(), report_.plan.methods[m].settings),
-                               method.bias, method.changed_pixels});
+    cache_.methods.push_back({settings_words(frame_.set(), report_.plan.methods[m].settings),
+                              method.bias, method.changed_pixels});
   }
   const std::vector<bool> front = pareto_front(costs);
   for (std::size_t i = 0; i < front.size(); ++i) candidates[i]->pareto = front[i];

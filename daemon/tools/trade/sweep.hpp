@@ -16,8 +16,8 @@
 #include "daemon/core/scene/scene.hpp"
 #include "daemon/core/timing/frame.hpp"
 #include "daemon/tools/trade/budget.hpp"
+#include "daemon/tools/trade/cache.hpp"
 #include "daemon/tools/trade/measure.hpp"
-#include "daemon/tools/trade/memory.hpp"
 #include "daemon/tools/trade/method.hpp"
 #include "daemon/tools/trade/options.hpp"
 #include "daemon/tools/trade/probes.hpp"
@@ -29,7 +29,7 @@ class Sweep {
  public:
   // Goes on from `memory`, which outlives the sweep, and adds what it measures.
   Sweep(const TradeOptions& options, timing::TimedFrame& frame, const scene::Scene& scene,
-        std::shared_ptr<render::Device> device, TradeMemory& memory);
+        std::shared_ptr<render::Device> device, TradeCache& cache);
   // Calls `save` with what is known, whenever that grows. Ends early, with that, if it is to stop.
   TradeReport run(std::ostream& out, const std::function<void(const TradeReport&)>& save);
 
@@ -79,7 +79,7 @@ class Sweep {
   const std::shared_ptr<render::Device> device_;
   TradeReport report_;
   std::optional<TradeReference> reference_;
-  TradeMemory& memory_;
+  TradeCache& cache_;
   std::vector<std::map<int, TradePicture>> best_;  // by method and round: at the most samples
   render::Layers own_;  // the set's own in the first round, at the most samples; empty: not yet
 

@@ -12,7 +12,7 @@
 #include "daemon/core/session/files.hpp"
 #include "daemon/core/set/problems.hpp"
 #include "daemon/core/timing/frame.hpp"
-#include "daemon/tools/trade/memory.hpp"
+#include "daemon/tools/trade/cache.hpp"
 #include "daemon/tools/trade/page.hpp"
 #include "daemon/tools/trade/sweep.hpp"
 #include "drivers/error.hpp"
@@ -66,18 +66,18 @@ std::string answer_file(const TradeReport& report, const TradeAnswer& answer) {
 }
 
 // Returns what the last trade in the directory measured, if it was of the same.
-TradeMemory remembered(const TradeOptions& options, const fs::path& directory,
-                       const std::string& key, std::ostream& out) {
+TradeCache remembered(const TradeOptions& options, const fs::path& directory,
+                      const std::string& key, std::ostream& out) {
   if (options.anew) return {};
   std::string why_not;
-  TradeMemory memory = load_memory(directory, key, why_not);
+  TradeCache cache = load_cache(directory, key, why_not);
   if (!why_not.empty())
     out << (directory / "trade.json").string() << ": " << why_not << "; measuring everything again"
         << std::endl;
-  else if (memory.reference.samples > 0)
+  else if (cache.reference.samples > 0)
     out << "continuing the last table in " << directory.string() << " (--anew: start over)"
         << std::endl;
-  return memory;
+  return cache;
 }
 
 fs::path made_directory(const fs::path& directory) {
@@ -116,13 +116,13 @@ TradeReport run_trade(const TradeOptions& given, std::ostream& out) {
   const std::shared_ptr<render::Device> device =
       render::open_device(render::options_for(options.device, frame.set().quality.hardware_rays));
   const std::string key = memory_key(frame, scene, options.scale, render::facts_of(*device));
-  TradeMemory memory = remembered(options, directory, key, out);
+  TradeCache cache = remembered(options, directory, key, out);
   const auto save = [&](const TradeReport& report) {
     session::replace_file(directory / "trade.csv", trade_csv(report));
     session::replace_file(directory / "trade.html", trade_page(report));
-    save_memory(directory, key, memory);
+    save_cache(directory, key, cache);
   };
-  TradeReport report = Sweep(options, frame, scene, device, memory).run(out, save);
+  TradeReport report = Sweep(options, frame, scene, device, cache).run(out, save);
   if (report.reference.samples.empty()) return report;  // it was stopped before anything was known
   report.csv = directory / "trade.csv";
   report.page = directory / "trade.html";

@@ -161,7 +161,7 @@ glm::dvec3 way_of(double px, const glm::dvec3& at, const glm::dvec3& direction) 
 
 std::string names_of(const Figure& figure) {
   std::string names;
-  for (const fit::ThingOff& thing : figure.things_off) names += thing.name + ";";
+  for (const fit::PartOff& part : figure.things_off) names += part.name + ";";
   return names;
 }
 
@@ -258,7 +258,7 @@ Frame picture_with_red_moved() {
   return picture_of(drawn);
 }
 
-// A thing that is off in some frames is hidden there by somebody, or they are blurred.
+// A part that is off in some frames is hidden there by somebody, or they are blurred.
 TEST(ModelFigure, NamesWhatIsOffInMostFrames) {
   const fit::RealModel model = model_of(boxes()).model();
   const ObserverCalibration camera = test::camera_of_tests();
@@ -300,11 +300,11 @@ TEST(ModelFigure, NamesThingsByTheLastFrames) {
   const fit::RealModel model = model_of(boxes()).model();
   const ObserverCalibration camera = test::camera_of_tests();
   const Frame still = picture_of(boxes()), moved = picture_with_red_moved();
-  fit::Things things;
+  fit::Parts parts;
   const auto names_after = [&](const Frame& frame, std::size_t times) {
-    fit::Measurement measurement(model, camera, things);
+    fit::Measurement measurement(model, camera, parts);
     for (std::size_t i = 0; i < times; ++i) measurement.look(frame, test::place_of_camera());
-    things = measurement.things();
+    parts = measurement.parts();
     return names_of(measurement.figure());
   };
   EXPECT_EQ(names_after(moved, 1), "red;");

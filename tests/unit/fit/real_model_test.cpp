@@ -54,7 +54,7 @@ TEST(RealModel, KnowsWhereAThingStandsOnAnother) {
   EXPECT_EQ(touched, 4u);
 }
 
-// Printed tags lie on things, and are none: the crew does not measure their places by hand.
+// Printed tags lie on parts, and are none: the crew does not measure their places by hand.
 TEST(RealModel, NamesItsThingsAsTheSetAndItsFilesDo) {
   RealScene real({cube, test::table(), test::box({1, 0, 0}, test::cube_size),
                   test::box({2, 0, 0}, test::cube_size), test::box({3, 0, 0}, test::cube_size)});
@@ -68,12 +68,12 @@ TEST(RealModel, NamesItsThingsAsTheSetAndItsFilesDo) {
   real.set.objects[0].name = "crate";
   real.set.objects[1].name = "set";
   const auto model = real.model();
-  EXPECT_EQ(model.things(), (std::vector<std::string>{"crate", "table", "red cube", "Cube.001"}));
-  const std::vector<std::size_t> of_instances = {0, 1, 2, 3, fit::no_thing};
+  EXPECT_EQ(model.parts(), (std::vector<std::string>{"crate", "table", "red cube", "Cube.001"}));
+  const std::vector<std::size_t> of_instances = {0, 1, 2, 3, fit::no_part};
   for (const fit::ModelEdge& edge : model.edges()) {
     const double x = 0.5 * (edge.a.x + edge.b.x);
     const bool is_of_table = std::max(std::abs(edge.a.x), std::abs(edge.b.x)) == 4;
-    EXPECT_EQ(edge.thing, is_of_table ? 1 : of_instances[x < 0.5 ? 0 : 1 + std::size_t(x + 0.2)])
+    EXPECT_EQ(edge.part, is_of_table ? 1 : of_instances[x < 0.5 ? 0 : 1 + std::size_t(x + 0.2)])
         << x;
   }
 }
@@ -88,7 +88,7 @@ TEST(RealModel, NamesOfItsThingsDiffer) {
   }
   real.set.objects[0].name = "left";
   real.set.objects[1].name = "right";
-  EXPECT_EQ(real.model().things(),
+  EXPECT_EQ(real.model().parts(),
             (std::vector<std::string>{"left: lid", "left: box", "right: lid (1 of 2)", "right: box",
                                       "right: lid (2 of 2)", "right (1 of 2)", "right (2 of 2)"}));
 }
@@ -125,11 +125,11 @@ TEST_F(RealModelOfFile, ANodeOfSeveralMaterialsIsOneThing) {
   gltf.root("", mesh, {{"translation", {1, 0, 0}}});
   gltf.root("", mesh, {{"translation", {2, 0, 0}}});
   const auto real = model();
-  EXPECT_EQ(real.things(),
+  EXPECT_EQ(real.parts(),
             (std::vector<std::string>{"crate.1", "props (1 of 2)", "props (2 of 2)"}));
   EXPECT_EQ(real.edges().size(), 36u);
   for (const fit::ModelEdge& edge : real.edges())
-    EXPECT_EQ(edge.thing, std::size_t(0.5 * (edge.a.x + edge.b.x))) << edge.a.x << ' ' << edge.b.x;
+    EXPECT_EQ(edge.part, std::size_t(0.5 * (edge.a.x + edge.b.x))) << edge.a.x << ' ' << edge.b.x;
 }
 
 TEST_F(RealModelOfFile, EveryCopyOfANodeIsAThing) {
@@ -137,19 +137,19 @@ TEST_F(RealModelOfFile, EveryCopyOfANodeIsAThing) {
   gltf.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
       {"TRANSLATION", gltf.positions({{0, 0, 0}, {1, 0, 0}})}};
   const auto real = model();
-  EXPECT_EQ(real.things(),
+  EXPECT_EQ(real.parts(),
             (std::vector<std::string>{"props: chair (1 of 2)", "props: chair (2 of 2)"}));
   for (const fit::ModelEdge& edge : real.edges())
-    EXPECT_EQ(edge.thing, std::size_t(0.5 * (edge.a.x + edge.b.x)));
+    EXPECT_EQ(edge.part, std::size_t(0.5 * (edge.a.x + edge.b.x)));
 }
 
-// Where things meet, neither's edge is its own; and what lies in one line is not one edge.
+// Where parts meet, neither's edge is its own; and what lies in one line is not one edge.
 TEST(RealModel, EdgesOfTwoThingsAreOfNone) {
   const RealScene apart({test::sheet({{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}}),
                          test::sheet({{{1, 0, 0}, {1, 0, 1}, {1, 1, 1}, {1, 1, 0}}})});
   std::size_t of_none = 0;
   const auto folded = apart.model();
-  for (const fit::ModelEdge& edge : folded.edges()) of_none += edge.thing == fit::no_thing;
+  for (const fit::ModelEdge& edge : folded.edges()) of_none += edge.part == fit::no_part;
   EXPECT_EQ(folded.edges().size(), 7u);
   EXPECT_EQ(of_none, 1u);
   const RealScene in_line({test::sheet({{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}}),

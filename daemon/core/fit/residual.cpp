@@ -1,4 +1,4 @@
-#include "daemon/core/fit/rest.hpp"
+#include "daemon/core/fit/residual.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -23,53 +23,53 @@ glm::dvec2 moved_by(const glm::dvec4& motion, const glm::dvec2& away) {
   return glm::dvec2(motion) + motion.z * glm::dvec2(-away.y, away.x) + motion.w * away;
 }
 
-glm::dvec2 middle_of(std::size_t thing, const std::vector<Looked>& found) {
+glm::dvec2 middle_of(std::size_t part, const std::vector<EdgeSample>& found) {
   glm::dvec2 sum(0);
   double count = 0;
-  for (const Looked& looked : found)
-    if (looked.thing == thing) sum += looked.at, ++count;
+  for (const EdgeSample& sample : found)
+    if (sample.part == part) sum += sample.at, ++count;
   return sum / std::max(1.0, count);
 }
 
-// Returns the motion that brings all but one thing nearer to the edges of light on which it agrees
+// Returns the motion that brings all but one part nearer to the edges of light on which it agrees
 // after a motion: least squares over the pieces.
-glm::dvec4 bettered(const glm::dvec4& motion, const glm::dvec2& middle, std::size_t but_thing,
-                    const std::vector<Looked>& found) {
+glm::dvec4 refined(const glm::dvec4& motion, const glm::dvec2& middle, std::size_t but_part,
+                   const std::vector<EdgeSample>& found) {
   const double hold = stiffness * double(found.size());
   glm::dmat4 squares(1e-9);
   squares[2][2] = squares[3][3] = hold;
   glm::dvec4 products(0);
-  for (const Looked& looked : found) {
-    if (looked.thing == but_thing) continue;
-    const glm::dvec2 away = (looked.at - middle) / unit_px;
+  for (const EdgeSample& sample : found) {
+    if (sample.part == but_part) continue;
+    const glm::dvec2 away = (sample.at - middle) / unit_px;
     const glm::dvec2 shift = moved_by(motion, away);
-    const double light_px = nearest(looked, shift).along_normal_px;
-    if (std::abs(light_px - glm::dot(looked.normal, shift)) > agree_px) continue;
-    const glm::dvec4 gains(looked.normal, glm::dot(looked.normal, glm::dvec2(-away.y, away.x)),
-                           glm::dot(looked.normal, away));
+    const double light_px = nearest(sample, shift).along_normal_px;
+    if (std::abs(light_px - glm::dot(sample.normal, shift)) > agree_px) continue;
+    const glm::dvec4 gains(sample.normal, glm::dot(sample.normal, glm::dvec2(-away.y, away.x)),
+                           glm::dot(sample.normal, away));
     squares += glm::outerProduct(gains, gains);
     products += light_px * gains;
   }
   return glm::inverse(squares) * products;
 }
 
-glm::dvec2 turned_at(std::size_t thing, const std::vector<Looked>& found,
+glm::dvec2 turned_at(std::size_t part, const std::vector<EdgeSample>& found,
                      const glm::dvec2& common) {
-  const glm::dvec2 middle = middle_of(thing, found);
+  const glm::dvec2 middle = middle_of(part, found);
   glm::dvec4 motion(common, 0, 0);
-  for (int round = 0; round < rounds; ++round) motion = bettered(motion, middle, thing, found);
+  for (int round = 0; round < rounds; ++round) motion = refined(motion, middle, part, found);
   return glm::dvec2(motion);
 }
 
 }  // namespace
 
-std::optional<RestShift> shift_of_rest(std::size_t thing, const Votes& rest,
-                                       const std::vector<Looked>& found) {
+std::optional<ResidualShift> residual_shift(std::size_t part, const Votes& rest,
+                                            const std::vector<EdgeSample>& found) {
   if (rest.pieces() < least_pieces) return {};
   const glm::dvec2 common = rest.best();
   if (glm::length(common) > most_off_px) return {};
   if (rest.agreed(common) < most_of * double(rest.pieces())) return {};
-  return RestShift{common, turned_at(thing, found, common)};
+  return ResidualShift{common, turned_at(part, found, common)};
 }
 
 }  // namespace previz::fit

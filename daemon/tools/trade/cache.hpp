@@ -54,7 +54,7 @@ struct KeptReference {
   void add(int more, const std::array<const render::Layers*, 2>& layers);
 };
 
-struct TradeMemory {
+struct TradeCache {
   KeptReference reference;
   TradeErrors noise;  // of the reference, to which the errors of the points belong
   std::vector<KeptPoint> points;
@@ -80,10 +80,10 @@ std::string memory_key(timing::TimedFrame& frame, const scene::Scene& scene, dou
 
 // Returns what is kept in the directory under this key; nothing if it holds none, or of another
 // key. What cannot be read is said in `why_not`.
-TradeMemory load_memory(const std::filesystem::path& directory, const std::string& key,
-                        std::string& why_not);
+TradeCache load_cache(const std::filesystem::path& directory, const std::string& key,
+                      std::string& why_not);
 // Throws previz::Error.
-void save_memory(const std::filesystem::path& directory, const std::string& key,
-                 const TradeMemory& memory);
+void save_cache(const std::filesystem::path& directory, const std::string& key,
+                const TradeCache& cache);
 
 }  // namespace previz::trade

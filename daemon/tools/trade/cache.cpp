@@ -1,4 +1,4 @@
-#include "daemon/tools/trade/memory.hpp"
+#include "daemon/tools/trade/cache.hpp"
 
 #include <fmt/format.h>
 
@@ -97,27 +97,27 @@ StillCurves curves_of(const json& value) {
   return {curve_of(value.at("noisy")), curve_of(value.at("denoised"))};
 }
 
-json rows_of(const TradeMemory& memory) {
+json rows_of(const TradeCache& cache) {
   json rows;
-  rows["noise"] = of(memory.noise);
-  rows["reference"] = of(memory.reference.curves);
+  rows["noise"] = of(cache.noise);
+  rows["reference"] = of(cache.reference.curves);
   for (const char* kind : {"points", "methods", "costs", "curves"}) rows[kind] = json::array();
-  for (const KeptPoint& point : memory.points)
+  for (const KeptPoint& point : cache.points)
     rows["points"].push_back({{"settings", point.settings},
                               {"samples", point.samples},
                               {"squared", list_of(point.squared)},
                               {"errors", list_of(point.errors)},
                               {"seconds", point.seconds}});
-  for (const KeptMethod& method : memory.methods) {
+  for (const KeptMethod& method : cache.methods) {
     json one{{"settings", method.settings}};
     if (method.bias) one["bias"] = {method.bias->value, method.bias->least};
     if (method.changed_pixels) one["changed_pixels"] = *method.changed_pixels;
     rows["methods"].push_back(std::move(one));
   }
-  for (const KeptCost& cost : memory.costs)
+  for (const KeptCost& cost : cache.costs)
     rows["costs"].push_back(
         {{"settings", cost.settings}, {"live", cost.is_live}, {"parts", cost.cost.parts()}});
-  for (const KeptCurves& curves : memory.curves) {
+  for (const KeptCurves& curves : cache.curves) {
     json one = of(curves.curves);
     one["settings"] = curves.settings;
     rows["curves"].push_back(std::move(one));
@@ -143,16 +143,16 @@ KeptMethod method_of(const json& value) {
   return method;
 }
 
-void read_rows(const json& rows, TradeMemory& memory) {
-  memory.noise = errors_of(rows.at("noise"));
-  memory.reference.curves = curves_of(rows.at("reference"));
-  memory.points = list(rows.at("points"), point_of);
-  memory.methods = list(rows.at("methods"), method_of);
+void read_rows(const json& rows, TradeCache& cache) {
+  cache.noise = errors_of(rows.at("noise"));
+  cache.reference.curves = curves_of(rows.at("reference"));
+  cache.points = list(rows.at("points"), point_of);
+  cache.methods = list(rows.at("methods"), method_of);
   for (const json& cost : rows.at("costs"))
-    memory.costs.push_back({cost.at("settings").get<std::string>(), cost.at("live").get<bool>(),
-                            timing::PathCost(cost.at("parts").get<timing::PathCost::Parts>())});
+    cache.costs.push_back({cost.at("settings").get<std::string>(), cost.at("live").get<bool>(),
+                           timing::PathCost(cost.at("parts").get<timing::PathCost::Parts>())});
   for (const json& curves : rows.at("curves"))
-    memory.curves.push_back({curves.at("settings").get<std::string>(), curves_of(curves)});
+    cache.curves.push_back({curves.at("settings").get<std::string>(), curves_of(curves)});
 }
 
 // A line with the key, one with width, height and samples, then composite and mask of each half as
@@ -227,18 +227,18 @@ void KeptReference::add(int more, const std::array<const render::Layers*, 2>& la
   samples += more;
 }
 
-KeptPoint& TradeMemory::point(const std::string& settings, int samples) {
+KeptPoint& TradeCache::point(const std::string& settings, int samples) {
   for (KeptPoint& point : points)
     if (point.samples == samples && point.settings == settings) return point;
   return points.emplace_back(KeptPoint{settings, samples, {}, {}, {}});
 }
 
-const KeptMethod* TradeMemory::method(const std::string& settings) const {
+const KeptMethod* TradeCache::method(const std::string& settings) const {
   const auto found = std::ranges::find(methods, settings, &KeptMethod::settings);
   return found == methods.end() ? nullptr : &*found;
 }
 
-void TradeMemory::change_noise(const TradeErrors& to) {
+void TradeCache::change_noise(const TradeErrors& to) {
   const auto change = [&](TradeErrors& errors, std::optional<double> TradeErrors::*measure) {
     std::optional<double>& error = errors.*measure;
     const double before = (noise.*measure).value_or(0), after = (to.*measure).value_or(0);
@@ -284,32 +284,32 @@ std::string memory_key(timing::TimedFrame& frame, const scene::Scene& scene, dou
   return hash.text();
 }
 
-TradeMemory load_memory(const fs::path& directory, const std::string& key, std::string& why_not) {
+TradeCache load_cache(const fs::path& directory, const std::string& key, std::string& why_not) {
   why_not.clear();
   if (!fs::exists(rows_file(directory))) return {};
   try {
-    TradeMemory memory;
+    TradeCache cache;
     const json rows =
         json::parse(session::read_file(rows_file(directory), {"a table of a trade", 1 << 27}));
     if (rows.at("key").get<std::string>() != key) {
       why_not = "it is of another frame, set, size, device, driver or version";
       return {};
     }
-    read_rows(rows, memory);
+    read_rows(rows, cache);
     read_reference(
         session::read_file(reference_file(directory), {"a reference of a trade", 1ull << 34}), key,
-        memory.reference);
-    return memory;
+        cache.reference);
+    return cache;
   } catch (const std::exception& error) {
     why_not = error.what();
     return {};
   }
 }
 
-void save_memory(const fs::path& directory, const std::string& key, const TradeMemory& memory) {
-  json rows = rows_of(memory);
+void save_cache(const fs::path& directory, const std::string& key, const TradeCache& cache) {
+  json rows = rows_of(cache);
   rows["key"] = key;
-  session::replace_file(reference_file(directory), reference_bytes(key, memory.reference));
+  session::replace_file(reference_file(directory), reference_bytes(key, cache.reference));
   session::replace_file(rows_file(directory), rows.dump(1) + "\n");
 }
 
