@@ -6,27 +6,20 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/core/output/chart.hpp"
-#include "daemon/core/output/page_style.hpp"
+#include "daemon/core/output/page.hpp"
 #include "daemon/core/set/check.hpp"
 
 namespace previz::bench {
 namespace {
 
-using trade::escaped;
+using output::escaped, output::Table;
 
-constexpr const char* bar_style = R"(
-td.bar { width: 55%; } td.bar div { height: .8rem; min-width: 1px; background: var(--s1); border-radius: 2px; }
-.host td.bar div { background: var(--s2); }
-)";
+constexpr const char* bar_style =
+    R"(\ntd.bar { width: 55%; } td.bar div { height: .8rem; min-width: 1px; background: var(--s1); border-radius: 2px; }\n.host td.bar div { background: var(--s2); }\n)";
 
 std::string number(double value) {
   if (value >= 100) return fmt::format("{:.0f}", value);
   return value >= 10 ? fmt::format("{:.1f}", value) : fmt::format("{:.2f}", value);
-}
-
-std::string row(const std::string& name, const std::string& value) {
-  return "<tr><td>" + escaped(name) + "</td><td class=\"n\">" + escaped(value) + "</td></tr>\n";
 }
 
 std::string bar(const std::string& name, double ms, double longest, const char* kind) {
@@ -36,23 +29,24 @@ std::string bar(const std::string& name, double ms, double longest, const char* 
       kind, escaped(name), number(ms), longest > 0 ? 100 * ms / longest : 0);
 }
 
-std::string frames_table(const std::vector<FrameFigures>& frames) {
-  std::string html =
-      "<table><tr><th>picture</th><th class=\"n\">samples</th><th class=\"n\">triangles</th>"
-      "<th class=\"n\">a frame</th><th class=\"n\">frames per second</th><th class=\"n\">graphics "
-      "card</th><th class=\"n\">all cores</th></tr>\n";
-  for (const FrameFigures& frame : frames)
-    html += fmt::format(
-        "<tr><td>{}x{}</td><td class=\"n\">{}</td><td class=\"n\">{}</td><td class=\"n\">{} ms</td>"
-        "<td class=\"n\">{}</td><td class=\"n\">{} ms</td><td class=\"n\">{} ms</td></tr>\n",
-        frame.width, frame.height, frame.samples, frame.triangles, number(frame.ms),
-        number(frame.rate()), number(frame.passes_ms()), number(frame.cpu_ms));
-  return html + "</table>\n";
+std::string milliseconds(double ms) {
+  return number(ms) + " ms";
 }
 
 std::string section(const char* title, const std::vector<FrameFigures>& frames) {
   if (frames.empty()) return {};
-  return std::string("<h2>") + title + "</h2>\n" + frames_table(frames);
+  Table table({{"picture"},
+               {"samples", true},
+               {"triangles", true},
+               {"a frame", true},
+               {"frames per second", true},
+               {"graphics card", true},
+               {"all cores", true}});
+  for (const FrameFigures& frame : frames)
+    table.row({fmt::format("{}x{}", frame.width, frame.height), std::to_string(frame.samples),
+               std::to_string(frame.triangles), milliseconds(frame.ms), number(frame.rate()),
+               milliseconds(frame.passes_ms()), milliseconds(frame.cpu_ms)});
+  return std::string("<h2>") + title + "</h2>\n" + table.html();
 }
 
 // Where the time of the frame goes: the device's passes, longest first, then the computer's part.
@@ -95,26 +89,26 @@ std::string parts(const FrameFigures& frame) {
 
 std::string machine(const BenchReport& report) {
   const auto speed = [](double bytes_s) { return fmt::format("{:.1f} GB/s", bytes_s / 1e9); };
-  std::string html = "<h2>The machine</h2>\n<table>\n";
-  html += row("graphics card", report.device.name + (report.device.is_gpu ? "" : " (a CPU)"));
-  html += row("driver", report.device.driver);
-  html += row("rays", "traced by " + report.tracing_units());
-  html += row("its memory",
-              fmt::format("{:.1f} GB", static_cast<double>(report.device.memory_bytes) / 1e9));
-  html += row("processor", fmt::format("{}, {} cores", report.processor, report.cores));
-  html += row("first picture", fmt::format("after {:.1f} s", report.start_s));
-  if (report.up_bytes_s) html += row("copies up", speed(*report.up_bytes_s));
-  if (report.down_bytes_s) html += row("copies down", speed(*report.down_bytes_s));
+  Table table({{""}, {"", true}});
+  table.row({"graphics card", report.device.name + (report.device.is_gpu ? "" : " (a CPU)")});
+  table.row({"driver", report.device.driver});
+  table.row({"rays", "traced by " + report.tracing_units()});
+  table.row({"its memory",
+             fmt::format("{:.1f} GB", static_cast<double>(report.device.memory_bytes) / 1e9)});
+  table.row({"processor", fmt::format("{}, {} cores", report.processor, report.cores)});
+  table.row({"first picture", fmt::format("after {:.1f} s", report.start_s)});
+  if (report.up_bytes_s) table.row({"copies up", speed(*report.up_bytes_s)});
+  if (report.down_bytes_s) table.row({"copies down", speed(*report.down_bytes_s)});
   if (const FrameFigures* frame = report.typical()) {
     const auto rays = [](std::uint64_t count, double ms) {
       return fmt::format("{:.1f} million per second", 1e-3 * static_cast<double>(count) / ms);
     };
     if (const double ms = frame->ms_of("extend"); ms > 0)
-      html += row("rays", rays(frame->rays, ms));
+      table.row({"rays", rays(frame->rays, ms)});
     if (const double ms = frame->ms_of("shadow"); ms > 0)
-      html += row("shadow rays", rays(frame->shadow_rays, ms));
+      table.row({"shadow rays", rays(frame->shadow_rays, ms)});
   }
-  return html + "</table>\n";
+  return "<h2>The machine</h2>\n" + table.html();
 }
 
 std::string verdict(const BenchReport& report) {
@@ -144,15 +138,12 @@ std::string bench_page(const BenchReport& report) {
     title = fmt::format("{} frames per second at {}x{}", number(typical->rate()), typical->width,
                         typical->height);
   std::string html = fmt::format(
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" "
-      "content=\"width=device-width\">\n<title>{0}: {1}</title><style>{2}{3}</style></head><body>\n"
-      "<h1>{1}</h1>\n<p class=\"soft\">{0}, measured by previzd {4} on {5}. A live frame has one "
+      "<h1>{1}</h1>\n<p class=\"soft\">{0}, measured by previzd {2} on {3}. A live frame has one "
       "sample a pixel, is averaged with those before it and denoised; it shows a glass ball among "
       "solid ones under a sky. A frame lasts from the camera's picture to its own; where frames "
       "follow at once, the next one is begun before that, so that more of them come per second."
       "</p>\n",
-      escaped(report.device.name), title, report::page_style, bar_style, report.version,
-      report.date);
+      escaped(report.device.name), title, report.version, report.date);
   html += verdict(report);
   html += section("Over the size of the picture", report.by_size);
   if (typical) html += parts(*typical);
@@ -160,12 +151,11 @@ std::string bench_page(const BenchReport& report) {
   html += section("Over the triangles of the scene", report.by_triangles);
   html += machine(report);
   if (!report.left_out.empty()) {
-    html += "<h2>Not measured</h2>\n<table>\n";
-    for (const LeftOut& left : report.left_out)
-      html += "<tr><td>" + escaped(left.what) + "</td><td>" + escaped(left.why) + "</td></tr>\n";
-    html += "</table>\n";
+    Table table({{""}, {""}});
+    for (const LeftOut& left : report.left_out) table.row({left.what, left.why});
+    html += "<h2>Not measured</h2>\n" + table.html();
   }
-  return html + "</body></html>\n";
+  return output::page(report.device.name + ": " + title, html, bar_style);
 }
 
 }  // namespace previz::bench

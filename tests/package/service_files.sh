@@ -12,7 +12,8 @@ for line in StartLimitIntervalSec=0 StateDirectoryMode=0750 CacheDirectoryMode=0
   RuntimeDirectoryMode=0750 OOMScoreAdjust=-500 OOMPolicy=continue MemoryHigh=90% TasksMax=512 \
   LimitCORE=0 KeyringMode=private IPAddressDeny=any SocketBindDeny=any SocketBindAllow=ipv4:udp \
   "SystemCallFilter=landlock_create_ruleset landlock_add_rule landlock_restrict_self" \
-  RestartForceExitStatus=75 LockPersonality=yes ProtectHostname=yes RemoveIPC=yes UMask=0027; do
+  RestartForceExitStatus=75 LockPersonality=yes ProtectHostname=yes RemoveIPC=yes UMask=0027 \
+  NoExecPaths=/; do
   grep -qx "$line" previzd.service || fail "previzd.service has no $line"
 done
 # systemd resolves a group of devices only as the service starts, and leaves out one whose module the

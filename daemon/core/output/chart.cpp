@@ -5,10 +5,11 @@
 #include <cstdio>
 #include <limits>
 
+#include "daemon/core/output/page.hpp"
 #include "daemon/core/output/progress.hpp"
 #include "daemon/core/set/check.hpp"
 
-namespace previz::trade {
+namespace previz::output {
 namespace {
 
 constexpr double margin_left = 58, margin_right = 112, margin_top = 30, margin_bottom = 46;
@@ -180,7 +181,7 @@ std::string to_svg(const LogChart& chart) {
 
 std::string time_words(double seconds) {
   if (seconds < 0.0995) return two_digits(1000 * seconds) + " ms";
-  return seconds < 59.5 ? two_digits(seconds) + " s" : output::duration_words(seconds);
+  return seconds < 59.5 ? two_digits(seconds) + " s" : duration_words(seconds);
 }
 
 std::string share_words(double share) {
@@ -191,15 +192,4 @@ std::string samples_words(int samples) {
   return set::plural(static_cast<std::uint64_t>(samples), "sample");
 }
 
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text)
-    result += c == '&'   ? "&amp;"
-              : c == '<' ? "&lt;"
-              : c == '>' ? "&gt;"
-              : c == '"' ? "&quot;"
-                         : std::string(1, c);
-  return result;
-}
-
-}  // namespace previz::trade
+}  // namespace previz::output

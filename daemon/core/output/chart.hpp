@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace previz::trade {
+namespace previz::output {
 
 struct ChartPoint {
   double x = 0, y = 0;  // only points with both above 0 can be drawn
@@ -35,7 +35,5 @@ std::string time_words(double seconds);
 // "unknown".
 std::string share_words(double share);
 std::string samples_words(int samples);
-// Escapes text for HTML and SVG.
-std::string escaped(const std::string& text);
 
-}  // namespace previz::trade
+}  // namespace previz::output

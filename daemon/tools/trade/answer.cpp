@@ -15,6 +15,8 @@
 namespace previz::trade {
 namespace {
 
+using output::samples_words, output::share_words, output::time_words;
+
 constexpr double never = std::numeric_limits<double>::infinity();
 // A change is kept only if it brings more than the error's own uncertainty in a few rounds.
 constexpr double worth_keeping = 0.97;

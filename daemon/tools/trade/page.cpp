@@ -12,13 +12,15 @@
 #include <vector>
 
 #include "daemon/core/output/chart.hpp"
-#include "daemon/core/output/page_style.hpp"
+#include "daemon/core/output/page.hpp"
 #include "daemon/core/session/files.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::trade {
 namespace {
 
+using output::ChartCurve, output::ChartPoint, output::escaped, output::Table;
+using output::samples_words, output::share_words, output::time_words;
 using Measure = std::optional<double> TradeErrors::*;
 
 std::string plain_words(std::string name) {
@@ -54,17 +56,6 @@ std::string png_uri(const Plate& plate) {
 std::string figure(const Plate& picture, const std::string& caption) {
   return "<figure><img alt=\"\" src=\"" + png_uri(picture) + "\"><figcaption>" + caption +
          "</figcaption></figure>\n";
-}
-
-std::string cell(const std::string& text, bool number = false) {
-  return (number ? "<td class=\"n\">" : "<td>") + escaped(text) + "</td>";
-}
-
-std::string head_row(std::initializer_list<std::pair<const char*, bool>> columns) {
-  std::string row = "<tr>";
-  for (const auto& [name, number] : columns)
-    row += (number ? "<th class=\"n\">" : "<th>") + std::string(name) + "</th>";
-  return row + "</tr>\n";
 }
 
 std::string rate_words(double fps) {
@@ -106,7 +97,7 @@ ChartPoint chart_point(const TradeReport& report, std::size_t method, const Trad
 }
 
 std::string front_chart(const TradeReport& report) {
-  LogChart chart{"", "time to render", "error of the picture", {}, {}, 940, 430};
+  output::LogChart chart{"", "time to render", "error of the picture", {}, {}, 940, 430};
   ChartCurve cloud{"", "cloud", {}}, front{"", "front", {}};
   for (std::size_t m = 0; m < report.methods.size(); ++m) {
     if (report.methods[m].changed_pixels) continue;
@@ -145,25 +136,24 @@ std::string front_section(const TradeReport& report) {
       "on "
       "the line are the best choices: every other setting is slower or has a larger error. In the "
       "shaded part the reference itself is too noisy to decide.</p>\n<div class=\"scroll\">" +
-      front_chart(report) + "</div>\n<table>\n" +
-      head_row({{"time", true},
-                {"what", false},
-                {"error", true},
-                {"of light on the real set", true},
-                {"of virtual objects", true},
-                {"", false}});
+      front_chart(report) + "</div>\n";
+  Table table({{"time", true},
+               {"what"},
+               {"error", true},
+               {"of light on the real set", true},
+               {"of virtual objects", true},
+               {""}});
   for (const TradeFrontPoint& at : listed_front_of(report)) {
     const TradePoint& point = report.point(at);
-    const bool bend = corner_name(report, at) == "knee";
-    html += (bend ? "<tr class=\"bend\">" : "<tr>") + cell(time_words(point.seconds), true) +
-            cell(setting_words(report, at)) +
-            cell(error_words(report, point, &TradeErrors::picture), true) +
-            cell(error_words(report, point, &TradeErrors::difference), true) +
-            cell(error_words(report, point, &TradeErrors::virtual_part), true) +
-            cell(corner_name(report, at)) + "</tr>\n";
+    const std::string corner = corner_name(report, at);
+    table.row({time_words(point.seconds), setting_words(report, at),
+               error_words(report, point, &TradeErrors::picture),
+               error_words(report, point, &TradeErrors::difference),
+               error_words(report, point, &TradeErrors::virtual_part), corner},
+              corner == "knee" ? "bend" : "");
   }
-  return html +
-         "</table>\n<p class=\"soft\">Among settings whose errors differ by less than a tenth, "
+  return html + table.html() +
+         "<p class=\"soft\">Among settings whose errors differ by less than a tenth, "
          "only "
          "the fastest is listed. ≈ marks errors that are too close to the noise of the "
          "reference.</p>\n";
@@ -178,18 +168,13 @@ std::string answers_section(const TradeReport& report) {
       " for a frozen or rendered frame. Live, the take was played for some seconds with all that "
       "runs beside the renderer; the time is that of its part. Refine and post: a full-size frame "
       "and all its layers, with nothing beside. Errors are from the converged picture, without its "
-      "own noise.</p>\n<table class=\"answers\">\n" +
-      head_row({{"for", false},
-                {"what you get", false},
-                {"a frame", true},
-                {"error", true},
-                {"file", false}});
+      "own noise.</p>\n";
+  Table table({{"for"}, {"what you get"}, {"a frame", true}, {"error", true}, {"file"}}, "answers");
   for (const TradeAnswer& answer : report.answers)
-    html += (answer.is_met ? "<tr>" : "<tr class=\"bend\">") + cell(answer.use) +
-            cell(answer.words) + cell(time_words(answer.seconds), true) +
-            cell(share_words(answer.error), true) +
-            cell(answer.is_met ? answer.use + ".toml" : "none") + "</tr>\n";
-  html += "</table>\n";
+    table.row({answer.use, answer.words, time_words(answer.seconds), share_words(answer.error),
+               answer.is_met ? answer.use + ".toml" : "none"},
+              answer.is_met ? "" : "bend");
+  html += table.html();
   for (const TradeAnswer& answer : report.answers)
     if (answer.is_met)
       html += "<details><summary>" + escaped(answer.use) + ".toml</summary>\n<pre>" +
@@ -221,7 +206,7 @@ std::string corners_section(const TradeReport& report) {
 std::string axis_chart(const TradeReport& report, const TradePlan::Axis& axis, const char* title,
                        Measure measure) {
   constexpr std::array colours = {"s1", "s2", "s3", "s4", "s5", "s6"};
-  LogChart chart{title, "time to render", "error", {}, {}};
+  output::LogChart chart{title, "time to render", "error", {}, {}};
   std::size_t colour = 0;
   for (const TradePlan::Entry& entry : axis.entries) {
     ChartCurve curve{entry.variant + (entry.method == 0 ? " (own)" : ""),
@@ -266,16 +251,15 @@ std::string measured_words(const TradeMethod& method) {
 }
 
 // Photons are a part that this set may need: they are switched off to see what they cost.
-std::string photons_row(const TradeReport& report) {
+void add_photons(const TradeReport& report, Table& table) {
   const auto axis = std::ranges::find(report.plan.axes, "caustics", &TradePlan::Axis::name);
-  if (axis == report.plan.axes.end()) return "";
+  if (axis == report.plan.axes.end()) return;
   const auto time_of = [&](const char* variant) -> std::string {
     const auto entry = std::ranges::find(axis->entries, variant, &TradePlan::Entry::variant);
     return entry == axis->entries.end() ? "not measured"
                                         : measured_words(report.methods[entry->method]);
   };
-  return "<tr>" + cell("photons, which caustics need") + cell(time_of("none"), true) +
-         cell(time_of("photons"), true) + cell("caustics", true) + "</tr>\n";
+  table.row({"photons, which caustics need", time_of("none"), time_of("photons"), "caustics"});
 }
 
 std::string parts_section(const TradeReport& report, const TradePlan::Axis& axis) {
@@ -286,18 +270,16 @@ std::string parts_section(const TradeReport& report, const TradePlan::Axis& axis
       "are "
       "switched off. For this table they were switched on, to see what that would cost; the "
       "picture "
-      "must stay the same, bit for bit.</p>\n<table>\n" +
-      head_row(
-          {{"part", false}, {"without it", true}, {"with it", true}, {"pixels changed", true}});
+      "must stay the same, bit for bit.</p>\n";
+  Table table({{"part"}, {"without it", true}, {"with it", true}, {"pixels changed", true}});
   for (const TradePlan::Entry& entry : axis.entries) {
     const TradeMethod& method = report.methods[entry.method];
     if (!method.changed_pixels) continue;
-    html += "<tr>" + cell(entry.variant) + cell(time_words(own.seconds), true) +
-            cell(measured_words(method), true) +
-            cell(std::to_string(*method.changed_pixels), true) + "</tr>\n";
+    table.row({entry.variant, time_words(own.seconds), measured_words(method),
+               std::to_string(*method.changed_pixels)});
   }
-  return html + photons_row(report) + "</table>\n<p class=\"soft\">" + samples_words(own.samples) +
-         ".</p>\n";
+  add_photons(report, table);
+  return html + table.html() + "<p class=\"soft\">" + samples_words(own.samples) + ".</p>\n";
 }
 
 // Names what there was no time for, so that nobody takes its absence for a result.
@@ -384,17 +366,13 @@ std::string front_words(const TradeReport& report, const TradeFrontPoint& at) {
 
 std::string trade_page(const TradeReport& report) {
   const bool is_any_measured = !report.methods.front().points.empty();
-  std::string html =
-      "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta "
-      "name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
-      escaped(report.set) + ": what time buys</title>\n<style>" + report::page_style +
-      "</style>\n</head>\n<body>\n" + opening(report) + unmeasured_section(report) +
-      answers_section(report) + (is_any_measured ? front_section(report) : std::string()) +
-      corners_section(report);
+  std::string body = opening(report) + unmeasured_section(report) + answers_section(report) +
+                     (is_any_measured ? front_section(report) : std::string()) +
+                     corners_section(report);
   for (const TradePlan::Axis& axis : report.plan.axes)
     if (is_any_measured)
-      html += axis.name == parts_axis ? parts_section(report, axis) : axis_section(report, axis);
-  return html + reading_section(report) + "</body>\n</html>\n";
+      body += axis.name == parts_axis ? parts_section(report, axis) : axis_section(report, axis);
+  return output::page(report.set + ": what time buys", body + reading_section(report));
 }
 
 }  // namespace previz::trade

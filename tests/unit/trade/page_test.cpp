@@ -105,30 +105,30 @@ TEST(TradePage, WhatPeopleNamedCannotBreakIt) {
 }
 
 TEST(TradeChart, NumbersReadWell) {
-  EXPECT_EQ(share_words(std::numeric_limits<double>::infinity()), "unknown");
-  EXPECT_EQ(time_words(0.0321), "32 ms");
-  EXPECT_EQ(time_words(0.1), "0.1 s");
-  EXPECT_EQ(time_words(3.24), "3.2 s");
-  EXPECT_EQ(time_words(80), "1:20");
-  EXPECT_EQ(share_words(0.00351), "0.35 %");
-  EXPECT_EQ(share_words(0.04), "4 %");
-  EXPECT_EQ(share_words(1.2), "120 %");
-  EXPECT_EQ(share_words(0), "0 %");
+  EXPECT_EQ(output::share_words(std::numeric_limits<double>::infinity()), "unknown");
+  EXPECT_EQ(output::time_words(0.0321), "32 ms");
+  EXPECT_EQ(output::time_words(0.1), "0.1 s");
+  EXPECT_EQ(output::time_words(3.24), "3.2 s");
+  EXPECT_EQ(output::time_words(80), "1:20");
+  EXPECT_EQ(output::share_words(0.00351), "0.35 %");
+  EXPECT_EQ(output::share_words(0.04), "4 %");
+  EXPECT_EQ(output::share_words(1.2), "120 %");
+  EXPECT_EQ(output::share_words(0), "0 %");
 }
 
 TEST(TradeChart, WithNothingAboveZeroThereIsNoChart) {
-  LogChart chart;
+  output::LogChart chart;
   chart.curves = {{"none", "own", {{1, 0, false, ""}, {0, 1, false, ""}}}};
-  EXPECT_EQ(to_svg(chart), "");
+  EXPECT_EQ(output::to_svg(chart), "");
 }
 
 // Whatever the data, nothing is drawn outside the picture.
 TEST(TradeChart, EveryDotIsInside) {
-  LogChart chart;
+  output::LogChart chart;
   for (int i = 0; i < 9; ++i)
     chart.curves.push_back(
         {"curve", "s1", {{1e-6, 1e-9 * (i + 1), false, ""}, {1e6, 1e3, true, ""}}});
-  const std::string svg = to_svg(chart);
+  const std::string svg = output::to_svg(chart);
   const std::regex place("(cx|cy|x|y)=\"([-0-9.]+)\"");
   for (auto it = std::sregex_iterator(svg.begin(), svg.end(), place); it != std::sregex_iterator();
        ++it) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "daemon/core/output/page.hpp"
+
 namespace previz::calibrate {
 namespace {
 
@@ -19,19 +21,6 @@ text { font: 13px sans-serif; fill: #222; }
 .bar { fill: #1a6faf; }
 </style>
 )";
-
-std::string escaped(const std::string& text) {
-  std::string safe;
-  for (const char c : text) {
-    if (c == '&')
-      safe += "&amp;";
-    else if (c == '<')
-      safe += "&lt;";
-    else
-      safe += c;
-  }
-  return safe;
-}
 
 // Returns the scale that enlarges a typical residual to a twentieth of the plot's width: 1, 2 or 5
 // times a power of ten.
@@ -84,7 +73,7 @@ std::string bars_svg(const Views& views, const BundleFit& fit, double top) {
         "<rect class=\"bar\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" "
         "height=\"{:.1f}\"><title>{}: {:.3f} px</title></rect>\n",
         step * double(v), top + bar_height - height, 0.8 * step, height,
-        escaped(views.views[v].name), view_rms_px(fit, v));
+        output::escaped(views.views[v].name), view_rms_px(fit, v));
   }
   return svg;
 }
@@ -115,7 +104,8 @@ std::string residual_plot_svg(const Views& views, const BundleFit& fit,
              "<text x=\"0\" y=\"-14\">{}: rms {:.3f} px, residuals {:g} times enlarged, "
              "{} of {} corners rejected (red); shades: uncertainty, dark is 1 px</text>\n",
              plot_width + 2 * margin, bars_top + bar_height + 2 * margin, style, margin, margin,
-             escaped(title), fit.rms_px, enlarged, fit.corners - fit.corners_used, fit.corners) +
+             output::escaped(title), fit.rms_px, enlarged, fit.corners - fit.corners_used,
+             fit.corners) +
          certainty_svg(picture, scale) + residuals_svg(views, fit, scale, enlarged) +
          fmt::format("<rect class=\"frame\" width=\"{:.1f}\" height=\"{:.1f}\"/>\n", plot_width,
                      height) +

@@ -200,7 +200,7 @@ TEST(ObserverCalibration, PlotsEveryCorner) {
   };
   EXPECT_EQ(count("<line "), observer.fit.corners_used);
   EXPECT_EQ(count("<rect class=\"bar\""), views.views.size());
-  EXPECT_EQ(count("a&lt;b>&amp;c.png"), 1u);
+  EXPECT_EQ(count("a&lt;b&gt;&amp;c.png"), 1u);
   EXPECT_EQ(count("a<b>"), 0u);
 }
 

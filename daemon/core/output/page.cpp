@@ -1,11 +1,14 @@
-// The look of the pages that previzd writes, each of which is one HTML file that needs no other.
-#pragma once
+#include "daemon/core/output/page.hpp"
 
-namespace previz::report {
+#include <algorithm>
+#include <utility>
+
+namespace previz::output {
+namespace {
 
 // The page's look: a system font, one column, and colours that follow the reader's light or dark.
 // The six hues stay apart for readers who see no red or no green; names stand at the curves too.
-inline constexpr const char* page_style = R"(
+constexpr const char* page_style = R"(
 :root { color-scheme: light dark; --paper: #fdfdfc; --ink: #1c1d1f; --soft: #62666d; --line: #e3e4e6;
   --doubt: #f1efe8; --accent: #c2410c; --s1: #0f6cbd; --s2: #b4540a; --s3: #12805c; --s4: #8a3ea8;
   --s5: #a8862a; --s6: #c0356b; }
@@ -42,4 +45,45 @@ svg .cloud { --c: var(--soft); opacity: .45; } .s1 { --c: var(--s1); } .s2 { --c
   .answers td:nth-child(4)::before { content: "error: "; } .answers td:nth-child(5)::before { content: "file: "; } }
 )";
 
-}  // namespace previz::report
+std::string row_of(const std::string& style) {
+  return style.empty() ? "<tr>" : "<tr class=\"" + style + "\">";
+}
+
+}  // namespace
+
+std::string escaped(const std::string& text) {
+  std::string result;
+  for (const char c : text)
+    result += c == '&'   ? "&amp;"
+              : c == '<' ? "&lt;"
+              : c == '>' ? "&gt;"
+              : c == '"' ? "&quot;"
+                         : std::string(1, c);
+  return result;
+}
+
+Table::Table(std::vector<Column> columns, const std::string& style)
+    : columns_(std::move(columns)),
+      html_(style.empty() ? "<table>\n" : "<table class=\"" + style + "\">\n") {
+  if (std::ranges::all_of(columns_, [](const Column& each) { return *each.name == '\0'; })) return;
+  html_ += "<tr>";
+  for (const Column& column : columns_)
+    html_ += (column.is_number ? "<th class=\"n\">" : "<th>") + escaped(column.name) + "</th>";
+  html_ += "</tr>\n";
+}
+
+void Table::row(const std::vector<std::string>& cells, const std::string& style) {
+  html_ += row_of(style);
+  for (std::size_t i = 0; i < cells.size(); ++i)
+    html_ += (columns_.at(i).is_number ? "<td class=\"n\">" : "<td>") + escaped(cells[i]) + "</td>";
+  html_ += "</tr>\n";
+}
+
+std::string page(const std::string& title, const std::string& body, const std::string& style) {
+  return "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta "
+         "name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>" +
+         escaped(title) + "</title>\n<style>" + page_style + style + "</style>\n</head>\n<body>\n" +
+         body + "</body>\n</html>\n";
+}
+
+}  // namespace previz::output
