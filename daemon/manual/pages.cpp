@@ -64,11 +64,43 @@ std::string actions_text() {
   return text;
 }
 
+const Chapter rig_chapter{"A RIG", R"(
+A rig has a film camera, a fisheye that sees the lamps, tags, a model of what is really there, a set file, buttons and a screen. `previzd devices` lists what is plugged in, and `previzd check SET` says what is missing.
+
+Cameras: USB and other V4L2 cameras, camera modules through libcamera, GigE Vision and USB3 Vision cameras through Aravis, or a take in place of a camera. The film camera has a calibrated lens; the light camera is a fisheye and takes brackets. An environment can stand in for it (previz(1), THE LIGHT). A camera that is missing, stalls or is unplugged is reopened when it is back, and the others continue meanwhile; `faults` in the set file rehearses that.
+
+Tags: `previz print tags` draws AprilTags. Stick them on, film a walk past all of them, and `previz calibrate tags` finds where they are (previz(1), WHERE THE TAGS ARE). With `hide = true` in [tags] the printed tags are removed from the picture.
+
+Model: `previz model` makes the phantom, a glTF file of what really stands there, from the tags and from corners marked in a few pictures or on the rig (previz(1), THE MODEL).
+
+Objects: Objects and lamps can be attached to a tag on a stick or a tray and carried around (`carrier`). glTF animations play (`animation`), and an object is shown in any variant of its materials that its file has (`variant`). Lamps in a glTF file light the set, too: `previzd check` compares each with the film camera's white, and `lamp_gain` scales those of an object. Real lamps can be dimmed, tinted and switched off in the picture: those that the set declares (`gain_real`), those it knows by direction only ([[captured_light]]), and, by buttons, any that is found in the light camera's picture.
+
+Buttons: A [[button]] maps a short, long or double press to an action, and [[gpio]] says how contacts are wired. `previzd devices --learn` shows the button that is pressed, and previzctl(1) lists the actions. A button that is pressed more than 8 times per second is treated as broken, reported, and ignored until it is quiet for a second.
+
+Screen: `driver = "kms"` in [display], the default of the package, uses a screen on the computer's own graphics card, without a window system. An overlay shows mode, take, frame rate, tracking, light and every fault; it is never recorded. The actions `pass_times`, `guides` and `debug_view` show what each pass costs, where the model is, and any layer in place of the picture; guides also say how many pixels the model is off. In standby the screen is dark and free for other programs.
+
+Takes: A take contains every frame that the cameras delivered, by default from two seconds before the button was pressed; lost frames are counted and reported. While a hand covers the tags, the live picture continues with the last motion for up to half a second, and says so ("predicted pose 0.3 s", `hold_s` in [tracking]); what is guessed is never recorded. A take in review can be moved and relit too, on top of how it was recorded.
+)"};
+
+const Chapter cards_chapter{"GRAPHICS CARDS", R"(
+previzd needs Vulkan 1.3. Without a graphics card the processor draws, slowly. `previzd check` and `previzd bench` say which card and driver they find and what is missing; `previzd bench --page bench.html` measures them in about two minutes, and with a set also says what rate that set will hold. In Debian the drivers are:
+
+NVIDIA: linux-headers-amd64 and nvidia-driver (contrib, non-free and non-free-firmware). A screen without a window system also needs `nvidia-drm.modeset=1` on the kernel's command line.
+
+AMD: mesa-vulkan-drivers and firmware-amd-graphics.
+
+Intel: For Arc mesa-vulkan-drivers and firmware-intel-graphics (Debian 13), or firmware-misc-nonfree and a kernel from bookworm-backports (Debian 12).
+
+The service waits for a graphics card that is gone: the plate is shown and recording continues meanwhile.
+)"};
+
 const Chapter service_chapter{"THE SERVICE", R"(
 previzd.service runs `previzd run --bus --loop /etc/previzd/set.toml` as the user previz. When the set file is saved, it is reloaded, or at the latest on `systemctl reload previzd`. If it has a mistake, the old one keeps running, and the journal and `previzctl status` report what is wrong. Changes made by buttons stay in effect, and the last take stays the one that `mark_good` marks; it can be reviewed as long as the text of the set is the one that it was recorded with. While a set loads, `previzctl status` says since when, and everything else is refused with these words.
-`previzctl action keep` writes what buttons have changed into the set file. As installed, the service may not write anywhere in /etc: keep the set file in /var/lib/previzd, or let the service write (`systemctl edit previzd`, ReadWritePaths=/etc/previzd) to a folder owned by previz.
+`previzctl action keep` writes what buttons have changed into the set file; comments and order stay, and the old file is kept beside it. As installed, the service may not write anywhere in /etc: keep the set file in /var/lib/previzd, or let the service write (`systemctl edit previzd`, ReadWritePaths=/etc/previzd) to a folder owned by previz.
 `journalctl -u previzd` shows what it reports, each line with its priority: `-p err` shows only the errors. Each loss of a device is logged, from the second on with its number ("the 3rd time in this run"). What repeats with every frame is logged only the 1st, 10th, 100th and 1000th time.
-Members of the group previz may operate the rig with previzctl; members of previz-view see its state and its figures. polkit decides who operates it, by the action org.previz.Rig1.operate, so that a rule in /etc/polkit-1/rules.d can let others do some of it, or these not: its detail "verb" is what is to be done, an action of `previzctl actions`, a mode, or record. The journal names who did it, as in "bus, anna: recording".
+`adduser NAME previz` lets somebody operate the rig, `adduser NAME previz-view` only look. Members of the group previz may operate the rig with previzctl; members of previz-view see its state and its figures. polkit decides who operates it, by the action org.previz.Rig1.operate, so that a rule in /etc/polkit-1/rules.d can let others do some of it, or these not: its detail "verb" is what is to be done, an action of `previzctl actions`, a mode, or record. The journal names who did it, as in "bus, anna: recording".
+The udev rules give the service access to cameras without root, and to no keyboard or contact that you have not named: `previzd devices --rules` prints the lines for pads, pedals and GPIO chips, for /etc/udev/rules.d. Network cameras are let in from private networks; cameras.conf (FILES) lets in yours alone, and takes-disk.conf puts takes on other disks.
+The service starts with the machine, and is restarted if it fails or one of its threads hangs, however often. An upgrade keeps an edited set and waits for the end of a take; while one is recorded, the machine is not shut down or put to sleep. A purge removes everything except recordings.
 )"};
 
 const Chapter security_chapter{"SECURITY", R"(
@@ -217,10 +249,17 @@ All marks, tags and camera poses are adjusted together. Then the edges of boxes 
 Printed tags can be removed from the picture, with their light, shadows and reflections: by `hide = true` in the table [tags] of the set file, by the action `tags` of a button, or with `previz render --hide-tags`. For that a phantom must have them. `previz model` makes for each flat tag the nodes "tag 3 paper" and "tag 3 print", and from a session with light "under tag 3" as well: the surface that the tag lies on, in the colours that the plates have around it. Phantoms of other programs can have nodes of such names, too; without the last one, what is below the paper is shown as it is. To keep such a phantom, add `--tags-only --write`, for which no mark and no file of parts is needed: that puts the tags alone onto that phantom. A paper that goes on beyond the white cells of its tag needs `tag_paper_m = [width, height]` in its [[plane]] or [[box]], in metres along the tag's own edges and with the tag in the middle; a little too large does no harm. The place of a hidden tag is rendered as a virtual object is, with as much noise, and covers what the model does not have, such as a hand over the tag.
 )"};
 
+const Chapter rendering_chapter{"RENDERING", R"(
+`previz render` writes for every frame NNNN.exr, with all layers, and NNNN.png, as a display shows it, and review.mp4 of them all. They go where the set's `output.directory` says; the takes of a rig have a folder each in it, or in themselves. A render that was stopped continues where it stopped. A frame in which the camera's position is lost shows the plate untouched, and is reported.
+Denoised pictures are averaged with two frames of the take on each side (`quality.neighbours`, `--neighbours`; `--neighbours 0` renders every frame alone, as a snapshot or a refinement shows it). Every frame then has random numbers of its own, by `estimator.seed` and its number. Whatever part of a take is rendered, and however often it was stopped, a picture is the same. This takes 1.3 GB of memory per megapixel, 2 GB without a graphics card; if they are not free, the render is refused before it begins.
+Processes that share a folder (render.lock, FORMATS) take 16 frames at a time, or half of a take that is shorter than 32, and each renders two more at both ends of what it takes: at 16, up to a quarter more work.
+)"};
+
 const Chapter light_chapter{"THE LIGHT", R"(
 Virtual things are lit by what is really there, and shadows on real things are as deep as the model under that light says. Light that does not fit the picture is the first thing that a viewer sees, so previzd compares the two: `previzd check TAKE`, `previz render` and the running rig say how many times as bright as the picture the model of what is real comes out under this light, in red, green and blue, wherever nothing virtual is. A factor of 1.26, a third of a stop, is worth a word; a shadow never takes more light than the picture has.
-A fisheye on the set is best: it sees the lamps as they are in every frame, with their colours, and follows them when they change. Let it take brackets (README.md, "On a rig"), and calibrate it.
-An environment from elsewhere (`environment` in [lighting], OpenEXR or Radiance .hdr) has neither the brightness, nor the white, nor the direction of your set. Three commands with a take make it fit, in this order, each of which writes its result into the set file and keeps the old one beside it: `previz calibrate light TAKE --rotation --set SET --write` turns it until the shadows and the shading of the model are those of the picture, or says that nothing in the picture tells (shading that is then off by 4 % is what the true environment leaves, and 8 % what one of another room may); `previz calibrate balance TAKE --set SET --write` gives it the brightness and white of the film camera; `previz model TAKE --set SET --parts FILE` measures the colours of what is real. The first needs a model that casts a shadow or has sides, in any colours; grey will do.
+A fisheye on the set is best: it sees the lamps as they are in every frame, with their colours, and follows them when they change. Let it take brackets of exposures, and calibrate it.
+An environment from elsewhere (`environment` in [lighting], OpenEXR or Radiance .hdr, latitude-longitude or a cube cross, of any linear colours that it names) has neither the brightness, nor the white, nor the direction of your set. Three commands with a take make it fit, in this order, each of which writes its result into the set file and keeps the old one beside it: `previz calibrate light TAKE --rotation --set SET --write` turns it until the shadows and the shading of the model are those of the picture, or says that nothing in the picture tells (shading that is then off by 4 % is what the true environment leaves, and 8 % what one of another room may); `previz calibrate balance TAKE --set SET --write` gives it the brightness and white of the film camera; `previz model TAKE --set SET --parts FILE` measures the colours of what is real. The first needs a model that casts a shadow or has sides, in any colours; grey will do.
+Footage of unknown exposure is imported with `"exposure": 1`: the light of the set is then in units of the camera's white, and the same commands mend it.
 Without either, lamps of the set file alone light the set (`from = "set"`, and [[light]] with `gain_real = 1`); measure their places, and let the messages tell how bright they are to be.
 The grey card is in the picture already: the white paper of printed tags reflects 79 % of the light in all colours, so `calibrate balance` goes by it wherever a tag shows two white cells that are three pixels wide, and so does `model`, before it measures colours. A real grey card in the model, or any surface whose colour you know, is named with `--reference`; a [[surface]] of the set file gives it the colour that you know. Without tags and without a reference, all colours of the model count as if as many were too dark as too bright; a model whose colours were measured under a wrong light then agrees with that light. Coloured, glossy or grey paper is not 79 % white: name another reference.
 What it costs, measured on two sets whose truth is known: what virtual objects change on real surfaces is off by 3.3 and 2.2 % with a fisheye, and by 3.5 and 2.4 % with an environment of the place after the commands above, whether it was 0.3, 1 or 3 times as bright as the set, tinted, and turned by 70 degrees. Before them it was off by 107 %.
@@ -300,21 +339,23 @@ Chapter see_also(const std::string& pages) {
 }  // namespace
 
 std::vector<Page> man_pages() {
-  return {{"previzd.8", man_page(previzd_commands(), 8,
-                                 {service_chapter, security_chapter, rig_examples, glossary_chapter,
-                                  previzd_cameras, previzd_files, previzd_status,
-                                  see_also("previz(1), previzctl(1), previz-set(5)")})},
-          {"previz.1", man_page(general_commands(), 1,
-                                {tool_examples, clip_chapter, tags_chapter, model_chapter,
-                                 light_chapter, lenses_chapter, previz_formats, previz_status,
-                                 see_also("previzd(8), previz-farm(1), previz-set(5)")})},
-          {"previz-farm.1", man_page(farm_commands(), 1, farm_chapters())},
-          {"previzctl.1", man_page(previzctl_commands(), 1,
-                                   {{"ACTIONS", actions_text()},
-                                    previzctl_status,
-                                    see_also("previzd(8), previz-set(5)")})},
-          {"previz-set.5",
-           set_man_page(set_description, see_also("previzd(8), previz(1), previzctl(1)"))}};
+  return {
+      {"previzd.8", man_page(previzd_commands(), 8,
+                             {rig_chapter, service_chapter, cards_chapter, security_chapter,
+                              rig_examples, glossary_chapter, previzd_cameras, previzd_files,
+                              previzd_status, see_also("previz(1), previzctl(1), previz-set(5)")})},
+      {"previz.1",
+       man_page(general_commands(), 1,
+                {tool_examples, clip_chapter, tags_chapter, model_chapter, light_chapter,
+                 lenses_chapter, rendering_chapter, previz_formats, previz_status,
+                 see_also("previzd(8), previz-farm(1), previz-set(5)")})},
+      {"previz-farm.1", man_page(farm_commands(), 1, farm_chapters())},
+      {"previzctl.1",
+       man_page(
+           previzctl_commands(), 1,
+           {{"ACTIONS", actions_text()}, previzctl_status, see_also("previzd(8), previz-set(5)")})},
+      {"previz-set.5",
+       set_man_page(set_description, see_also("previzd(8), previz(1), previzctl(1)"))}};
 }
 
 std::vector<Page> bash_completions() {
