@@ -116,7 +116,7 @@ std::string verdict(const BenchReport& report) {
   if (!report.device.is_gpu)
     html +=
         "<p>There is no graphics card, or none that Vulkan finds: the processor draws, slowly. "
-        "README says which drivers a card needs.</p>\n";
+        "previzd(8) says which drivers a card needs.</p>\n";
   if (report.set) {
     const SetFigures& set = *report.set;
     html += fmt::format(

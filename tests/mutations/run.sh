@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Breaks each promise of the fault table in tests/COVERAGE.md once, and looks whether its test fails.
+# Breaks each promise of the fault table in tests/coverage/faults.md once, and looks whether its test fails.
 #
 #   tests/mutations/run.sh           all of the mutations in tests/mutations/*.list
 #   tests/mutations/run.sh NAME...   only those
@@ -80,7 +80,7 @@ cmake -S "$tree" -B "$build" -G Ninja --log-level=WARNING -DCMAKE_BUILD_TYPE=Deb
 caught=0 survived=0
 for name in "${names[@]}"; do
   [[ -n ${tests[$name]:-} ]] || { complain "no mutation '$name'" && continue; }
-  grep -qF "| ${promise[$name]}" tests/COVERAGE.md || complain "$name: no row begins '${promise[$name]}'"
+  grep -qF "| ${promise[$name]}" tests/coverage/faults.md || complain "$name: no row begins '${promise[$name]}'"
   key="${program[$name]} ${tests[$name]}"
   if [[ -z ${passes[$key]:-} ]]; then
     passes[$key]=no
@@ -121,7 +121,7 @@ while IFS= read -r row; do
     [[ -z $words || $row != "${words%% | *}"* ]] || found=yes
   done <"$lists/without.txt"
   [[ -n $found ]] || complain "no mutation of '$row', and no reason in $lists/without.txt"
-done < <(sed -n '/^# Faults/,/^# The package/s/^| //p' tests/COVERAGE.md | tail -n +3)
+done < <(sed -n '/^# Faults/,$s/^| //p' tests/coverage/faults.md | tail -n +3)
 printf 'mutations: %d caught, %d survived, %d errors; of %d rows, %d have no mutation\n' \
   "$caught" "$survived" "$wrong" "$rows" "$without"
 [[ $survived == 0 && $wrong == 0 ]]

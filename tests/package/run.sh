@@ -41,6 +41,7 @@ diff - "$work/tool_files" <<'FILES'
 ./usr/share/doc/previz-tools/changelog.gz
 ./usr/share/doc/previz-tools/copyright
 ./usr/share/doc/previz-tools/examples/frames.example.json
+./usr/share/doc/previz-tools/examples/parts.example.toml
 ./usr/share/doc/previz-tools/examples/reference.toml
 ./usr/share/doc/previz-tools/previz-tools.spdx.json
 ./usr/share/man/man1/previz-farm.1.gz

@@ -71,6 +71,24 @@ c = [0, 1, 0]
   EXPECT_EQ(parts.scans[0].points[1].at, glm::dvec3(0.5, 0, 0));
 }
 
+TEST(ModelParts, TheExampleHasEveryKind) {
+  const std::filesystem::path file =
+      std::filesystem::path(PREVIZ_SOURCE_DIR) / "config/parts.example.toml";
+  std::ifstream stream(file);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  const model::Parts parts = model::parse_parts(text, file);
+  EXPECT_EQ(parts.pictures.size(), 2);
+  EXPECT_EQ(parts.planes.size(), 7);
+  EXPECT_EQ(parts.boxes.size(), 2);
+  EXPECT_EQ(parts.cylinders.size(), 1);
+  EXPECT_EQ(parts.rooms.size(), 1);
+  ASSERT_EQ(parts.scans.size(), 2);
+  EXPECT_EQ(parts.scans[0].points.size(), 4);
+  // What is commented out is valid as well.
+  const std::string whole = std::regex_replace(text, std::regex("\n#(\\w+ = )"), "\n$1");
+  EXPECT_NO_THROW(model::parse_parts(whole, file));
+}
+
 TEST(ModelParts, AScanNeedsNoPoints) {
   const model::Parts parts =
       model::parse_parts("[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n", "model.toml");

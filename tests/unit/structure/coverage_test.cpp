@@ -1,4 +1,4 @@
-// tests/COVERAGE.md names only what there is: cases of the test programs, and files of the tests.
+// tests/coverage names only what there is: cases of the test programs, and files of the tests.
 #include "tests/unit/structure/source_text.hpp"
 
 namespace previz::coverage_test {
@@ -56,12 +56,14 @@ std::set<std::string> cases() {
   return names;
 }
 
-// What COVERAGE.md has between backticks.
+// What the files of tests/coverage have between backticks.
 std::vector<std::string> cited() {
   std::vector<std::string> words;
-  const std::string text = text_of(source / "tests/COVERAGE.md");
-  for (const std::smatch& match : matches(text, std::regex("`([^`\n]+)`")))
-    words.push_back(match.str(1));
+  for (const fs::directory_entry& entry : fs::directory_iterator(source / "tests/coverage")) {
+    const std::string text = text_of(entry.path());
+    for (const std::smatch& match : matches(text, std::regex("`([^`\n]+)`")))
+      words.push_back(match.str(1));
+  }
   return words;
 }
 
@@ -88,7 +90,7 @@ TEST(Coverage, EveryCaseThatIsCitedExists) {
     const std::string pattern = match.str(1);
     EXPECT_TRUE(std::any_of(all.begin(), all.end(),
                             [&](const std::string& name) { return fits(pattern, name); }))
-        << "tests/COVERAGE.md cites `" << word << "`, which no test program has";
+        << "tests/coverage cites `" << word << "`, which no test program has";
   }
   EXPECT_GT(looked_up, 200);
 }
@@ -100,7 +102,7 @@ TEST(Coverage, EveryFileThatIsCitedExists) {
     if (!file.starts_with("tests/")) continue;
     ++looked_up;
     EXPECT_TRUE(fs::exists(source / file) || fs::exists(source / (file + ".cpp")))
-        << "tests/COVERAGE.md cites `" << word << "`, which is not there";
+        << "tests/coverage cites `" << word << "`, which is not there";
   }
   EXPECT_GT(looked_up, 5);
 }
