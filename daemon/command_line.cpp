@@ -36,13 +36,6 @@ void add_bench(CLI::App& app, bench::BenchOptions& options) {
   add_device_options(command, options.device);
 }
 
-void add_check(CLI::App& app, check::CheckOptions& options) {
-  CLI::App& command =
-      *app.add_subcommand("check", "List the mistakes in a set file or, if none, what it needs");
-  command.add_option("set", options.set_or_session, "Set file or session folder")->required();
-  command.add_option("--set", options.set_file, "Set file, instead of the session's own");
-}
-
 void add_devices(CLI::App& app, bool& learn, bool& rules) {
   CLI::App& command = *app.add_subcommand(
       "devices", "List cameras, buttons and screens by the names that a set file uses");

@@ -216,6 +216,7 @@ void add_commands(CLI::App& app, CommandLine& said) {
   add_general(app, said.log_level);
   add_render(app, said.render, said.render_takes);
   add_merge(app, said.merge);
+  add_check(app, said.check);
   add_import(app, said.import_session);
   add_export(app, said.export_take);
   add_track(app, said.track);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "daemon/core/check/check.hpp"
 #include "daemon/tools/calibrate/command_line.hpp"
 #include "daemon/tools/exchange/camera_track.hpp"
 #include "daemon/tools/exchange/import.hpp"
@@ -28,6 +29,7 @@ struct CommandLine {
   post::RenderOptions render;
   std::optional<post::WhichTakes> render_takes;  // of the folder that is named
   post::RenderOptions merge;
+  check::CheckOptions check;
   exchange::ImportOptions import_session;
   exchange::ExportOptions export_take;
   exchange::TrackOptions track;

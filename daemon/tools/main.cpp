@@ -146,6 +146,7 @@ class Previz : public Program {
   int run(const CLI::App& app, const StopOnSignal& stop) override {
     if (app.got_subcommand("calibrate"))
       return calibrate::do_calibrate(app, said_.calibrate, std::cout);
+    if (app.got_subcommand("check")) return check::check_set(said_.check, std::cout);
     if (app.got_subcommand("export")) return do_export(said_.export_take, stop);
     if (app.got_subcommand("farm")) return do_farm(app, said_.farm, stop);
     if (app.got_subcommand("import")) return do_import(said_.import_session);

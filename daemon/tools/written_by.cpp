@@ -133,6 +133,7 @@ bool add_farm(const CLI::App& app, const farm::Commands& commands, Places& place
 
 std::optional<Written> written_by(const CLI::App& app, const CommandLine& said) {
   Places places;
+  if (app.got_subcommand("check")) return places.free();  // a set may name files anywhere
   if (app.got_subcommand("farm"))
     return add_farm(app, said.farm, places) ? places.confined() : places.free();
   if (app.got_subcommand("import"))

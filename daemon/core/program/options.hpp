@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "daemon/core/check/check.hpp"
 #include "daemon/core/render/device/gpu.hpp"
 
 namespace CLI {
@@ -23,6 +24,10 @@ void add_choice(CLI::App& command, const std::string& flags, std::optional<bool>
 void add_device_options(CLI::App& command, render::DeviceOptions& device);
 void add_any_paths(CLI::App& command, bool& any_paths);
 void add_with(CLI::App& command, std::optional<std::filesystem::path>& with);
+
+// Adds the command `check`, which both programs have: a set is checked on the rig, and a take where
+// its pictures are made.
+void add_check(CLI::App& app, check::CheckOptions& options);
 
 // Lets no option of `app` and its commands take NaN or an infinity: a range lets NaN pass, as no
 // comparison with it holds, and what is computed with it is lost.

@@ -149,6 +149,7 @@ TEST(FormerCommand, IsEachOfPreviz) {
   tools::CommandLine said;
   add_commands(app, said);
   for (const std::string& name : names_of(app)) {
+    if (name == "check") continue;  // both have it
     const char* const words[] = {"previzd", "--log-level", "error", name.c_str(), "take"};
     EXPECT_STREQ(former_command(5, words), name.c_str());
   }
