@@ -11,6 +11,14 @@
 
 namespace previz::test {
 
+// A set of one object, which is all of this file.
+inline set::Set set_of(const std::filesystem::path& file) {
+  set::Set set;
+  set.objects.resize(1);
+  set.objects[0].file = file;
+  return set;
+}
+
 class GltfTest : public ::testing::Test {
  protected:
   using Json = GltfWriter::Json;
@@ -30,6 +38,11 @@ class GltfTest : public ::testing::Test {
   }
 
   Json& first_primitive() { return gltf.json["meshes"][0]["primitives"][0]; }
+
+  // An entry of "images" that holds a PNG.
+  static Json image_of(const std::vector<unsigned char>& png) {
+    return {{"uri", "data:image/png;base64," + base64(png)}};
+  }
 
   // The message of the previz::Error that loading throws; "" where it loads.
   std::string error(const char* name = "test.gltf") {

@@ -147,6 +147,10 @@ Shoot::Shoot() {
   json = {{"observer", {{"pictures", "observer/%04d.png"}, {"fps", 25}, {"exposure", 0.5}}}};
 }
 
+Shoot::Shoot(const std::string& picture) : Shoot() {
+  json["observer"]["pictures"] = {picture};
+}
+
 void Shoot::film(const std::string& name, const VideoForm& form, const std::vector<Bytes>& frames,
                  const Json& more) {
   write_video(folder() / name, form, frames);
@@ -157,6 +161,7 @@ void Shoot::film(const std::string& name, const VideoForm& form, const std::vect
 ImportReport Shoot::import() const {
   const std::filesystem::path file = folder() / "FRAMES.json";
   session::write_content(file, json.dump(1));
+  std::filesystem::remove_all(session());
   return import_session({file, session()});
 }
 

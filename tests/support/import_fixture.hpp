@@ -54,6 +54,7 @@ void write_video(const std::filesystem::path& file, const VideoForm& form,
 class Shoot {
  public:
   Shoot();
+  explicit Shoot(const std::string& picture);  // that one, which the test writes
   const std::filesystem::path& folder() const { return directory_.path(); }
   std::filesystem::path session() const { return folder() / "take"; }
 
@@ -64,6 +65,7 @@ class Shoot {
   void film(const std::string& name, const VideoForm& form, const std::vector<Bytes>& frames,
             const Json& more = {{"fps", 25}});
 
+  // In the place of what was imported before.
   ImportReport import() const;
   // The message, or "" if the import succeeded; checks that a failure leaves nothing.
   std::string error() const;

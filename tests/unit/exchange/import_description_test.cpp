@@ -269,10 +269,11 @@ TEST(ImportDescription, TablesNameFileAndLine) {
 TEST(ImportDescription, NothingIsOverwritten) {
   Shoot shoot;
   EXPECT_EQ(shoot.error(), "");
-  EXPECT_THROW(shoot.import(), Error);
+  const ImportOptions again{shoot.folder() / "FRAMES.json", shoot.session()};
+  EXPECT_THROW(import_session(again), Error);
   std::filesystem::remove_all(shoot.session());
   std::filesystem::create_directory(shoot.session());
-  EXPECT_NO_THROW(shoot.import());  // an empty folder is taken
+  EXPECT_NO_THROW(import_session(again));  // an empty folder is taken
 }
 
 // The system refuses such a name without looking; the words are those of any file that is missing.

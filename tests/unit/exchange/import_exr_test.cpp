@@ -5,13 +5,9 @@
 #include <ImfOutputFile.h>
 #include <ImfStringAttribute.h>
 
-#include <array>
-
 #include "tests/support/import_fixture.hpp"
 
 namespace previz::exchange::import_exr_test {
-
-using testing::Contains;
 
 double encoded(double light) {  // IEC 61966-2-1, in parts of 255
   return 255 * (1.055 * std::pow(light, 1 / 2.4) - 0.055);
@@ -38,13 +34,12 @@ void write(const std::filesystem::path& path, const Imath::Box2i& data,
 
 class ImportStillsExr : public testing::Test {
  protected:
-  ImportStillsExr() { shoot.json["observer"]["pictures"] = {"a.exr"}; }
   double sample(std::size_t i) const {
     const FramePtr frame = shoot.open()->read(0);
     return reinterpret_cast<const std::uint16_t*>(frame->bytes.data())[i] / 257.0;
   }
 
-  Shoot shoot;
+  Shoot shoot{"a.exr"};
   const std::filesystem::path file = shoot.folder() / "a.exr";
 };
 
@@ -57,7 +52,6 @@ TEST_F(ImportStillsExr, OfOtherColoursIsConverted) {
   EXPECT_EQ(sample(std::size_t{3} * 16 * 14), 0);
 
   shoot.json["observer"]["read_as"] = {{"primaries", "bt709"}};
-  std::filesystem::remove_all(shoot.session());
   shoot.import();
   EXPECT_NEAR(sample(0), encoded(0.5), 0.01);
 }

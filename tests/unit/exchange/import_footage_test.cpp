@@ -51,9 +51,8 @@ const Kind kinds[] = {
 INSTANTIATE_TEST_SUITE_P(Files, ImportKinds, testing::ValuesIn(kinds));
 
 TEST(Import, JpegIsWhatItsDecoderSays) {
-  Shoot shoot;
+  Shoot shoot("a.jpg");
   write_picture(shoot.folder() / "a.jpg", cv::Mat(16, 24, CV_8UC3, cv::Scalar(30, 90, 200)));
-  shoot.json["observer"]["pictures"] = {"a.jpg"};
   const FramePtr frame = shoot.first_frame();
   // One flat block: only its mean is coded, to a step of at most 2 at OpenCV's quality 95, and
   // Y'CbCr to RGB multiplies a chroma step by at most 1.8.
@@ -115,7 +114,6 @@ TEST(Import, WildcardsSortByNumber) {
   session::write_content(shoot.folder() / "shots" / "readme.txt", "no picture");
   for (const char* pattern : {"shots/img*.png", "shots/*.png"}) {
     shoot.json["observer"]["pictures"] = pattern;
-    std::filesystem::remove_all(shoot.session());
     ASSERT_EQ(shoot.error(), "");
     const auto stream = shoot.open();
     ASSERT_EQ(stream->records().size(), 3u);
@@ -134,7 +132,6 @@ TEST(Import, NumbersMayGrowPastTheirPadding) {
     session::write_content(shoot.folder() / name, "no picture");
   for (const char* pattern : {"s%03d.png", "s%d.png"}) {
     shoot.json["observer"]["pictures"] = pattern;
-    std::filesystem::remove_all(shoot.session());
     EXPECT_EQ(shoot.import().observer_frames, 3u) << pattern;
   }
 }
@@ -265,10 +262,9 @@ TEST(Import, DamagedFootageIsAnError) {
 // Formats that are not on the list are refused by what a file is, whatever it is called; a play
 // list and an address of a network are not followed.
 TEST(Import, FootageOfOtherFormatsIsRefused) {
-  Shoot shoot;
+  Shoot shoot("a.png");
   write_picture(shoot.folder() / "a.bmp", noise_picture(1, CV_8UC3, 16, 16));
   std::filesystem::rename(shoot.folder() / "a.bmp", shoot.folder() / "a.png");
-  shoot.json["observer"]["pictures"] = {"a.png"};
   EXPECT_THAT(shoot.error(), HasSubstr("allowed: PNG, JPEG, TIFF"));
 
   shoot.film("real.mkv", {.pixel_format = "gray"}, {noise_bytes(512, 1)});
@@ -346,9 +342,8 @@ TEST(PictureHeader, MorePixelsThanAnybodyHasAreRefused) {
 }
 
 TEST(Import, TransparencyIsAnErrorUnlessThereIsNone) {
-  Shoot shoot;
+  Shoot shoot("a.png");
   cv::Mat picture = noise_picture(1, CV_8UC4, 16, 16);
-  shoot.json["observer"]["pictures"] = {"a.png"};
   write_picture(shoot.folder() / "a.png", picture);
   EXPECT_THAT(shoot.error(), HasSubstr("is transparent in places"));
   std::vector<cv::Mat> channels;

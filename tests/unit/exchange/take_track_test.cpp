@@ -221,7 +221,7 @@ TEST_F(UntrackedTake, IsJudgedWhereItIsImported) {
                    {"cy", 119.5}}}}}};
   session::replace_file(directory_ / "FRAMES.json", json.dump());
   EXPECT_THAT(import_session({directory_ / "FRAMES.json", directory_ / "take"}).notes,
-              testing::Contains(HasSubstr("no tag of tag25h9 in any picture: the pictures hold")));
+              Contains(HasSubstr("no tag of tag25h9 in any picture: the pictures hold")));
 }
 
 // It was refused: "track.jsonl has no pose".

@@ -1,11 +1,6 @@
 // Who is at work in a job's folder, on file systems with locks and without.
 #include "daemon/tools/farm/folder.hpp"
 
-#include <atomic>
-#include <cerrno>
-#include <mutex>
-#include <sstream>
-
 #include "daemon/core/session/draft.hpp"
 #include "daemon/tools/farm/job_lock.hpp"
 #include "daemon/tools/farm/signs_of_life.hpp"

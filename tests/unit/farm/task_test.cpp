@@ -49,10 +49,13 @@ class FarmTask : public testing::Test {
     return run_task(task, machine_, out_);
   }
   int finish() {
+    out_.str("");
+    return farm::finish(job_options(), out_);
+  }
+  JobOptions job_options() const {
     JobOptions job;
     job.job = folder_.path();
-    out_.str("");
-    return farm::finish(job, out_);
+    return job;
   }
   void run_all() {
     for (std::size_t chunk = 0; chunk < folder_.read_plan().chunks.size(); ++chunk)
@@ -164,9 +167,7 @@ TEST_F(FarmTask, OnAMachineThatCannotIsForAnother) {
   };
   EXPECT_EQ(run(2), task_status::machine_fault);
   EXPECT_EQ(state_of(folder_.read_state(2)), "machine: no Vulkan device");
-  JobOptions asked;
-  asked.job = folder_.path();
-  print_status(asked, out_);
+  print_status(job_options(), out_);
   EXPECT_THAT(out_.str(), HasSubstr("0 of 8 frames done, 0 tasks running, 2 failed"));
   EXPECT_THAT(out_.str(), HasSubstr("task 1, frames 3 to 5 of session: node2: previzd 0.0 is"));
 }
@@ -275,9 +276,8 @@ TEST_F(FarmTask, OfAJobWithLinksIsRefused) {
     std::filesystem::rename(place, kept);
     std::filesystem::create_directory_symlink(victim.path(), place);
     EXPECT_EQ(run(0), task_status::job_fault) << name;
-    JobOptions job;
-    job.job = folder_.path();
-    EXPECT_THAT(test::error_of([&] { farm::finish(job, out_); }), HasSubstr("is a link")) << name;
+    EXPECT_THAT(test::error_of([&] { farm::finish(job_options(), out_); }), HasSubstr("is a link"))
+        << name;
     std::filesystem::remove(place);
     std::filesystem::rename(kept, place);
   }
@@ -302,11 +302,7 @@ TEST_F(FarmTask, IsFinishedByTwoMachinesAtOnce) {
   std::ostringstream out;
   int other = -1;
   {
-    const std::jthread second([&] {
-      JobOptions job;
-      job.job = folder_.path();
-      other = farm::finish(job, out);
-    });
+    const std::jthread second([&] { other = farm::finish(job_options(), out); });
     EXPECT_EQ(finish(), task_status::done) << out_.str();
   }
   EXPECT_EQ(other, task_status::done) << out.str();
@@ -422,9 +418,7 @@ TEST_F(FarmTask, ThatIsToBeRetriedTakesBackThatTheJobIsDone) {
   run_all();
   EXPECT_EQ(finish(), task_status::done) << out_.str();
   std::filesystem::remove(directory_ / "out/0004.exr");
-  JobOptions job;
-  job.job = folder_.path();
-  farm::retry(job, out_);
+  farm::retry(job_options(), out_);
   EXPECT_EQ(state_of(folder_.read_finish_state()), "none");
 }
 
@@ -463,9 +457,7 @@ TEST_F(FarmTask, OfAnotherKindOfDeviceIsNotTaken) {
   EXPECT_THAT(out_.str(), HasSubstr("--any-device` takes both"));
   EXPECT_EQ(finish(), task_status::machine_fault);  // it is still known
   EXPECT_THAT(out_.str(), HasSubstr("session: frame 6: was rendered on "));
-  JobOptions again;
-  again.job = folder_.path();
-  retry(again, out_);
+  farm::retry(job_options(), out_);
   EXPECT_EQ(run(2), task_status::done) << out_.str();
   EXPECT_EQ(finish(), task_status::done) << out_.str();
 }
@@ -481,8 +473,7 @@ TEST_F(FarmTask, OfAnotherKindOfDeviceMayBeTakenLater) {
   job.any_device = false;
   session::replace_file(folder_.plan(), to_json(job));
   EXPECT_EQ(finish(), task_status::machine_fault);
-  JobOptions both;
-  both.job = folder_.path();
+  JobOptions both = job_options();
   both.any_device = true;
   EXPECT_EQ(farm::finish(both, out_), task_status::done) << out_.str();
 }
@@ -494,9 +485,7 @@ TEST_F(FarmTask, WritesBesideTheJobOnlyUnlessItIsAllowed) {
   submit();
   EXPECT_EQ(run(0), task_status::job_fault);
   EXPECT_THAT(out_.str(), HasSubstr("is not beside the job's folder"));
-  JobOptions job;
-  job.job = folder_.path();
-  EXPECT_THAT(test::error_of([&] { farm::finish(job, out_); }), HasSubstr("--any-paths"));
+  EXPECT_THAT(test::error_of([&] { farm::finish(job_options(), out_); }), HasSubstr("--any-paths"));
   EXPECT_FALSE(std::filesystem::exists(elsewhere / "out/0000.exr"));
 }
 

@@ -156,7 +156,7 @@ TEST_F(ExrEnvironment, AColourThatRec709CannotShowIsAtItsEdge) {
     greens += texel.r < 1e-4f;
   }
   EXPECT_GT(greens, lighting.environment.radiance.size() * 4 / 10);
-  EXPECT_THAT(lighting.report.notes, testing::Contains(HasSubstr("1024 of 2048 pixels are more")));
+  EXPECT_THAT(lighting.report.notes, Contains(HasSubstr("1024 of 2048 pixels are more")));
 
   // What the file has as negative is still repaired; roundings are neither.
   write(header,
@@ -218,7 +218,7 @@ TEST_F(ExrEnvironment, Rec709KeepsItsBits) {
     const LinearPicture picture = read();
     for (int y = 0; y < 32; ++y)
       for (int x = 0; x < 64; ++x) ASSERT_EQ(picture.at(x, y), paint(x, y));
-    EXPECT_THAT(notes, testing::IsEmpty());
+    EXPECT_THAT(notes, IsEmpty());
   }
 }
 
@@ -321,7 +321,7 @@ TEST_F(ExrEnvironment, XyzIsConvertedAndPositionsAreRefused) {
 TEST_F(ExrEnvironment, LowerCaseAndASingleLayerAreRead) {
   write(header_of(), plain({1, 2, 4}), {"r", "g", "b"});
   EXPECT_EQ(read().radiance[0], glm::vec3(1, 2, 4));
-  EXPECT_THAT(notes, testing::IsEmpty());
+  EXPECT_THAT(notes, IsEmpty());
   write(header_of(), plain({1, 2, 4}), {"beauty.R", "beauty.G", "beauty.B"});
   expect_converted(unit, "the layer \"beauty\" is used", {1, 2, 4});
   write(header_of(), plain({1, 2, 4}), {"normal.R", "normal.G", "normal.B"});
@@ -469,7 +469,7 @@ TEST_F(ExrEnvironment, ATooLargePictureIsReadByItsMeans) {
 
   // A picture that is kept is not changed, and a sun that overflowed lights its share.
   EXPECT_EQ(read(2048).at(63, 31), place(63, 31));
-  EXPECT_THAT(notes, testing::IsEmpty());
+  EXPECT_THAT(notes, IsEmpty());
   const float inf = std::numeric_limits<float>::infinity();
   write(header_of(), [&](int x, int y) { return glm::vec3(x == 3 && y == 3 ? inf : 0); });
   EXPECT_EQ(read(512).at(1, 1), glm::vec3(65504.f / 4));

@@ -103,7 +103,7 @@ TEST_F(PictureFormats, AnyProgramsRadianceFileIsRead) {
     const Lighting lighting =
         load(with_header("-Y 8 +X 16", "", magic) + flat(128, {128, 64, 32, 129}));
     expect_even(lighting, {1, 0.5, 0.25});
-    EXPECT_THAT(lighting.report.notes, testing::IsEmpty()) << magic;
+    EXPECT_THAT(lighting.report.notes, IsEmpty()) << magic;
   }
 }
 
@@ -123,7 +123,7 @@ TEST_F(PictureFormats, OtherPrimariesOfRadianceAreConverted) {
        {"0 0 0 0 0 0 0 0", " 0.6400 0.3300 0.3000 0.6000 0.1500 0.0600 0.3127 0.3290"}) {
     const Lighting lighting = with_primaries(numbers);
     expect_even(lighting, {1, 0.5, 0.25});
-    EXPECT_THAT(lighting.report.notes, testing::IsEmpty()) << numbers;
+    EXPECT_THAT(lighting.report.notes, IsEmpty()) << numbers;
   }
   expect_near(with_primaries("0.708 0.292 0.170 0.797 0.131 0.046 0.3127 0.3290"),
               {1.6605 - 0.5876 * 0.5 - 0.0728 * 0.25, -0.1246 + 1.1329 * 0.5 - 0.0083 * 0.25,

@@ -98,6 +98,7 @@ class ModelCommand : public testing::Test {
 
   void write_parts(const std::string& text) { std::ofstream(options_.parts_file) << text; }
 
+  void make() { model::make_model(options_, out_); }
   std::string refusal() {
     std::ostringstream out;
     return error_of([&] { model::make_model(options_, out); });
@@ -105,15 +106,15 @@ class ModelCommand : public testing::Test {
 
   TemporaryDirectory folder_;
   model::ModelOptions options_;
+  std::ostringstream out_;
 };
 
 TEST_F(ModelCommand, MakesAPhantomAndAddsItToTheSet) {
   write_parts(marks() + parts_text);
-  std::ostringstream out;
-  model::make_model(options_, out);
-  EXPECT_THAT(out.str(), HasSubstr("12 marks in 3 pictures"));
-  EXPECT_THAT(out.str(), HasSubstr("red, top: accurate to"));
-  EXPECT_THAT(out.str(), HasSubstr("the set has a phantom \"table and cubes\" beside this model"));
+  make();
+  EXPECT_THAT(out_.str(), HasSubstr("12 marks in 3 pictures"));
+  EXPECT_THAT(out_.str(), HasSubstr("red, top: accurate to"));
+  EXPECT_THAT(out_.str(), HasSubstr("the set has a phantom \"table and cubes\" beside this model"));
   const set::Set set = set::load_set(*options_.set_file);
   const auto added = std::ranges::find(set.objects, "real", &set::Object::name);
   ASSERT_NE(added, set.objects.end());
@@ -170,8 +171,7 @@ void expect_tags(set::Set made, bool hides) {
 TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
   options_.grey = false;
   write_parts(marks() + parts_text);
-  std::ostringstream out;
-  model::make_model(options_, out);
+  make();
   set::Set made = set::load_set(*options_.set_file), own = made;
   std::erase_if(made.objects, [](const set::Object& o) { return o.name != "real"; });
   std::erase_if(own.objects, [](const set::Object& o) { return o.name != "table and cubes"; });
@@ -187,11 +187,11 @@ TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
     EXPECT_NEAR(colour_in(found, "tag 0 paper")[c], 0.79, 0.08);
     EXPECT_NEAR(colour_in(found, "tag 0 print")[c], 0.04, 0.01);
   }
-  EXPECT_THAT(out.str(), HasSubstr("under tag 2: continued from"));
+  EXPECT_THAT(out_.str(), HasSubstr("under tag 2: continued from"));
   // How far it is, from the first line on.
-  EXPECT_THAT(out.str(), StartsWith(session.string() + ": looking for tags and edges\n"));
-  EXPECT_THAT(out.str(), HasSubstr("colours: first rounds ("));
-  EXPECT_THAT(out.str(), HasSubstr("colours: looking around tags (100 %)"));
+  EXPECT_THAT(out_.str(), StartsWith(session.string() + ": looking for tags and edges\n"));
+  EXPECT_THAT(out_.str(), HasSubstr("colours: first rounds ("));
+  EXPECT_THAT(out_.str(), HasSubstr("colours: looking around tags (100 %)"));
   for (const bool hides : {false, true}) expect_tags(made, hides);
 }
 
@@ -199,9 +199,8 @@ TEST_F(ModelCommand, MeasuresTheColoursOfFacesAndTags) {
 TEST_F(ModelCommand, MakesTheTagsAlone) {
   options_.tags_only = true;
   write_parts(marks() + parts_text);
-  std::ostringstream out;
-  model::make_model(options_, out);
-  EXPECT_THAT(out.str(), Not(HasSubstr("beside this model")));
+  make();
+  EXPECT_THAT(out_.str(), Not(HasSubstr("beside this model")));
   set::Set made = set::load_set(*options_.set_file);
   std::erase_if(made.objects, [](const set::Object& o) { return o.name != "real"; });
   const scene::Scene scene = scene::load_scene(made);
@@ -217,8 +216,7 @@ TEST_F(ModelCommand, MakesTheTagsAlone) {
 TEST_F(ModelCommand, MakesTheDemosThings) {
   options_.parts_file = folder_ / "demo/real.toml";
   options_.write = false;
-  std::ostringstream out;
-  model::make_model(options_, out);
+  make();
   set::Set made = set::load_set(*options_.set_file);
   for (const auto& [node, truth] : {std::pair("red cube", "cube_red"),
                                     {"yellow cube", "cube_yellow"},
@@ -253,11 +251,10 @@ TEST_F(ModelCommand, PlacesAScanByItsPoints) {
   EXPECT_THAT(missing, HasSubstr("its points fit best with up = \"y\""));
   parts.insert(parts.find("[scan.points]"), "unit = \"cm\"\nup = \"y\"\n");
   write_parts(marks() + parts);
-  std::ostringstream out;
-  model::make_model(options_, out);
-  EXPECT_THAT(out.str(), HasSubstr("scan cube: 4 points, rms 0."));
-  EXPECT_THAT(out.str(), HasSubstr("scan cube: 1 open borders"));
-  EXPECT_THAT(out.str(), Not(HasSubstr("ignored")));
+  make();
+  EXPECT_THAT(out_.str(), HasSubstr("scan cube: 4 points, rms 0."));
+  EXPECT_THAT(out_.str(), HasSubstr("scan cube: 1 open borders"));
+  EXPECT_THAT(out_.str(), Not(HasSubstr("ignored")));
   EXPECT_TRUE(fs::exists(folder_ / "demo/real.glb"));
 }
 
@@ -277,12 +274,11 @@ TEST_F(ModelCommand, PlacesAScanAloneByItsTags) {
   write_textured_glb(folder_ / "demo/table.glb", scan);
   write_parts("[[scan]]\nname = \"table\"\nfile = \"table.glb\"\n");
   options_.overlay = folder_ / "over";
-  std::ostringstream out;
-  model::make_model(options_, out);
-  EXPECT_THAT(out.str(), HasSubstr("looking for tags on scan table\n"));
-  EXPECT_THAT(out.str(), HasSubstr("scan table: placed by tags 0, 1 and 2 (12 corners), rms 0."));
-  EXPECT_THAT(out.str(), Not(HasSubstr("marks in")));
-  EXPECT_THAT(out.str(), HasSubstr("scans are not drawn over the pictures"));
+  make();
+  EXPECT_THAT(out_.str(), HasSubstr("looking for tags on scan table\n"));
+  EXPECT_THAT(out_.str(), HasSubstr("scan table: placed by tags 0, 1 and 2 (12 corners), rms 0."));
+  EXPECT_THAT(out_.str(), Not(HasSubstr("marks in")));
+  EXPECT_THAT(out_.str(), HasSubstr("scans are not drawn over the pictures"));
   EXPECT_FALSE(fs::exists(folder_ / "over"));
   set::Set made = set::load_set(*options_.set_file);
   std::erase_if(made.objects, [](const set::Object& o) { return o.name != "real"; });
@@ -293,8 +289,7 @@ TEST_F(ModelCommand, TakesANameThatTheSetDoesNotHave) {
   std::ofstream(*options_.set_file, std::ios::app)
       << "\n[[object]]\nname = \"real\"\nfile = \"phantom.glb\"\npresence = \"phantom\"\n";
   write_parts(marks() + parts_text);
-  std::ostringstream out;
-  model::make_model(options_, out);
+  make();
   const set::Set set = set::load_set(*options_.set_file);
   EXPECT_NE(std::ranges::find(set.objects, "real 2", &set::Object::name), set.objects.end());
 }
@@ -317,20 +312,19 @@ TEST_F(ModelCommand, ReplacesNothingThatItIsMadeOf) {
 
 TEST_F(ModelCommand, SaysWhatABeginnerMeant) {
   options_.write = false;
-  std::ostringstream out;
   // A name that is misspelled in a picture.
   write_parts(marks() + "t33 = [100, 100]\n" + parts_text);
-  model::make_model(options_, out);
+  make();
   EXPECT_THAT(
-      out.str(),
+      out_.str(),
       HasSubstr("real.toml: point \"t33\" belongs to no part and is ignored; did you mean t3?"));
-  EXPECT_THAT(out.str(), HasSubstr("farthest off: \"t"));
+  EXPECT_THAT(out_.str(), HasSubstr("farthest off: \"t"));
   // The name of the picture's file.
   std::string text = marks();
   for (std::size_t at = text.find("frame "); at != std::string::npos; at = text.find("frame "))
     text[at + 5] = '_';
   write_parts(text + parts_text);
-  model::make_model(options_, out);
+  make();
   // Corners in another order than around.
   std::string crossed = parts_text;
   crossed.replace(crossed.find("\"t3\", \"t4\""), 10, "\"t4\", \"t3\"");
@@ -367,8 +361,7 @@ TEST_F(ModelCommand, DrawsTheModelOverThePictures) {
   options_.write = false;
   options_.overlay = folder_ / "over";
   write_parts(marks() + parts_text);
-  std::ostringstream out;
-  model::make_model(options_, out);
+  make();
   for (const int frame : frames) {
     const Plate over =
         output::read_png(*options_.overlay / fmt::format("frame_{}.model.png", frame));
@@ -386,8 +379,7 @@ TEST_F(ModelCommand, DrawsTheModelOverThePictures) {
 TEST_F(ModelCommand, WritesPicturesToMarkPointsIn) {
   options_.parts_file.clear();
   options_.pictures = folder_ / "marks";
-  std::ostringstream out;
-  model::make_model(options_, out);
+  make();
   const std::string text = test::content_of(folder_ / "marks/model.toml");
   EXPECT_THAT(text, HasSubstr("tags = [0, 1, 2]"));
   EXPECT_TRUE(fs::exists(folder_ / "marks/frame_0.png"));
@@ -398,7 +390,7 @@ TEST_F(ModelCommand, WritesPicturesToMarkPointsIn) {
   options_.pictures.reset();
   options_.parts_file = folder_ / "marks/model.toml";
   options_.write = false;
-  model::make_model(options_, out);
+  make();
   EXPECT_TRUE(fs::exists(folder_ / "marks/model.glb"));
   // Marks are never overwritten.
   options_.pictures = folder_ / "marks";

@@ -93,7 +93,7 @@ TEST(ModelParts, AScanNeedsNoPoints) {
   const model::Parts parts =
       model::parse_parts("[[scan]]\nname = \"s\"\nfile = \"s.obj\"\n", "model.toml");
   ASSERT_EQ(parts.scans.size(), 1u);
-  EXPECT_THAT(parts.scans[0].points, testing::IsEmpty());
+  EXPECT_THAT(parts.scans[0].points, IsEmpty());
 }
 
 TEST(ModelParts, MistakesAreNamedWithTheirLine) {

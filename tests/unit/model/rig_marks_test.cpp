@@ -81,7 +81,7 @@ TEST_F(MarkedTake, BecomesAModelWithoutAFileOfParts) {
   EXPECT_TRUE(fs::exists(folder_ / "demo/marked.glb"));
   const set::Set set = set::load_set(*options_.set_file);
   EXPECT_NE(std::ranges::find(set.objects, "marked", &set::Object::name), set.objects.end());
-  EXPECT_THAT(said, testing::Not(HasSubstr("warning: box")));
+  EXPECT_THAT(said, Not(HasSubstr("warning: box")));
 }
 
 TEST_F(MarkedTake, SaysWhatABoxLacks) {
@@ -93,7 +93,7 @@ TEST_F(MarkedTake, SaysWhatABoxLacks) {
                               "picture and needs two, from different sides"));
   EXPECT_THAT(said, HasSubstr("box 1: 9"));
   EXPECT_THAT(said, HasSubstr("9 marks in 3 pictures"));
-  EXPECT_THAT(said, testing::Not(HasSubstr("belongs to no part")));
+  EXPECT_THAT(said, Not(HasSubstr("belongs to no part")));
   EXPECT_THAT(said, HasSubstr("box 1 stands on plane 1 (tags 0, 1, 2)"));
 }
 
@@ -205,9 +205,9 @@ TEST_F(MarkedTake, DoesWithoutPicturesWhoseTagsDoNotShowTheCamera) {
   const RigMarks marks = rig_marks(options_.footage, camera, tracking);
   EXPECT_TRUE(marks.pictures.empty());
   EXPECT_TRUE(marks.views.views.empty());
-  EXPECT_THAT(marks.missing,
-              testing::ElementsAre(
-                  "frame 0: shows no tags of the set that fit together; its marks are not used",
+  EXPECT_THAT(
+      marks.missing,
+      ElementsAre("frame 0: shows no tags of the set that fit together; its marks are not used",
                   "frame 2: shows no tags of the set that fit together; its marks are not used",
                   "frame 5: shows no tags of the set that fit together; its marks are not used"));
 }

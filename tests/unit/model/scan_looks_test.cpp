@@ -3,12 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <bit>
 #include <csignal>
-#include <cstdlib>
-#include <fstream>
-#include <functional>
 #include <glm/geometric.hpp>
 
 #include "daemon/tools/model/glb.hpp"
@@ -161,7 +156,7 @@ TEST_F(ScanLooks, FilesOfOtherNamesAreSaid) {
   std::ofstream(folder_ / "a.obj")
       << "mtllib a.mtl\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1/1 2/1 3/1\n";
   EXPECT_THAT(model::read_scan(folder_ / "a.obj", model::Colouring::read).notes,
-              testing::ElementsAre(HasSubstr("is read from red.png")));
+              ElementsAre(HasSubstr("is read from red.png")));
 }
 
 // As MeshLab and OpenMVS write them (assimp #5010): two faces that share two points, and no
@@ -206,7 +201,7 @@ TEST_F(ScanLooks, OfPlyWithWrongNumbersAreSaid) {
                                       "TextureFile green.png\n" +
                                           rest;
   EXPECT_THAT(model::read_scan(folder_ / "a.ply", model::Colouring::read).notes,
-              testing::ElementsAre(HasSubstr("faces whose texnumber has no texture")));
+              ElementsAre(HasSubstr("faces whose texnumber has no texture")));
 }
 
 // The luma of (255, 128, 0) by Rec. 709: 0.2126 * 255 + 0.7152 * 128 = 145.76.

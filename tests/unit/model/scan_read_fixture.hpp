@@ -1,11 +1,7 @@
 // What the tests of readers of scans share.
 #pragma once
 
-#include <filesystem>
-#include <fstream>
 #include <glm/geometric.hpp>
-#include <string>
-#include <vector>
 
 #include "daemon/tools/model/scan_read.hpp"
 #include "tests/support/temporary_directory.hpp"

@@ -3,12 +3,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <bit>
 #include <csignal>
-#include <cstdlib>
-#include <fstream>
-#include <functional>
 #include <glm/geometric.hpp>
 
 #include "daemon/tools/model/glb.hpp"
@@ -324,7 +319,7 @@ TEST_F(ScanRead, PlyThatIsNotWhatItsHeaderSaysIsRefused) {
                 "a vertex that the file lacks"),
         Refused("ply\nformat ascii 1.0\n" + vertex + face + "end_header\n" + points + "3 0 1 nan\n",
                 "a vertex that the file lacks")})
-    EXPECT_THAT(refusal("a.ply", text), testing::AllOf(HasSubstr("a.ply: "), HasSubstr(words)));
+    EXPECT_THAT(refusal("a.ply", text), AllOf(HasSubstr("a.ply: "), HasSubstr(words)));
 }
 
 TEST_F(ScanRead, StlIsKnownByItsBytes) {

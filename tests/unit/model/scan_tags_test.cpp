@@ -1,8 +1,6 @@
 // Scans that are placed by the tags of the set that their own colours show.
 #include "daemon/tools/model/scans.hpp"
 
-#include <limits>
-
 #include "tests/support/content_of.hpp"
 #include "tests/support/gltf_writer.hpp"
 #include "tests/support/temporary_directory.hpp"

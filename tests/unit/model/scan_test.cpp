@@ -41,7 +41,7 @@ class Scans : public testing::Test {
     parts_.pictures = scene_.pictures(random);
     const model::Views views = scene_.views(parts_, random);
     const model::Start start = model::first_guess(parts_, views, scene_.tags);
-    EXPECT_THAT(start.layout.unused_points, testing::IsEmpty());
+    EXPECT_THAT(start.layout.unused_points, IsEmpty());
     const model::Fit fit = model::adjust(parts_, views, start);
     std::ostringstream out;
     auto scans = model::place_scans(parts_, start.layout, fit.shape,

@@ -2,9 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cmath>
-#include <fstream>
 #include <glm/geometric.hpp>
 
 #include "drivers/calibration.hpp"

@@ -75,7 +75,7 @@ TEST_P(RecorderAmong, LosesNoFrame) {
   EXPECT_EQ(recorder.status().fault, "");
   const fs::path take = recorder.status().directory;
   EXPECT_EQ(frame_count(take), frames);
-  EXPECT_THAT(missing_of(take), testing::IsEmpty());
+  EXPECT_THAT(missing_of(take), IsEmpty());
   EXPECT_LT(std::chrono::steady_clock::now() - begin, std::chrono::seconds(20));
 }
 

@@ -38,7 +38,7 @@ TEST(Recorder, SaysForHowLongATakeIsBeingWritten) {
   EXPECT_TRUE(wait_until("the take is whole", [&] { return !recorder.status().writing; }));
   const RecorderStatus status = recorder.status();
   EXPECT_EQ(status.finished_takes, 1u);
-  EXPECT_THAT(missing_of(status.directory), testing::IsEmpty());
+  EXPECT_THAT(missing_of(status.directory), IsEmpty());
 }
 
 TEST(Timecode, CountsFramesOfTheNearestWholeRate) {
@@ -309,7 +309,7 @@ TEST(Recorder, AnAlmostFullDiskEndsTheTakeInOrder) {
   EXPECT_THAT(status.fault, HasSubstr("almost full"));
   EXPECT_EQ(status.failures, 1u);
   EXPECT_EQ(status.finished_takes, 1u);
-  EXPECT_THAT(missing_of(directory / "12A_take001"), testing::IsEmpty());  // closed
+  EXPECT_THAT(missing_of(directory / "12A_take001"), IsEmpty());  // closed
   EXPECT_EQ(frames_of(directory / "12A_take001"), count_from(0, status.frames - 1));
 
   recorder.start();  // refused by the same disk
@@ -445,7 +445,7 @@ TEST(RecorderDeath, AKilledProcessKeepsEveryFrameThatItCounted) {
 std::optional<std::string> interrupted_in(const std::filesystem::path& directory) {
   const Recorder recorder(options_in(directory));
   EXPECT_TRUE(wait_for_its_look(recorder));
-  EXPECT_THAT(recorder.status().salvaged, testing::IsEmpty());
+  EXPECT_THAT(recorder.status().salvaged, IsEmpty());
   return recorder.status().interrupted;
 }
 
@@ -457,7 +457,7 @@ TEST(Recorder, RemembersThatItWasRecordingUntilSomebodyEndsIt) {
     recorder.start();
     recorder.offer(picture(0));
   }  // as for an upgrade: the take is closed, and nobody has ended the recording
-  EXPECT_THAT(missing_of(directory / "12A_take001"), testing::IsEmpty());
+  EXPECT_THAT(missing_of(directory / "12A_take001"), IsEmpty());
   EXPECT_EQ(interrupted_in(directory.path()), "12A_take001");
   {
     Recorder recorder(options_in(directory.path()));
@@ -474,7 +474,7 @@ TEST(Recorder, HasEverythingOnTheDiskOnceItIsFinishedAndTakesNothingAfterThat) {
   for (int i = 0; i < 3; ++i) recorder.offer(picture(i));
   recorder.finish();
   const std::filesystem::path take = directory / "12A_take001";
-  EXPECT_THAT(missing_of(take), testing::IsEmpty());
+  EXPECT_THAT(missing_of(take), IsEmpty());
   recorder.offer(picture(3));
   recorder.offer(track_of(3));
   recorder.finish();

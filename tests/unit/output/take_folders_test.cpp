@@ -157,7 +157,7 @@ TEST(Recorder, ThatCannotKeepWhatIsWishedBeforeTheButtonSaysSoOnce) {
     recorder.start();
     ASSERT_TRUE(wait_for_frames(recorder, frames));
     if (wished_s < 1) {
-      EXPECT_THAT(disks.heard.notes(), testing::IsEmpty());
+      EXPECT_THAT(disks.heard.notes(), IsEmpty());
       continue;
     }
     EXPECT_EQ(std::ranges::count(disks.heard.notes(),
@@ -194,7 +194,7 @@ TEST(Recorder, WritesTheFormThatTheSetWants) {
   end_take(recorder);
   const std::filesystem::path take = disks.first / "12A_take001";
   EXPECT_EQ(frames_of(take), count_from(0, 2));
-  EXPECT_THAT(session::open_session(take).missing, testing::IsEmpty());
+  EXPECT_THAT(session::open_session(take).missing, IsEmpty());
   EXPECT_THAT(test::content_of(take / "session.toml"), HasSubstr("codec = \"raw\""));
 }
 
@@ -235,7 +235,7 @@ TEST(Recorder, ThatFindsAnotherInItsFolderLeavesItAlone) {
   first->finish();
   EXPECT_EQ(first->status().failures, 0u);
   first.reset();
-  EXPECT_THAT(missing_of(directory / "takes/12A_take001"), testing::IsEmpty());
+  EXPECT_THAT(missing_of(directory / "takes/12A_take001"), IsEmpty());
   // Whoever is left takes the folder over.
   Recorder third(options);
   EXPECT_TRUE(wait_until("it has the folder", [&] { return third.folders()[0].is_own; }));

@@ -2,7 +2,6 @@
 // ranges has the files of one that is rendered as a whole.
 #include "daemon/tools/post/sample_ranges.hpp"
 
-#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "daemon/core/output/sums_exr.hpp"
@@ -16,20 +15,11 @@ namespace previz::post::sample_ranges_test {
 using session::content_of, session::write_content;
 using test::small_take_lost;
 
-std::string message_of(const auto& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
-
 TEST(SampleRangeText, IsOneOfHowMany) {
   EXPECT_EQ(parse_sample_range("2/4"), (render::SampleRange{2, 4}));
   EXPECT_EQ(parse_sample_range("1/1"), (render::SampleRange{1, 1}));
   for (const char* text : {"", "2", "/", "2/", "/4", "0/4", "5/4", "-1/4", "2/4/8", "a/b", "2 / 4"})
-    EXPECT_THAT(message_of([&] { parse_sample_range(text); }), HasSubstr("2/4 for the second"))
+    EXPECT_THAT(test::error_of([&] { parse_sample_range(text); }), HasSubstr("2/4 for the second"))
         << text;
 }
 
@@ -42,7 +32,7 @@ set::Quality quality_of(int samples) {
 
 TEST(SampleRangeCheck, SaysWhyAFrameCannotBeDivided) {
   const auto why = [](render::SampleRange range, const set::Quality& quality) {
-    return message_of([&] { check_sample_range(range, quality); });
+    return test::error_of([&] { check_sample_range(range, quality); });
   };
   set::Quality quality = quality_of(256);
   quality.adaptive = false;
@@ -123,14 +113,14 @@ TEST(SumsExr, IsRefusedWhereItCannotHoldItsPixels) {
   bytes.replace(bytes.find(name) + name.size() + 4, sizeof(window),
                 std::string_view(reinterpret_cast<const char*>(window), sizeof(window)));
   write_content(file, bytes);
-  EXPECT_THAT(message_of([&] { output::read_sums_exr(file); }),
+  EXPECT_THAT(test::error_of([&] { output::read_sums_exr(file); }),
               HasSubstr("is too small for its 50000000 pixels"));
 }
 
 TEST(SumsExr, IsRefusedWhereItIsAnotherFile) {
   const test::TemporaryDirectory directory;
   write_content(directory / "0.sums.exr", "no picture");
-  EXPECT_THAT(message_of([&] { output::read_sums_exr(directory / "0.sums.exr"); }),
+  EXPECT_THAT(test::error_of([&] { output::read_sums_exr(directory / "0.sums.exr"); }),
               HasSubstr("0.sums.exr"));
 }
 
@@ -193,7 +183,7 @@ TEST_F(MergedTake, HasTheFilesOfOneRun) {
   const RenderReport second = render_range({2, 2}, "second");
 
   const RenderReport merged = merge("merged");
-  EXPECT_THAT(merged.failures, testing::IsEmpty());
+  EXPECT_THAT(merged.failures, IsEmpty());
   ASSERT_EQ(merged.frames.size(), 3u);
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(merged.frames[i].files, whole.frames[i].files) << i;
@@ -217,9 +207,9 @@ TEST_F(MergedTake, LeavesOutAFrameWhoseSumsAreDamagedOrMissing) {
   EXPECT_TRUE(merged.video.empty());
   ASSERT_EQ(merged.failures.size(), 1u);
   EXPECT_THAT(merged.failures[0],
-              testing::AllOf(HasSubstr("frame 4: sample range 2/2: "), HasSubstr("second"),
-                             HasSubstr("its .sums.exr has another size than when it was written"),
-                             HasSubstr("--sample-range 2/2 --frames 4")));
+              AllOf(HasSubstr("frame 4: sample range 2/2: "), HasSubstr("second"),
+                    HasSubstr("its .sums.exr has another size than when it was written"),
+                    HasSubstr("--sample-range 2/2 --frames 4")));
   std::filesystem::remove(directory_ / "first/0004.sums.exr");
   EXPECT_THAT(merge("merged").failures.at(0),
               HasSubstr("frame 4: sample range 1/2: " + (directory_ / "first").string() +
@@ -231,7 +221,7 @@ TEST_F(MergedTake, LeavesOutAFrameWhoseSumsAreDamagedOrMissing) {
   merged = merge("merged");
   EXPECT_EQ(merged.found_finished, 2u);
   EXPECT_EQ(merged.frames.size(), 3u);
-  EXPECT_THAT(merged.failures, testing::IsEmpty());
+  EXPECT_THAT(merged.failures, IsEmpty());
 }
 
 TEST_F(MergedTake, TakesNoFileOfAnotherFrame) {
@@ -244,7 +234,7 @@ TEST_F(MergedTake, TakesNoFileOfAnotherFrame) {
 TEST_F(MergedTake, RefusesFoldersThatDoNotGoTogether) {
   render_ranges();
   const auto why = [&](const std::vector<std::string>& from) {
-    return message_of([&] { merge("merged", from); });
+    return test::error_of([&] { merge("merged", from); });
   };
   EXPECT_THAT(why({"second"}), HasSubstr("no folder has the samples of range 1/2"));
   EXPECT_THAT(why({"first", "session"}), HasSubstr("has no render.json"));
@@ -255,12 +245,12 @@ TEST_F(MergedTake, RefusesFoldersThatDoNotGoTogether) {
   options = options_for("merged");
   options.seed = 9;
   options.sums_from = {directory_ / "first", directory_ / "second"};
-  EXPECT_THAT(message_of([&] { run(options); }),
-              testing::AllOf(HasSubstr("first/render.json"), HasSubstr("seed is ")));
+  EXPECT_THAT(test::error_of([&] { run(options); }),
+              AllOf(HasSubstr("first/render.json"), HasSubstr("seed is ")));
   EXPECT_FALSE(std::filesystem::exists(directory_ / "merged"));
   // Sums and pictures do not mix in a folder.
-  EXPECT_THAT(message_of([&] { run(options_for("first")); }), HasSubstr("sample_range"));
-  EXPECT_THAT(message_of([&] {
+  EXPECT_THAT(test::error_of([&] { run(options_for("first")); }), HasSubstr("sample_range"));
+  EXPECT_THAT(test::error_of([&] {
                 render_range({1, 2}, "second");
               }),
               HasSubstr("sample_range is \"2/2\" there and \"1/2\" now"));

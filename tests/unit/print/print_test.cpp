@@ -225,34 +225,35 @@ TEST_F(Print, TheRulerIsAsLongAsItSays) {
 }
 
 TEST(PrintRefusals, SayWhatIsPossible) {
+  struct Asked {
+    const char *ids, *size, *family, *paper, *words;
+  };
   std::ostringstream out;
   TagOptions tags;
-  tags.ids = "0-3", tags.size = "80";
-  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("size \"80\""));
-  tags.size = "1mm";
-  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("needs 3.2 mm or more"));
-  tags.size = "80mm", tags.ids = "3-1";
-  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("ids \"3-1\""));
-  tags.ids = "587";
-  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("it has 0 to 586"));
-  tags.ids = "0", tags.family = "tag99";
-  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("known: tag36h11"));
-  tags.family = "tag36h11", tags.paper = "A5";
-  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr("known: A4, A3, Letter"));
-  tags.paper = "A4", tags.size = "3m";
-  EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }),
-              HasSubstr("sheets of A4; at most 64"));
+  for (const auto& [ids, size, family, paper, words] : {
+           Asked{"0-3", "80", "tag36h11", "A4", "size \"80\""},
+           Asked{"0-3", "1mm", "tag36h11", "A4", "needs 3.2 mm or more"},
+           Asked{"3-1", "80mm", "tag36h11", "A4", "ids \"3-1\""},
+           Asked{"587", "80mm", "tag36h11", "A4", "it has 0 to 586"},
+           Asked{"0", "80mm", "tag99", "A4", "known: tag36h11"},
+           Asked{"0", "80mm", "tag36h11", "A5", "known: A4, A3, Letter"},
+           Asked{"0", "3m", "tag36h11", "A4", "sheets of A4; at most 64"},
+       }) {
+    tags.ids = ids, tags.size = size, tags.family = family, tags.paper = paper;
+    EXPECT_THAT(test::error_of([&] { print_tags(tags, out); }), HasSubstr(words));
+  }
   tags.size = "80mm", tags.ids = "1,2,3";
   EXPECT_THAT(test::error_of([&] { print_block(tags, out); }), HasSubstr("5 or 6 tags"));
   EXPECT_THAT(test::error_of([&] { print_stick(tags, out); }), HasSubstr("rings of four tags"));
   BoardOptions board;
-  board.board = "charuco:7x5:30mm:22mm:9x9_100";
-  EXPECT_THAT(test::error_of([&] { print_board(board, out); }),
-              HasSubstr("not a marker dictionary"));
-  board.board = "aprilgrid:3x3:40mm:5mm:tagStandard41h12";
-  EXPECT_THAT(test::error_of([&] { print_board(board, out); }), HasSubstr("gap of 32 mm or more"));
-  board.board = "aprilgrid:3x3:40mm:7mm:kalibr";  // a white cell about each of ten cells of 4 mm
-  EXPECT_THAT(test::error_of([&] { print_board(board, out); }), HasSubstr("gap of 8 mm or more"));
+  for (const auto& [text, words] : {
+           std::pair{"charuco:7x5:30mm:22mm:9x9_100", "not a marker dictionary"},
+           {"aprilgrid:3x3:40mm:5mm:tagStandard41h12", "gap of 32 mm or more"},
+           {"aprilgrid:3x3:40mm:7mm:kalibr", "gap of 8 mm or more"},  // a cell of 4 mm about each
+       }) {
+    board.board = text;
+    EXPECT_THAT(test::error_of([&] { print_board(board, out); }), HasSubstr(words));
+  }
 }
 
 TEST(PrintReport, SaysWhatIsInTheFile) {

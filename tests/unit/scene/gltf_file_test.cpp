@@ -6,10 +6,7 @@ namespace previz::test::gltf_file_test {
 class GltfFiles : public GltfTest {
  protected:
   static std::string error_of_file(const std::filesystem::path& file) {
-    set::Set set;
-    set.objects.resize(1);
-    set.objects[0].file = file;
-    return test::error_of([&] { scene::load_scene(set); });
+    return test::error_of([&] { scene::load_scene(set_of(file)); });
   }
   std::string error_of(const std::string& bytes) {
     session::write_content(directory / "raw", bytes);

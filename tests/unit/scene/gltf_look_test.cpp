@@ -1,4 +1,3 @@
-#include <algorithm>
 
 #include "tests/support/gltf_test.hpp"
 #include "tests/support/session_fixture.hpp"
@@ -14,9 +13,6 @@ class GltfLooks : public GltfTest {
   GltfLooks() { gltf.root("a", gltf.triangle_mesh()); }
   static Json colored(int texture) {
     return {{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", texture}}}}}};
-  }
-  static Json image_of(const std::vector<unsigned char>& bytes) {
-    return {{"uri", "data:image/png;base64," + base64(bytes)}};
   }
 };
 

@@ -26,9 +26,6 @@ class GltfMaterials : public GltfTest {
   static Json with(const char* extension, Json what) {
     return {{"name", extension}, {"extensions", {{extension, std::move(what)}}}};
   }
-  static Json image_of(const std::vector<unsigned char>& bytes) {
-    return {{"uri", "data:image/png;base64," + base64(bytes)}};
-  }
   scene::Material loaded(Json material) {
     use(std::move(material));
     return load().materials.at(0);

@@ -1,7 +1,5 @@
 #include "daemon/core/scene/gltf_text.hpp"
 
-#include <random>
-
 #include "tests/support/gltf_test.hpp"
 #include "tests/support/session_fixture.hpp"
 
@@ -26,10 +24,7 @@ class GltfText : public GltfTest {
   }
   scene::Scene load_bytes(const std::string& bytes, const std::string& name = "raw.gltf") {
     session::write_content(directory / name, bytes);
-    set::Set set;
-    set.objects.resize(1);
-    set.objects[0].file = directory / name;
-    return scene::load_scene(set);
+    return scene::load_scene(set_of(directory / name));
   }
   std::string error_of_bytes(const std::string& bytes, const std::string& name = "raw.gltf") {
     const std::string file = (directory / name).string();

@@ -38,10 +38,7 @@ class GltfUris : public GltfTest {
     Json json = sound;
     json["buffers"][0]["uri"] = uri;
     session::write_content(directory / "raw.gltf", json.dump());
-    set::Set set;
-    set.objects.resize(1);
-    set.objects[0].file = directory / "raw.gltf";
-    return scene::load_scene(set);
+    return scene::load_scene(set_of(directory / "raw.gltf"));
   }
   Json sound;
 };

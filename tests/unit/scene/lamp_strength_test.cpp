@@ -1,8 +1,6 @@
 // Lamps of objects beside the film camera's white, in the units that programs write them in.
 #include "daemon/core/scene/lamp_strength.hpp"
 
-#include <numbers>
-
 #include "tests/support/gltf_test.hpp"
 
 namespace previz::test::lamp_strength_test {

@@ -40,10 +40,7 @@ class TextureBudget : public GltfTest {
   }
   scene::Scene load_with(std::uint64_t most_texels) {
     gltf.save(directory / "test.gltf");
-    set::Set set;
-    set.objects.resize(1);
-    set.objects[0].file = directory / "test.gltf";
-    return scene::load_scene(set, most_texels);
+    return scene::load_scene(set_of(directory / "test.gltf"), most_texels);
   }
 };
 

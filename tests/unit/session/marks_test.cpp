@@ -64,11 +64,10 @@ TEST_F(SessionMarks, OfAPictureThatTheTakeLacksAreNamed) {
   const Marks marks = read();
   ASSERT_EQ(marks.marks.size(), 1u);
   EXPECT_EQ(marks.marks[0].point, "b");
-  EXPECT_THAT(
-      marks.missing,
-      testing::ElementsAre("events.jsonl: lines 5 to 6 cannot be understood, and may have marks",
-                           "the picture in which \"a\" was marked is not in the session; "
-                           "that mark is not used"));
+  EXPECT_THAT(marks.missing,
+              ElementsAre("events.jsonl: lines 5 to 6 cannot be understood, and may have marks",
+                          "the picture in which \"a\" was marked is not in the session; "
+                          "that mark is not used"));
 }
 
 TEST(BoxCorner, HasAName) {

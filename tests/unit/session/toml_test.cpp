@@ -137,13 +137,6 @@ TEST(SessionToml, ErrorsNameFileLineAndKey) {
 
 // Sessions are read for ever, and by other programs: keys may be added, but what is written of the
 // others must not change by a byte.
-TEST(SessionToml, ANumberWithAFractionIsNoWholeOne) {
-  std::string text = to_toml({});
-  const std::string version = "format_version = ";
-  text.replace(text.find(version), version.size() + 1, version + "1.0");
-  EXPECT_THAT(error_of(text), HasSubstr("format_version"));
-}
-
 TEST(SessionToml, CalibrationsAreWrittenAsEver) {
   SessionFile file;
   ObserverCalibration observer;

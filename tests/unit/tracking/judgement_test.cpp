@@ -4,10 +4,7 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-#include <cstdlib>
 #include <glm/gtc/matrix_transform.hpp>
-#include <numbers>
 #include <stop_token>
 
 #include "daemon/core/set/tag_families.hpp"

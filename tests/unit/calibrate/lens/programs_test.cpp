@@ -114,7 +114,7 @@ TEST(MetashapeFiles, WhatOpencvsLensLacksIsRefusedByName) {
   EXPECT_THAT(refusal(metashape("<f>1500</f><b2>0.5</b2>")),
               HasSubstr("b2: a skew of 0.5 moves the picture's edge by 0.18 px"));
   EXPECT_THAT(lens_of(metashape("<f>1500</f><b2>-0.1</b2>")).notes,
-              testing::Contains(HasSubstr("b2 is ignored: it moves the picture's edge by 0.036")));
+              Contains(HasSubstr("b2 is ignored: it moves the picture's edge by 0.036")));
   EXPECT_THAT(refusal(metashape("<fx>1500</fx><fy>1500</fy><cx>960</cx><cy>540</cy>")),
               HasSubstr("PhotoScan's form before 1.2"));
   EXPECT_THAT(refusal(metashape("<f>1e308</f><b1>1e308</b1>")),
@@ -138,7 +138,7 @@ TEST(TransformsFiles, GiveTheLens) {
   // Every frame has the lens, the same one.
   const std::string each = "{\"frames\": [{" + opencv_numbers + "}, {" + opencv_numbers + "}]}";
   expect_pinhole(lens_of(each), truth);
-  EXPECT_THAT(lens_of(each).notes, testing::Contains(HasSubstr("0.5 px is subtracted")));
+  EXPECT_THAT(lens_of(each).notes, Contains(HasSubstr("0.5 px is subtracted")));
   PinholeIntrinsics plain{1920, 1080, 1500, 1500, 959.5, 539.5};
   expect_pinhole(lens_of(R"({"fl_x": 1500, "cx": 960, "cy": 540})", {}, PictureSize{1920, 1080}),
                  plain);
