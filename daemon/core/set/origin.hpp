@@ -1,5 +1,10 @@
-// Says how far a set file is trusted.
+// Says how far a set file is trusted, and which files stand in for those that it names.
 #pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
 
 namespace previz::set {
 
@@ -8,5 +13,8 @@ namespace previz::set {
 // session may come from anywhere, so that its set is read as data: a file that it names must be in
 // its own folder, unless the crew trusts it. So may a job, which brings along what its set names.
 enum class Origin { crew, session, trusted_session, job };
+
+// As the set names them: in their place.
+using Assets = std::vector<std::pair<std::string, std::filesystem::path>>;
 
 }  // namespace previz::set

@@ -3,17 +3,12 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "daemon/core/set/origin.hpp"
 #include "daemon/core/set/problems.hpp"
 #include "daemon/core/set/table.hpp"
 
 namespace previz::set {
-
-using Assets = std::vector<std::pair<std::string, std::filesystem::path>>;
 
 // Adds every problem to `problems`; the set is meaningful only if there are none.
 Set resolve(Draft draft, const std::filesystem::path& file, const Assets& assets, Origin origin,

@@ -150,10 +150,10 @@ const Mistake ranges[] = {
     {"[[tag]]\nid=-1\nsize_m=0.1\nposition_m=[0,0,0]\n", "2:4: tag.id: -1", "0 to 65535"},
     {POINT "emission=[1,-1,1]\n", "4:13: light.emission: -1", "0 to 1e+12"},
     {"[recording]\ndirectory='/proc/takes'\n",
-     "2:1: recording.directory: /proc/takes holds no files of anybody", "a folder on a disk"},
-    {"[recording]\nsecond_directory='/a/../sys'\n", "2:1: recording.second_directory: /sys holds",
-     "a folder on a disk"},
-    {"[output]\ndirectory='/sys/kernel'\n", "2:1: output.directory: /sys/kernel holds",
+     "2:1: recording.directory: /proc/takes is not on a disk", "a folder on a disk"},
+    {"[recording]\nsecond_directory='/a/../sys'\n",
+     "2:1: recording.second_directory: /sys is not on a disk", "a folder on a disk"},
+    {"[output]\ndirectory='/sys/kernel'\n", "2:1: output.directory: /sys/kernel is not on a disk",
      "a folder on a disk"},
 };
 INSTANTIATE_TEST_SUITE_P(Ranges, SetMistake, testing::ValuesIn(ranges));
