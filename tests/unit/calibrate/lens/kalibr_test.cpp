@@ -1,16 +1,20 @@
 // Kalibr's AprilGrid: tags with a black border of two cells, and squares at their corners.
+#include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
+#include "daemon/core/tracking/photometry.hpp"
 #include "daemon/tools/calibrate/calibrate.hpp"
 #include "daemon/tools/calibrate/lens/board_finder.hpp"
 #include "daemon/tools/calibrate/lens/observer.hpp"
 #include "daemon/tools/calibrate/lens/views.hpp"
-#include "tests/unit/calibrate/lens/drawn_board.hpp"
+#include "tests/support/test.hpp"
+#include "tests/support/tracking_synthetic.hpp"
 
 namespace previz::calibrate::kalibr_test {
 
-using namespace drawn_board;
-
+constexpr int width = 640, height = 480;
+constexpr double focal_px = 620;
 constexpr const char* board_text = "aprilgrid:6x6:88mm:26.4mm";
 
 // The board is drawn with 100 px per tag, inside a white margin of a gap around the outermost
@@ -50,13 +54,52 @@ cv::Mat1b draw_board(const Form& form) {
   return board;
 }
 
+// Where the board is: turned by a rotation vector about the drawing's centre, which is at `middle`;
+// the drawing's width is the unit.
+struct Held {
+  cv::Vec3d turn, middle;
+};
+
+cv::Matx33d pixel_from_drawing(const Held& held) {
+  cv::Matx33d r;
+  cv::Rodrigues(held.turn, r);
+  const cv::Vec3d& t = held.middle;
+  const cv::Matx33d pose(r(0, 0), r(0, 1), t[0], r(1, 0), r(1, 1), t[1], r(2, 0), r(2, 1), t[2]);
+  const double s = 1.0 / drawing_px;
+  const cv::Matx33d centred(s, 0, -0.5, 0, s, -0.5, 0, 0, 1);
+  return cv::Matx33d(focal_px, 0, 319.5, 0, focal_px, 239.5, 0, 0, 1) * pose * centred;
+}
+
 // Returns where a point of the board is in the picture. The board's y points up, the drawing's
 // down.
 glm::dvec2 pixel_of(const glm::dvec3& point, const Held& held) {
   const double px_m = 0.088 / tag_px;
-  const cv::Vec3d at = pixel_from_drawing({drawing_px, drawing_px}, held) *
-                       cv::Vec3d(left_px + point.x / px_m, low_px - point.y / px_m, 1);
+  const cv::Vec3d at =
+      pixel_from_drawing(held) * cv::Vec3d(left_px + point.x / px_m, low_px - point.y / px_m, 1);
   return {at[0] / at[2], at[1] / at[2]};
+}
+
+Frame frame_of(const cv::Mat1b& picture) {
+  return test::gray_frame(picture.cols, picture.rows, {picture.datastart, picture.dataend});
+}
+
+// Returns the board as a camera with the sRGB curve sees it: 4x4 samples per pixel, the light
+// slightly blurred, noise of 1.5 of 255.
+Frame photograph(const cv::Mat1b& drawing, const Held& held, cv::RNG& random) {
+  const cv::Matx33d finer(4, 0, 1.5, 0, 4, 1.5, 0, 0, 1);
+  cv::Mat1b fine, picture;
+  cv::warpPerspective(drawing, fine, finer * pixel_from_drawing(held), {4 * width, 4 * height},
+                      cv::INTER_LINEAR, cv::BORDER_CONSTANT, 200);
+  cv::resize(fine, picture, {width, height}, 0, 0, cv::INTER_AREA);
+  cv::GaussianBlur(picture, picture, {}, 0.7);
+  cv::Mat1b curve(1, 256);
+  for (int i = 0; i < 256; ++i)
+    curve(i) = std::uint8_t(std::lround(255 * tracking::srgb_encode(i / 255.0)));
+  cv::LUT(picture, curve, picture);
+  cv::Mat noisy(height, width, CV_16S);
+  random.fill(noisy, cv::RNG::NORMAL, 0, 1.5);
+  cv::add(picture, noisy, picture, {}, CV_8U);
+  return frame_of(picture);
 }
 
 Held any_pose(cv::RNG& random) {
