@@ -1,5 +1,5 @@
 // Finds the packets of a session's video one by one, in a Matroska file whose head is torn. Not for
-// use outside drivers/.
+// use outside this room.
 #pragma once
 
 #include <cstdint>

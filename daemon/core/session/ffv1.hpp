@@ -1,5 +1,5 @@
 // Opens FFV1's encoder and decoder as every session's videos need them. Not for use outside
-// drivers/.
+// the room.
 #pragma once
 
 #include <filesystem>

@@ -1,6 +1,6 @@
 // Reads and writes the .jsonl files, which have one record a line, so that a torn line costs that
 // line only. Numbers are written so that every double comes back bit for bit. Not for use outside
-// drivers/.
+// the room.
 #pragma once
 
 #include <cstdint>

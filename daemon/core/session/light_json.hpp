@@ -1,4 +1,4 @@
-// Converts the light of a track line to JSON and back. Not for use outside drivers/.
+// Converts the light of a track line to JSON and back. Not for use outside this room.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>

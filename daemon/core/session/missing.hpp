@@ -1,4 +1,4 @@
-// Says in plain words what a damaged session lacks. Not for use outside drivers/.
+// Says in plain words what a damaged session lacks. Not for use outside this room.
 #pragma once
 
 #include <cstdint>

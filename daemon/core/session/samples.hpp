@@ -1,4 +1,4 @@
-// Converts between a frame's packed samples and libav's pictures. Not for use outside drivers/.
+// Converts between a frame's packed samples and libav's pictures. Not for use outside this room.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Writes and parses session.toml, in which a session describes itself. Not for use outside
-// drivers/.
+// Writes and parses session.toml, in which a session describes itself. Not for use outside this
+// room.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Reads packets and pictures of a stream's Matroska file, as far as it is whole. Not for use
-// outside drivers/.
+// outside this room.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // Writes lossless video in Matroska, such that every frame is in the file once write() returns. Not
-// for use outside drivers/.
+// for use outside this room.
 #pragma once
 
 #include <cstdint>
