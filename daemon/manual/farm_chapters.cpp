@@ -5,17 +5,17 @@ namespace previz::manual {
 std::vector<Chapter> farm_chapters() {
   return {
       {"HOW A JOB GOES", R"(
-`previz farm TAKE` opens the take and its set, so that a mistake in them is found now and not at night, divides the frames into chunks, and writes the folder of the job. That folder, the takes and the folder for the pictures must be seen by all machines at the same places. Then it submits one task per chunk and a last step to Slurm, and ends; no process of its own has to stay.
-Each task is `previz farm task`. It checks what can be known before the first frame: version, take, clock, room and device. Then it renders the frames of its chunk into a folder of the chunk's own, and writes into the job's folder where it runs and how it ended. A task that is started again continues where the one before it stopped, and two tasks of one chunk share its frames (on a disk without locks, see WITHOUT SLURM, one waits for the other).
-The last step, `previz farm finish`, runs after all tasks have ended, whichever way. It reads every file of every frame and compares its size and SHA-256 with the line that was written when it was rendered, and that the frames have the settings, the version and the kind of device of the job. What is whole it moves into the folder of the pictures. If every frame is there it makes the review video and removes the chunks' folders; otherwise it writes missing.json and ends with 75. Only its line "every frame is there and whole" means that the job is done.
+`previz farm TAKE` opens the take and its set, so that a mistake in them is found now and not at night, and writes the folder of the job. That folder, the takes and the folder for the pictures must be seen by all machines at the same places. Then it submits tasks and a last step to Slurm, and ends; no process of its own has to stay.
+All tasks are one command, `previz farm task`. It checks what can be known before the first frame: version, take, clock, room and device. Then it renders frames that no other process has into the folder of the pictures, as several `previz render` do that share one, until it has done its share (`--chunk`), and writes into the job's folder where it runs and how it ended. Which task renders which frame is not planned: a quick machine renders more, what a task leaves is free for the others, and a task that is started again or twice takes what is left.
+The last step, `previz farm finish`, runs after all tasks have ended, whichever way. It reads every file of every frame and compares its size and SHA-256 with the line that was written when it was rendered, and that the frames have the settings, the version and the kind of device of the job. If every frame is there it makes the review video; otherwise it writes missing.json and ends with 75. Only its line "every frame is there and whole" means that the job is done.
 The pictures are those of `previz render` on one machine, to the last bit, as long as all machines have the same kind of graphics card and the same driver, or all render on processors.
-Frames that were rendered before, in the same folder with the same settings, are kept. The set file that `--set` names, the overlay of `--with` and the files that they name are copied into the job's folder: they may be edited while the job runs. A take must not be changed meanwhile.
+Frames that were rendered before, in the same folder with the same settings and on the same kind of device, are kept. The set file that `--set` names, the overlay of `--with` and the files that they name are copied into the job's folder: they may be edited while the job runs. A take must not be changed meanwhile.
 )"},
       {"EXAMPLE", R"(
 previz farm takes/12A_take003 --out /film/renders/12A_take003 --nodes 3 --dry-run: In the evening, with a take and three machines: prints the plan, the scripts and the commands for Slurm, and writes nothing.
 previz farm takes/12A_take003 --out /film/renders/12A_take003 --nodes 3: Makes the job in /film/renders/12A_take003.farm and submits it.
 previz farm status /film/renders/12A_take003.farm: Says how many frames are done, which tasks run, which have failed, where and why, and about how long the rest takes.
-previz farm retry /film/renders/12A_take003.farm: In the morning, if frames are missing: checks all pictures, and submits only the tasks whose frames are missing or damaged.
+previz farm retry /film/renders/12A_take003.farm: In the morning, if frames are missing: checks all pictures, and submits tasks for the frames that are missing or damaged.
 previz farm cancel /film/renders/12A_take003.farm: Cancels what waits and runs. What is finished stays, and `previz farm retry` continues.
 previz farm takes/12A_take003 takes/12B_take001 --out /film/renders --gpu --partition night --time 4:00:00: Renders two takes in one job, each into a folder of its name, with a graphics card per task.
 previz farm takes/12A_take003 --cpu --nodes 20 --limit 10 --sbatch=--nice=100: Renders on processors, on at most ten machines at once, behind what others want.
@@ -23,7 +23,7 @@ previz farm takes/12A_take003 --frames 40 --spp 4096 --neighbours 0 --nodes 8: D
 )",
        true},
       {"HEAVY FRAMES", R"(
-Where there are fewer frames than machines, a frame's samples are divided into ranges, a task for each, and further tasks merge their sums into pictures. `--sample-ranges` sets their number: a power of two, at most 16. A range has at least 64 samples. Frames whose number of samples is not fixed (`--error`, `--seconds`, `--adaptive`) and frames that are averaged with their neighbours cannot be divided: give `--neighbours 0`.
+Where there are fewer frames than machines, a frame's samples are divided into ranges, and a task renders one. Whichever finds all sums of a frame merges them into its picture. `--sample-ranges` sets their number: a power of two, at most 16. A range has at least 64 samples. Frames whose number of samples is not fixed (`--error`, `--seconds`, `--adaptive`) and frames that are averaged with their neighbours cannot be divided: give `--neighbours 0`.
 The same without a job: `previz render TAKE --sample-range 1/2 --out first` on one machine, 2/2 on another, then `previz merge TAKE first second` with the same options. The merged picture is that of one run, to the last bit, if the machines have the same kind of graphics card and driver.
 )"},
       {"MACHINES THAT DIFFER", R"(
@@ -37,19 +37,18 @@ set: "the take, its set, or a file that it names was changed since the job was m
 folder: "is not beside the job's folder": a job that came from elsewhere does not choose where files are written. If it is yours, `--any-paths` allows it.
 )"},
       {"WITHOUT SLURM", R"(
-If there is no program sbatch, the job is written and the command for it printed: `bash JOB/loop.sh`, to be started on each machine, by hand, over ssh or by any scheduler, on as many machines as there are, and on further ones later. Each takes chunks that no other machine is at, waits at the end for those of the others, takes over what they do not finish, and does the last step. Started again, it continues.
-Machines know of each other by locks on files. Where the disk has none that other machines see (Lustre without `flock`, NFS with `nolock`, sshfs), each renews the time of its file in state/ instead, and a chunk whose machine has lost power is taken over three minutes later.
+If there is no program sbatch, the job is written and the command for it printed: `bash JOB/loop.sh`, to be started on each machine, by hand, over ssh or by any scheduler, on as many machines as there are, and on further ones later. Each renders until no frame is left, waits at the end for those of the others, takes over what they do not finish, and does the last step. Started again, it continues.
+Machines know of each other by locks on files. Where the disk has none that other machines see (Lustre without `flock`, NFS with `nolock`, sshfs), each renews the times of its files in render.leases, beside the pictures, and the frames of a machine that has lost power are taken over three minutes later.
 `--openjd FILE` writes the job as a template of Open Job Description (2023-09) instead, for schedulers that take it. The parameter JobFolder is the job's folder, Previzd the program on the machines.
 )"},
       {"IN THE MORNING", R"(
 `previz farm status JOB` first. If all frames are done it names the folder of the pictures, with review.mp4; look at the video.
-If frames are missing, missing.json and the log of the last step, log/finish.log, say which and why: "not begun", "stopped", a machine with its own words, "ended without a word" for one that lost power or was killed, or what is wrong with a file. `previz farm retry JOB` renders these and nothing else. It refuses while tasks of the job are running or waiting.
+If frames are missing, missing.json and the log of the last step, log/finish.log, say which and why: who is rendering them, what is wrong with a file, the words of the tasks that failed, or "not rendered" where no task has left a word: it lost power or was killed. `previz farm retry JOB` renders these and nothing else. It refuses while tasks of the job are running or waiting.
 )"},
       {"EXIT STATUS", R"(
 0: Done. A `task` has rendered its frames; to `finish` it means that every frame is there and whole.
 1: Error; one line says what is wrong. A `task` ends with it if the job is at fault, so that no machine can do it.
 2: The command line cannot be understood.
-66: A `task` that merges sample ranges ends with it if one of them was not rendered; Slurm does not start it again, and `retry` renders both.
 75: A `task` ends with it if the machine is at fault: another one, or a later time, mends it. `finish` does if frames are missing.
 128+N: Stopped by signal N. Finished frames are on disk, and the next start of the task continues there.
 )"},
@@ -57,11 +56,12 @@ If frames are missing, missing.json and the log of the last step, log/finish.log
 job.json: In the job's folder, as all of these: the plan, which is written once and read by every machine. It names no program.
 set/: The set file, the overlay and the files that the set names, if the command line named any.
 tasks.sh, finish.sh, loop.sh: What Slurm starts for a task and for the last step, and the script for people without a scheduler.
-chunks/0003/: The pictures of a chunk, until the last step has moved them.
-state/0003.json: What the task of that chunk said last: running, done, stopped, machine (at fault) or job (at fault), on which machine, since when, and why.
-state/finish.json: The same of the last step, or of a retry.
+sums/0000/3/: The sums of sample range 3 of the first take, until the last step has seen them merged.
+state/0003.json: What the task of that number said last, or the one of a machine, on-NAME.json: running, done, stopped, machine (at fault) or job (at fault), on which machine, since when, and why.
+state/finish.json: The same of the last step.
 log/0003.log, log/finish.log: What the tasks and the last step print under Slurm.
-submitted.json: Slurm's numbers of what was submitted last.
+submitted.txt: Slurm's numbers of what was submitted last.
+render.lock: Who is at work on the job. The last step and a retry are done by one process at a time.
 stopped.txt: Why no further task starts; `previz farm retry` removes it.
 missing.json: The frames that the last step found missing, with the reasons; there is none if none is missing.
 )",

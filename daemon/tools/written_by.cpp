@@ -108,11 +108,14 @@ void add_takes(const TakesCommands& commands, Places& places) {
   places.add_folder(commands.copied.folder);
 }
 
-// A job writes into its folder and the one that it lies in (check_paths()).
+// A job writes into its folder and those beside it (check_paths()).
 void add_job(const fs::path& job, bool any_paths, Places& places) {
   places.add(job);
-  for (const char* folder : {"", "state", "chunks"}) places.add_folder(job / folder);
-  places.add_folders_in(job / "chunks");
+  for (const char* folder : {"", "state"}) places.add_folder(job / folder);
+  std::error_code unreadable;
+  for (const auto& take : fs::directory_iterator(job / "sums", unreadable))
+    places.add_folders_in(take.path());
+  places.add_folders_in(job / "..");
   if (any_paths) places.add_everything();
 }
 

@@ -126,7 +126,7 @@ has_begun() {
   local task finished
   task=$(task_on "$1")
   [[ -n $task ]] || return 1
-  finished=$(find "$job/chunks/$(printf %04d "$task")" -name '*.exr' ! -name '.*' 2>/dev/null | wc -l)
+  finished=$(grep --count '^frame .*samples in' "$job/log/$(printf %04d "$task").log")
   ((finished >= 1 && finished < $2))
 }
 

@@ -75,7 +75,8 @@ std::string meant_option(const CLI::App& app) {
 void add_check(CLI::App& app, check::CheckOptions& options) {
   CLI::App& command =
       *app.add_subcommand("check", "List the mistakes in a set file or, if none, what it needs");
-  command.add_option("set", options.set_or_session, "Set file or session folder")->required();
+  command.add_option("set-or-session", options.set_or_session, "Set file or session folder")
+      ->required();
   command.add_option("--set", options.set_file, "Set file, instead of the session's own");
 }
 

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "daemon/tools/farm/finish.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::farm {
@@ -35,7 +36,7 @@ void add_division(CLI::App& farm, FarmOptions& options) {
       ->check(CLI::Range(1, 100'000))
       ->capture_default_str();
   farm.add_option("--chunk", options.division.chunk,
-                  "Frames per task (default: by --nodes, at most 64)")
+                  "Frames that a task renders at most (default: by --nodes, at most 64)")
       ->check(CLI::Range(1, 1'000'000));
   farm.add_option(
           "--sample-ranges", options.division.sample_ranges,
@@ -92,18 +93,23 @@ void add_farm(CLI::App& app, Commands& commands,
   status.add_flag("--json", commands.job.json, "Print it as JSON");
   add_job_command(farm, "cancel", "Cancel the tasks that run or wait", commands.job.job);
   CLI::App& retry = add_job_command(
-      farm, "retry", "Submit the tasks whose frames are missing or damaged", commands.job.job);
+      farm, "retry", "Submit tasks for the frames that are missing or damaged", commands.job.job);
   add_any_place(retry, commands.job.any_paths);
   add_wishes(retry, commands.job.wishes);
   add_program_options(retry, commands.job.program, commands.job.sbatch);
   retry.footer(
       "--limit, --partition, --time and --mem are those of the first submission unless they are "
       "given; --program and --sbatch are not remembered, and are given again.");
-  CLI::App& task = add_job_command(farm, "task", "Render one chunk of a job, as each task does",
-                                   commands.task.job);
-  task.add_option("number", commands.task.chunk, "Number of the chunk")->required();
-  task.add_flag("--not-if-taken", commands.task.not_if_taken,
-                "Leave frames alone that another machine is rendering, and do not wait for them");
+  CLI::App& task = add_job_command(
+      farm, "task", "Render frames of a job that no other task has, as each of its tasks does",
+      commands.task.job);
+  task.add_option(
+          "number", commands.task.number,
+          "Number of the task, which ends with its share of the frames (default: it renders "
+          "until none is left)")
+      ->check(CLI::Range(0, 1'000'000));
+  // In the loop of a job of an earlier previz.
+  task.add_flag("--not-if-taken")->group("");
   add_any_place(task, commands.task.any_paths);
   CLI::App& finish = add_job_command(
       farm, "finish", "Prove that every frame is there and whole, and make the review video",

@@ -1,15 +1,11 @@
 #include "daemon/tools/farm/farm.hpp"
 
 #include <algorithm>
-#include <optional>
 #include <ostream>
-#include <set>
 
 #include "daemon/core/session/draft.hpp"
 #include "daemon/core/session/files.hpp"
 #include "daemon/tools/farm/finish.hpp"
-#include "daemon/tools/farm/job_lock.hpp"
-#include "daemon/tools/farm/machine.hpp"
 #include "daemon/tools/farm/plan.hpp"
 #include "daemon/tools/farm/scripts.hpp"
 #include "daemon/tools/farm/slurm.hpp"
@@ -60,17 +56,15 @@ class NewFolder {
     make_folder(options, folder, job);
     // What an earlier job in this folder has left would be taken for this one's.
     std::error_code stays;
-    for (const std::filesystem::path& file :
-         {folder.stopped_file(), folder.missing_file(), folder.path() / "submitted.json",
-          folder.finish_state_file()})
-      std::filesystem::remove(file, stays);
-    for (std::size_t chunk = 0; chunk < job.chunks.size() && was_there_; ++chunk)
-      std::filesystem::remove(folder.state_file(chunk), stays);
+    folder.forget_states();
+    std::filesystem::remove(folder.submitted_file(), stays);
+    std::filesystem::remove_all(folder.place("sums"), stays);
   }
   NewFolder(const NewFolder&) = delete;
   NewFolder& operator=(const NewFolder&) = delete;
   ~NewFolder() {
-    if (is_kept_ || may_be_queued()) return;
+    if (is_kept_ || was_submitted(folder_))
+      return;  // what could not be taken back is canceled by it
     std::error_code stays;
     std::filesystem::remove(folder_.plan(), stays);
     if (!was_there_) std::filesystem::remove_all(folder_.path(), stays);
@@ -78,51 +72,27 @@ class NewFolder {
   void keep() { is_kept_ = true; }
 
  private:
-  // What could not be taken back is canceled by its folder.
-  bool may_be_queued() const {
-    try {
-      const Submitted submitted = folder_.read_submitted();
-      return !submitted.tasks.empty() || submitted.finish.has_value();
-    } catch (const Error&) {
-      return true;
-    }
-  }
-
   const JobFolder& folder_;
   const bool was_there_;
   bool is_kept_ = false;
 };
 
-std::uint64_t frames_of(const Job& job) {
-  std::uint64_t frames = 0;
-  for (const JobTake& take : job.takes) frames += length_of(take.frames);
-  return frames;
-}
-
 void print_plan(const Job& job, const JobFolder& folder, const Division& division,
                 std::ostream& out) {
-  out << folder.path().string() << ": " << frames_of(job)
-      << (frames_of(job) == 1 ? " frame of " : " frames of ") << job.takes.size()
-      << (job.takes.size() == 1 ? " take" : " takes") << " in " << job.first_merge()
-      << (job.first_merge() == 1 ? " task" : " tasks");
-  if (!division.chunk && job.first_merge() < static_cast<std::size_t>(division.machines))
+  const std::uint64_t frames = job.frames(), tasks = job.tasks(frames);
+  out << folder.path().string() << ": " << frames << (frames == 1 ? " frame of " : " frames of ")
+      << job.takes.size() << (job.takes.size() == 1 ? " take" : " takes") << " in " << tasks
+      << (tasks == 1 ? " task" : " tasks");
+  if (!division.chunk && tasks < static_cast<std::uint64_t>(division.machines))
     out << " (fewer than --nodes " << division.machines
         << ", because a task of few frames also renders their neighbours, with which pictures are "
            "averaged; --chunk 2 divides it all the same)";
-  if (job.sample_ranges > 1)
-    out << ", each frame in " << job.sample_ranges << " sample ranges, and "
-        << job.chunks.size() - job.first_merge() << " more that merge them";
+  if (job.sample_ranges > 1) out << ", each frame in " << job.sample_ranges << " sample ranges";
   out << ", on "
       << (job.any_device ? "whatever device there is"
           : job.on_gpu   ? "a graphics card each"
                          : "processors (--gpu asks for graphics cards)")
       << std::endl;
-}
-
-// Frames that were rendered before with the same settings are not rendered again.
-std::set<std::size_t> chunks_to_do(const JobFolder& folder, const Job& job, std::ostream& out,
-                                   const std::stop_token& stop) {
-  return prove(folder, job, Foreign::keep, out, stop).chunks;
 }
 
 // Forgets what is finished, once for the whole job: no task does it again (`--force`).
@@ -147,24 +117,16 @@ void refuse_where_others_wait(const JobFolder& folder) {
 }
 
 void refuse_while_queued(const JobStatus& status, const JobFolder& folder) {
-  if (!status.is_queued && status.running == 0) return;
+  if (!status.is_queued && status.count(TaskPhase::running) == 0) return;
   throw Error(folder.path().string() +
               ": tasks are still running or waiting; wait for them (`previz farm status`), or "
               "cancel them first (`previz farm cancel`)");
 }
 
-void refuse_under_another_name(const JobStatus& status, const JobFolder& folder) {
-  if (status.others.empty()) return;
-  throw Error(folder.path().string() + ": its jobs " + status.others +
-              " are in the queue under another name, as they are where the folder was moved since; "
-              "look at them by `squeue --jobs=" +
-              status.others + "`, and cancel them, or wait until they have ended");
-}
-
 void hand_over(const FarmOptions& options, const JobFolder& folder, const Job& job,
-               const std::set<std::size_t>& chunks, bool uses_slurm, std::ostream& out) {
+               std::uint64_t frames, bool uses_slurm, std::ostream& out) {
   if (uses_slurm)
-    submit_chunks(folder, job, chunks, options.sbatch, out);
+    submit_tasks(folder, job, job.tasks(frames), options.sbatch, out);
   else if (options.openjd)
     out << options.openjd->string() << ": submit it to a scheduler that takes Open Job Descriptions"
         << std::endl;
@@ -199,17 +161,18 @@ void submit(const FarmOptions& options, std::ostream& out) {
   const bool uses_slurm = !options.openjd && has_slurm();
   NewFolder made(options, folder, job);
   if (uses_slurm) refuse_where_others_wait(folder);
-  write_scripts(folder, job, places);
+  write_scripts(folder, places);
   if (options.render.force) forget_finished(job, options.stop);
-  const std::set<std::size_t> to_do = chunks_to_do(folder, job, out, options.stop);
-  if (to_do.empty()) {
+  // Frames that were rendered before with the same settings are not rendered again.
+  const Proof there = prove(folder, job, Foreign::refuse, out, options.stop);
+  if (there.missing.empty()) {
     complete(folder, job, out);
     out << "all of these frames are rendered already, with these settings" << std::endl;
     return;
   }
   if (options.openjd)
     session::replace_file(*options.openjd, openjd_template(places, job, folder.name()));
-  hand_over(options, folder, job, to_do, uses_slurm, out);
+  hand_over(options, folder, job, there.missing_frames(), uses_slurm, out);
   made.keep();
 }
 
@@ -218,7 +181,7 @@ void print_status(const JobOptions& options, std::ostream& out) {
   const Job job = folder.read_plan();
   const JobStatus status = status_of(folder, job);
   if (options.json)
-    print_json(job, status, out);
+    print_json(status, out);
   else
     print_words(folder, job, status, options.terminal, out);
 }
@@ -232,7 +195,8 @@ void cancel(const JobOptions& options, std::ostream& out) {
         folder.path().string() +
         ": was not submitted to Slurm; end loop.sh, or what else renders it, where it runs");
   if (queued_tasks(folder).empty()) {
-    out << folder.path().string() << ": nothing is in the queue" << std::endl;
+    out << folder.path().string() << ": nothing is in the queue under the job's name, "
+        << folder.name() << std::endl;
     return;
   }
   session::replace_file(folder.stopped_file(), "`previz farm cancel`\n");
@@ -248,57 +212,21 @@ void retry(const JobOptions& options, std::ostream& out) {
   check_paths(folder, job, options.any_paths);
   const JobStatus status = status_of(folder, job);
   refuse_while_queued(status, folder);
-  refuse_under_another_name(status, folder);
-  std::error_code stays;
-  std::filesystem::remove(folder.stopped_file(), stays);
-  JobLock lock(folder, this_machine().host, out, options.stop);
+  const JobLock lock(folder, out, options.stop);
   const Proof proof = prove(folder, job, Foreign::forget, out, options.stop);
+  folder.forget_states();
   write_missing(folder, job, proof);
   print_missing(folder, job, proof, out);
-  const ScriptPlaces places = places_of(folder, job, options.program);
-  write_scripts(folder, job, places);
-  if (!proof.missing.empty()) lock.end_without_word();
+  write_scripts(folder, places_of(folder, job, options.program));
   if (proof.missing.empty()) {
     complete(folder, job, out);
-    lock.end(TaskOutcome::done, "");
+    folder.write_state(finish_name, state_now(TaskOutcome::done, post::host_name(), ""));
     out << folder.path().string() << ": every frame is there and whole" << std::endl;
   } else if (has_slurm()) {
-    submit_chunks(folder, job, proof.chunks, options.sbatch, out);
+    submit_tasks(folder, job, job.tasks(proof.missing_frames()), options.sbatch, out);
   } else {
     out << "start this on each machine:\n  bash " << shell_word(folder.loop_script().string())
         << std::endl;
-  }
-}
-
-int finish(const JobOptions& options, std::ostream& out) {
-  const JobFolder folder(options.job);
-  Job job = folder.read_plan();
-  job.any_device |= options.any_device;
-  check_paths(folder, job, options.any_paths);
-  std::optional<JobLock> lock;  // what only waits for it has nothing to say of the last step
-  const auto end = [&](TaskOutcome outcome, const std::string& message) {
-    if (lock) lock->end(outcome, message);
-  };
-  try {
-    lock.emplace(folder, this_machine().host, out, options.stop);
-    int status = task_status::done;
-    if (lock->is_complete())
-      out << folder.path().string() << ": another machine has just done the last step" << std::endl;
-    else
-      status = run_finish(folder, job, out, options.stop);
-    const bool is_done = status == task_status::done;
-    end(is_done ? TaskOutcome::done : TaskOutcome::machine, is_done ? "" : "frames are missing");
-    return status;
-  } catch (const JobFault&) {
-    throw;
-  } catch (const std::exception& error) {
-    out << error.what() << std::endl;
-    try {
-      end(TaskOutcome::machine, error.what());
-    } catch (const Error& full) {
-      out << full.what() << std::endl;
-    }
-    return task_status::machine_fault;
   }
 }
 

@@ -19,10 +19,8 @@ void print_status(const JobOptions& options, std::ostream& out);
 // Cancels what is in the queue or runs, and stops the job, so that no task begins. What is finished
 // stays. Throws previz::Error if the job was not handed to Slurm.
 void cancel(const JobOptions& options, std::ostream& out);
-// Submits the tasks of the frames that are missing or not whole, or makes the review videos if none
+// Submits tasks for the frames that are missing or not whole, or makes the review videos if none
 // is. Throws previz::Error while tasks are in the queue.
 void retry(const JobOptions& options, std::ostream& out);
-// Does the last step (finish.hpp); returns the exit status of `previz farm finish`.
-int finish(const JobOptions& options, std::ostream& out);
 
 }  // namespace previz::farm

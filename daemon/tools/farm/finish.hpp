@@ -1,16 +1,16 @@
-// The last step of a job: moves what the tasks have made into the folder of finished pictures, and
-// proves that every frame is there and whole.
+// The last step of a job: proves that every frame is there and whole, and completes what goes
+// beside them.
 #pragma once
 
 #include <cstdint>
 #include <iosfwd>
-#include <set>
+#include <map>
 #include <stop_token>
 #include <string>
 #include <vector>
 
-#include "daemon/tools/farm/folder.hpp"
-#include "daemon/tools/farm/job.hpp"
+#include "daemon/tools/farm/options.hpp"
+#include "daemon/tools/post/folder_locks.hpp"
 
 namespace previz::farm {
 
@@ -22,26 +22,26 @@ struct MissingFrames {
 };
 
 // What becomes of frames that another kind of device rendered, where the plan does not allow it:
-// they stay where they are, or are forgotten, so that a task renders them again.
-enum class Foreign { keep, forget };
+// they are missing and stay where they are, or are forgotten, so that a task renders them again, or
+// the job is refused.
+enum class Foreign { keep, forget, refuse };
 
 struct Proof {
   std::vector<MissingFrames> missing;
-  std::set<std::size_t> chunks;  // that have a missing frame, and those that they are merged of
   // Remarks that stop nothing: pictures of several models of graphics cards.
   std::vector<std::string> notes;
+
+  std::uint64_t missing_frames() const;
 };
 
 // Looks at every file of every frame, by the SHA-256 in its line; what is not whole is no longer
-// finished. Chunks that a process is at stay as they are, and so do frames of other settings, of
-// another version or, unless the plan allows it, of another kind of device: these are missing. A
-// process that only looks at a chunk whose frames are all there is waited for.
-// Throws previz::Error where a folder cannot be read or written, or on a stop.
+// finished, nor are sums of frames that are missing. Frames that a process is rendering and, unless
+// the plan allows it, those of another kind of device are missing. Throws previz::Error where a
+// folder cannot be read or written, on a stop, or for Foreign::refuse.
 Proof prove(const JobFolder& folder, const Job& job, Foreign foreign, std::ostream& out,
             const std::stop_token& stop);
 
-// Writes the review videos of the takes and removes what is left of the chunks, but of those that a
-// process is at: it finds them finished, and in the loop removes them with its own last step.
+// Writes the review videos of the takes and removes the sums that were merged.
 void complete(const JobFolder& folder, const Job& job, std::ostream& out);
 
 // Writes JOB/missing.json, or removes it if nothing is missing.
@@ -49,9 +49,22 @@ void write_missing(const JobFolder& folder, const Job& job, const Proof& proof);
 // Prints what is missing, a line a reason.
 void print_missing(const JobFolder& folder, const Job& job, const Proof& proof, std::ostream& out);
 
-// Does the whole last step, within a JobLock: proves the frames, and completes the job if none is
-// missing. Returns a status of task_status, or throws as prove() does.
-int run_finish(const JobFolder& folder, const Job& job, std::ostream& out,
-               const std::stop_token& stop);
+// As long as it lives, no other process does the last step of the job, or a retry.
+class JobLock {
+ public:
+  // Waits until no other process has it, and says so; throws previz::Error on a stop.
+  JobLock(const JobFolder& folder, std::ostream& out, const std::stop_token& stop);
+
+  // Returns whether another process had it first.
+  bool has_waited() const { return has_waited_; }
+
+ private:
+  post::FolderLocks locks_;
+  bool has_waited_ = false;
+};
+
+// Does the last step: proves the frames, and completes the job if none is missing. JOB/state says
+// how it ends. Returns a status of task_status; throws JobFault.
+int finish(const JobOptions& options, std::ostream& out);
 
 }  // namespace previz::farm

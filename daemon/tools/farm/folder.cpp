@@ -1,12 +1,13 @@
 #include "daemon/tools/farm/folder.hpp"
 
-#include <fcntl.h>
 #include <fmt/chrono.h>
+#include <fmt/format.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cerrno>
 #include <ctime>
 #include <nlohmann/json.hpp>
@@ -15,15 +16,13 @@
 #include "daemon/core/session/draft.hpp"
 #include "daemon/core/session/files.hpp"
 #include "daemon/core/session/json_numbers.hpp"
-#include "daemon/tools/farm/signs_of_life.hpp"
-#include "drivers/descriptor.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::farm {
 namespace {
 
 constexpr std::array<const char*, 5> outcomes{"running", "done", "stopped", "machine", "job"};
-// A job of a million chunks takes less, and so does any state or reason.
+// A job of a thousand takes takes less, and so does any state or reason.
 constexpr session::FileKind plan_kind{"a job's plan", 1 << 27},
     state_kind{"a state of a job", 1 << 16};
 
@@ -53,22 +52,25 @@ TaskState state_now(TaskOutcome outcome, const std::string& host, const std::str
           on_one_line(message)};
 }
 
-JobFolder::JobFolder(const std::filesystem::path& folder) : JobFolder(folder, post::call_fcntl) {}
+// A machine's name comes from elsewhere, and is part of a file's.
+std::string task_name(std::optional<std::uint64_t> number, const std::string& host) {
+  if (number) return fmt::format("{:04}", *number);
+  std::string name = "on-" + host;
+  for (char& c : name)
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '.') c = '_';
+  return name;
+}
 
-JobFolder::JobFolder(const std::filesystem::path& folder, LockCall call)
-    : call_(call), path_(std::filesystem::absolute(folder).lexically_normal()) {
+JobFolder::JobFolder(const std::filesystem::path& folder)
+    : path_(std::filesystem::absolute(folder).lexically_normal()) {
   if (!path_.has_filename()) path_ = path_.parent_path();  // "JOB/"
   std::error_code unknown;
   const std::filesystem::path real = std::filesystem::weakly_canonical(path_, unknown);
   if (!unknown) path_ = real;
 }
 
-std::filesystem::path JobFolder::chunk(std::size_t chunk) const {
-  return path_ / "chunks" / chunk_number(chunk);
-}
-
-std::filesystem::path JobFolder::state_file(std::size_t chunk) const {
-  return path_ / "state" / (chunk_number(chunk) + ".json");
+std::filesystem::path JobFolder::sums(std::size_t take, int range) const {
+  return path_ / "sums" / fmt::format("{:04}", take) / std::to_string(range);
 }
 
 Job JobFolder::read_plan() const {
@@ -94,29 +96,15 @@ void JobFolder::refuse_links() const {
                      ": is a link, or no folder, by which files would be written elsewhere; "
                      "remove it, or make the job again");
   };
-  for (const char* name : {"chunks", "log", "set", "set/with", "state"}) refuse(path_ / name);
+  for (const char* name : {"log", "set", "set/with", "state", "sums"}) refuse(path_ / name);
   std::error_code unreadable;
-  for (const auto& entry : std::filesystem::directory_iterator(path_ / "chunks", unreadable))
-    refuse(entry.path());
+  for (std::filesystem::recursive_directory_iterator entry(path_ / "sums", unreadable), end;
+       !unreadable && entry != end; entry.increment(unreadable))
+    if (entry.depth() < 2) refuse(entry->path());
 }
 
-std::optional<TaskState> JobFolder::read_state(std::size_t chunk) const {
-  return read_state_in(state_file(chunk));
-}
-
-void JobFolder::write_state(std::size_t chunk, const TaskState& state) const {
-  write_state_in(state_file(chunk), state);
-}
-
-std::optional<TaskState> JobFolder::read_finish_state() const {
-  return read_state_in(finish_state_file());
-}
-
-void JobFolder::write_finish_state(const TaskState& state) const {
-  write_state_in(finish_state_file(), state);
-}
-
-std::optional<TaskState> JobFolder::read_state_in(const std::filesystem::path& file) const {
+std::optional<TaskState> JobFolder::read_state(const std::string& task) const {
+  const std::filesystem::path file = path_ / "state" / (task + ".json");
   if (!is_there(file)) return std::nullopt;
   try {
     const auto json = nlohmann::json::parse(session::read_plain_file(file, state_kind));
@@ -128,77 +116,44 @@ std::optional<TaskState> JobFolder::read_state_in(const std::filesystem::path& f
     state.pid = session::number_at<std::int64_t>(json, "pid");
     json.at("since").get_to(state.since);
     json.at("message").get_to(state.message);
-    state.alone = json.value("alone", false);
     return state;
-  } catch (const Error&) {
-    throw;
   } catch (const std::exception&) {
     return std::nullopt;  // written by hand, or on a disk that was full
   }
 }
 
-void JobFolder::write_state_in(const std::filesystem::path& file, const TaskState& state) const {
-  nlohmann::ordered_json json{{"outcome", name_of(state.outcome)},
-                              {"host", state.host},
-                              {"pid", state.pid},
-                              {"since", state.since},
-                              {"message", state.message}};
-  if (!has_locks()) json["alone"] = true;
-  session::replace_file(file, text_of(json));
-}
-
-void JobFolder::remove_finish_state() const {
-  std::error_code stays;
-  std::filesystem::remove(finish_state_file(), stays);
-}
-
-Submitted JobFolder::read_submitted() const {
-  const std::filesystem::path file = path_ / "submitted.json";
-  if (!is_there(file)) return {};
-  try {
-    const auto json = nlohmann::json::parse(session::read_plain_file(file, state_kind));
-    Submitted submitted;
-    submitted.tasks = session::numbers_of<std::uint64_t>(json.at("tasks"));
-    if (json.contains("finish"))
-      submitted.finish = session::number_at<std::uint64_t>(json, "finish");
-    return submitted;
-  } catch (const Error&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw Error(file.string() + ": cannot be understood: " + error.what());
+std::map<std::string, TaskState> JobFolder::read_states() const {
+  std::map<std::string, TaskState> states;
+  std::error_code gone;
+  for (std::filesystem::directory_iterator entry(path_ / "state", gone), end; !gone && entry != end;
+       entry.increment(gone)) {
+    const std::filesystem::path& file = entry->path();
+    if (file.extension() != ".json" || file.stem() == finish_name) continue;
+    if (auto state = read_state(file.stem().string())) states[file.stem()] = *std::move(state);
   }
+  return states;
 }
 
-void JobFolder::write_submitted(const Submitted& submitted) const {
-  nlohmann::ordered_json json{{"tasks", submitted.tasks}};
-  if (submitted.finish) json["finish"] = *submitted.finish;
-  session::replace_file(path_ / "submitted.json", text_of(json));
+void JobFolder::write_state(const std::string& task, const TaskState& state) const {
+  session::replace_file(path_ / "state" / (task + ".json"),
+                        text_of({{"outcome", name_of(state.outcome)},
+                                 {"host", state.host},
+                                 {"pid", state.pid},
+                                 {"since", state.since},
+                                 {"message", state.message}}));
+}
+
+void JobFolder::forget_states() const {
+  std::error_code stays, gone;
+  for (std::filesystem::directory_iterator entry(path_ / "state", gone), end; !gone && entry != end;
+       entry.increment(gone))
+    if (entry->path().extension() == ".json") std::filesystem::remove(entry->path(), stays);
+  for (const std::filesystem::path& file : {stopped_file(), missing_file()})
+    std::filesystem::remove(file, stays);
 }
 
 std::string JobFolder::read_stopped() const {
   return is_there(stopped_file()) ? session::read_plain_file(stopped_file(), state_kind) : "";
-}
-
-bool JobFolder::has_locks() const {
-  const OwnedDescriptor file(
-      ::open(plan().c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  return !file || post::why_others_are_not_seen(file.get(), path_, call_).empty();
-}
-
-std::optional<TaskState> JobFolder::living(const std::filesystem::path& state_file) const {
-  std::optional<TaskState> state = read_state_in(state_file);
-  const bool is_alive = state && state->outcome == TaskOutcome::running &&
-                        (state->alone || !has_locks()) && has_signs_of_life(state_file);
-  return is_alive ? state : std::nullopt;
-}
-
-std::optional<TaskState> JobFolder::living_finish() const {
-  return living(finish_state_file());
-}
-
-Taken JobFolder::taken(std::size_t chunk) const {
-  if (post::is_in_use(this->chunk(chunk), call_)) return Taken::shared;
-  return living(state_file(chunk)) ? Taken::alone : Taken::no;
 }
 
 post::RenderOptions JobFolder::render_options(const Job& job, const JobTake& take) const {
@@ -211,6 +166,7 @@ post::RenderOptions JobFolder::render_options(const Job& job, const JobTake& tak
   options.exr = take.exr;
   options.png = take.png;
   options.video = take.video;
+  options.directory = take.pictures;
   return options;
 }
 

@@ -1,4 +1,5 @@
-// The plan of a job: which frames of which takes are rendered in which chunk, with which settings.
+// The plan of a job: which frames of which takes are rendered, with which settings, and how many of
+// them by each task. Every task is the same command: it takes frames that no other has.
 // It is written once, as JOB/job.json, and every machine reads it. It may come from elsewhere, so
 // that what is read is data: nothing in it names a program or an argument of one.
 #pragma once
@@ -7,9 +8,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "daemon/tools/post/finished_frame.hpp"
@@ -36,20 +35,6 @@ struct JobTake {
   bool hardware_rays = true;      // quality.hardware_rays of its set
 };
 
-// What a task makes of its frames.
-enum class ChunkKind {
-  pictures,  // what `previz render` makes
-  sums,      // the sums of one sample range of every frame
-  merge      // the pictures of sums that other chunks made
-};
-
-struct Chunk {
-  std::size_t take = 0;  // index in Job::takes
-  post::FrameRange frames;
-  ChunkKind kind = ChunkKind::pictures;
-  int range = 0;  // of ChunkKind::sums: from 1 to Job::sample_ranges; otherwise 0
-};
-
 // What Slurm is asked for, in the words of sbatch(1). Empty: not asked for.
 struct Wishes {
   int at_once = 0;  // tasks; 0: as many as there are machines
@@ -66,43 +51,36 @@ struct Job {
   std::map<std::string, std::string> set_assets;  // as the set writes them: place in the folder
   bool on_gpu = false;                            // every frame is rendered on a graphics card
   bool any_device = false;                        // or on whatever there is
-  int sample_ranges = 1;
+  int sample_ranges = 1;                          // that each frame's samples are rendered in
+  std::uint64_t share = 1;  // frames, or sample ranges of frames, that a task renders at most
   Wishes wishes;
   std::vector<JobTake> takes;
-  std::vector<Chunk> chunks;  // those of ChunkKind::merge come last
 
-  // Returns the number of chunks that need no other.
-  std::size_t first_merge() const;
+  std::uint64_t frames() const;
+  // Returns how many tasks render so many frames.
+  std::uint64_t tasks(std::uint64_t frames) const;
 };
 
 // These write the plan as JSON and read it back. job_from_json() throws JobFault that begins with
-// `name` and says what is wrong: not JSON, of another format, a number out of its range, or chunks
-// that are not the frames of the takes, each once.
+// `name` and says what is wrong: not JSON, of another format, or a number out of its range.
 std::string to_json(const Job& job);
 Job job_from_json(const std::string& text, const std::string& name);
 
 // Returns the number of frames in a range.
 std::uint64_t length_of(const post::FrameRange& range);
-// Returns the number of the chunk as its folder and its log have it: at least four digits.
-std::string chunk_number(std::size_t chunk);
-// Returns "frames 12 to 15 of 12A_take003", "frame 7 of 12A_take003, sample range 2 of 4".
-std::string words_of(const Job& job, const Chunk& chunk);
-
 // What is asked for when frames are divided.
 struct Division {
   int machines = 8;                    // that share the work
   std::optional<std::uint64_t> chunk;  // frames; absent: by the number of machines
   std::optional<int> sample_ranges;    // of each frame; absent: by the number of machines
   int most_sample_ranges = 1;          // that the settings allow
-  bool averages_neighbours = false;    // long chunks render fewer frames twice
+  bool averages_neighbours = false;    // a task of many frames renders fewer of them twice
 };
 
 // Returns into how many sample ranges each of this number of frames is best divided: 1, unless
 // there are fewer frames than machines.
 int sample_ranges_for(const Division& division, std::uint64_t frames);
-// Appends the chunks of these frames of a take: runs of frames without a gap, all but the
-// last one of a run of the same length.
-void divide(const std::set<std::uint64_t>& frames, std::size_t take, int sample_ranges,
-            const Division& division, std::vector<Chunk>& chunks);
+// Returns how many of the frames, each in so many sample ranges, a task renders at most.
+std::uint64_t share_for(const Division& division, std::uint64_t frames, int sample_ranges);
 
 }  // namespace previz::farm

@@ -1,12 +1,9 @@
 #include "daemon/tools/farm/machine.hpp"
 
-#include <unistd.h>
-
-#include <array>
 #include <cstdlib>
 #include <ctime>
 
-#include "daemon/tools/farm/signs_of_life.hpp"
+#include "daemon/tools/post/folder_locks.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::farm {
@@ -15,11 +12,6 @@ namespace {
 // Clocks that anybody sets are closer, and a larger difference would mix up the order of what
 // happened.
 constexpr std::int64_t most_clock_difference_s = 60;
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
-}
 
 bool can_be_seen(const std::filesystem::path& file) {
   std::error_code unknown;
@@ -46,7 +38,7 @@ std::string why_no_room(const std::filesystem::path& path, std::uint64_t needed,
 }
 
 std::string why_wrong_clock(const Machine& machine, const JobFolder& folder) {
-  const std::int64_t behind = time_of_disk_s(folder.place("state")) - machine.now_s();
+  const std::int64_t behind = post::time_of_disk_s(folder.place("state")) - machine.now_s();
   if (std::abs(behind) <= most_clock_difference_s) return "";
   return "the clock here is " + std::to_string(std::abs(behind)) + " s " +
          (behind > 0 ? "behind" : "ahead of") + " that of the job's disk; set it (timedatectl)";
@@ -56,9 +48,7 @@ std::string why_wrong_clock(const Machine& machine, const JobFolder& folder) {
 
 Machine this_machine() {
   Machine machine;
-  // A cluster may know a machine by another name than its own.
-  const char* const node = std::getenv("SLURMD_NODENAME");
-  machine.host = node && *node ? node : host_name();
+  machine.host = post::host_name();
   machine.software = "previzd " PREVIZ_VERSION;
   machine.now_s = [] { return static_cast<std::int64_t>(std::time(nullptr)); };
   machine.free_bytes = [](const std::filesystem::path& folder) {
@@ -73,9 +63,8 @@ Machine this_machine() {
   return machine;
 }
 
-std::string why_not_here(const JobFolder& folder, const Job& job, const Chunk& chunk,
+std::string why_not_here(const JobFolder& folder, const Job& job, const JobTake& take,
                          const Machine& machine) {
-  const JobTake& take = job.takes.at(chunk.take);
   if (machine.software != job.software)
     return machine.software + " is installed here, and the job was made with " + job.software +
            ", whose pictures may differ; install that one";

@@ -25,10 +25,10 @@ struct Machine {
 
 Machine this_machine();
 
-// Returns what keeps this machine from the chunk, as one sentence that says what to do; empty:
-// nothing. Looked at are the version, the take and the set, the room on the disks of the job and of
-// the pictures, and the clock, which must be within a minute of that of the job's disk.
-std::string why_not_here(const JobFolder& folder, const Job& job, const Chunk& chunk,
+// Returns what keeps this machine from a take of the job, as one sentence that says what to do;
+// empty: nothing. Looked at are the version, the take and the set, the room on the disks of the job
+// and of the pictures, and the clock, which must be within a minute of that of the job's disk.
+std::string why_not_here(const JobFolder& folder, const Job& job, const JobTake& take,
                          const Machine& machine);
 
 // Opens the device that the job wants for a take; throws previz::Error that says what is missing

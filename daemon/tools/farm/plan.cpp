@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <ctime>
 #include <memory>
-#include <ostream>
-#include <set>
 
 #include "daemon/core/pipeline/preview_size.hpp"
 #include "daemon/core/pipeline/refinement.hpp"
@@ -64,13 +62,6 @@ post::RenderOptions options_of(const FarmOptions& options, const std::filesystem
   return one;
 }
 
-std::set<std::uint64_t> all_of(const post::FrameRange& range) {
-  std::set<std::uint64_t> frames;
-  for (std::uint64_t frame = range.first; frame <= range.last; ++frame)
-    frames.insert(frames.end(), frame);
-  return frames;
-}
-
 std::string place_of_asset(const std::filesystem::path& file) {
   return "set/" + session::sha256_of(file).substr(0, 16) + file.extension().string();
 }
@@ -99,9 +90,7 @@ void add_set(const FarmOptions& options, const post::RenderPlan& plan, Job& job)
     job.set_assets[as_written] = place_of_asset(file);
 }
 
-void add_chunks(const FarmOptions& options, const std::vector<set::Quality>& qualities, Job& job) {
-  std::uint64_t frames = 0;
-  for (const JobTake& take : job.takes) frames += length_of(take.frames);
+void divide(const FarmOptions& options, const std::vector<set::Quality>& qualities, Job& job) {
   Division division = options.division;
   division.most_sample_ranges = 1024;
   for (const set::Quality& quality : qualities) {
@@ -111,11 +100,8 @@ void add_chunks(const FarmOptions& options, const std::vector<set::Quality>& qua
         std::min(division.most_sample_ranges, most_sample_ranges(quality));
     division.averages_neighbours |= post::neighbours_of(quality) > 0;
   }
-  job.sample_ranges = sample_ranges_for(division, frames);
-  for (std::size_t i = 0; i < job.takes.size(); ++i)
-    divide(all_of(job.takes[i].frames), i, job.sample_ranges, division, job.chunks);
-  std::stable_partition(job.chunks.begin(), job.chunks.end(),
-                        [](const Chunk& chunk) { return chunk.kind != ChunkKind::merge; });
+  job.sample_ranges = sample_ranges_for(division, job.frames());
+  job.share = share_for(division, job.frames(), job.sample_ranges);
 }
 
 }  // namespace
@@ -143,7 +129,7 @@ Job make_job(const FarmOptions& options) {
                     " would have their pictures in one folder, " + added.pictures.string() +
                     "; give another one with --out, or make a job of each");
   }
-  add_chunks(options, qualities, job);
+  divide(options, qualities, job);
   return job;
 }
 
@@ -152,8 +138,7 @@ void make_folder(const FarmOptions& options, const JobFolder& folder, const Job&
     throw Error(folder.path().string() +
                 ": a job is there already; `previz farm status` says how it goes, `previz farm "
                 "retry` renders what it is missing, and --job gives another folder");
-  for (const char* name : {"chunks", "state", "log", "set/with"})
-    session::make_folders(folder.place(name));
+  for (const char* name : {"state", "log", "set/with"}) session::make_folders(folder.place(name));
   const auto copy = [&](const std::filesystem::path& from, const std::string& place) {
     std::error_code code;
     std::filesystem::copy_file(from, folder.place(place),

@@ -95,7 +95,7 @@ std::string shell_word(const std::string& text) {
 }
 
 std::string slurm_tasks(const ScriptPlaces& places) {
-  return head(places, "A task of a Slurm array: renders the chunk of its number.") +
+  return head(places, "A task of a Slurm array: renders frames that no other has.") +
          R"sh(task=$((SLURM_ARRAY_TASK_ID + ${1:-0}))
 is_ended=
 log=$(printf %04d "$SLURM_ARRAY_TASK_ID").log
@@ -120,30 +120,21 @@ std::string slurm_finish(const ScriptPlaces& places) {
          own_log(places, "finish.log") + call(places, "finish \"$job\"") + "\n";
 }
 
-std::string shell_loop(const ScriptPlaces& places, const Job& job) {
-  const std::string last = std::to_string(job.chunks.size() - 1);
+std::string shell_loop(const ScriptPlaces& places) {
   return head(places,
               "Renders a job without a scheduler, on as many machines as it is started on.") +
          R"sh(set -u
-# Ctrl-C ends the loop, and not only the task in hand, which ends by itself with status 0.
+# Ctrl-C ends this script, and not only the task in hand, which ends by itself with status 0.
 trap 'exit 130' INT
 trap 'exit 143' TERM
-# First what no other machine is at, then what others have left.
-for waits in --not-if-taken ''; do
-  for task in $(seq 0 )sh" +
-         last +
-         R"sh(); do
-    )sh" +
-         call(places, "task \"$job\" \"$task\" $waits") +
+)sh" + call(places, "task \"$job\"") +
          R"sh(
-    status=$?
-    if [[ $status == 66 || $status == 75 ]]; then
-      echo "this machine leaves the loop, for the reason above; others go on with it, and the last" \
-        "of them does the last step. Start it here again once that is mended." >&2
-    fi
-    [[ $status == 0 ]] || exit "$status"
-  done
-done
+status=$?
+if [[ $status == 75 ]]; then
+  echo "this machine leaves the job, for the reason above; others go on with it, and the last of" \
+    "them does the last step. Start it here again once that is mended." >&2
+fi
+[[ $status == 0 ]] || exit "$status"
 )sh" + call(places, "finish \"$job\"") +
          "\n";
 }
@@ -165,40 +156,31 @@ std::string openjd_template(const ScriptPlaces& places, const Job& job, const st
             {"dataFlow", "INOUT"},
             {"default", places.job.string()}},
        Json{{"name", "Previzd"}, {"type", "STRING"}, {"default", places.program.string()}}});
-  const auto add = [&](const char* step_name, std::size_t first, std::size_t end,
-                       const char* after) {
-    Json step =
-        openjd_step(step_name, places, {"task", "{{Param.JobFolder}}", "{{Task.Param.Chunk}}"});
-    step["parameterSpace"]["taskParameterDefinitions"] =
-        Json::array({Json{{"name", "Chunk"},
-                          {"type", "INT"},
-                          {"range", std::to_string(first) + "-" + std::to_string(end - 1)}}});
-    if (after) step["dependencies"] = Json::array({Json{{"dependsOn", after}}});
-    json["steps"].push_back(std::move(step));
-  };
-  const std::size_t merges = job.first_merge();
-  const bool has_merges = merges < job.chunks.size();
-  add("Render", 0, merges, nullptr);
-  if (has_merges) add("Merge", merges, job.chunks.size(), "Render");
+  Json render =
+      openjd_step("Render", places, {"task", "{{Param.JobFolder}}", "{{Task.Param.Number}}"});
+  render["parameterSpace"]["taskParameterDefinitions"] =
+      Json::array({Json{{"name", "Number"},
+                        {"type", "INT"},
+                        {"range", "0-" + std::to_string(job.tasks(job.frames()) - 1)}}});
   Json finish = openjd_step("Finish", places, {"finish", "{{Param.JobFolder}}"});
-  finish["dependencies"] = Json::array({Json{{"dependsOn", has_merges ? "Merge" : "Render"}}});
-  json["steps"].push_back(std::move(finish));
+  finish["dependencies"] = Json::array({Json{{"dependsOn", "Render"}}});
+  json["steps"] = Json::array({std::move(render), std::move(finish)});
   return json.dump(2) + "\n";
 }
 
 std::vector<std::string> sbatch_arguments(const JobFolder& folder, const Job& job,
-                                          const std::string& indices, std::size_t offset,
+                                          std::uint64_t offset, std::uint64_t count,
                                           const std::vector<std::string>& after,
                                           const std::vector<std::string>& more) {
   std::vector<std::string> arguments{"--parsable"};
   add_wishes_of(job, arguments);
   add_device(job, arguments);
   arguments.insert(arguments.end(), more.begin(), more.end());
-  // %4a has at least four digits, as the chunks have.
+  // %4a has at least four digits, as the states of tasks have.
   add_fixed(folder, (offset == 0 ? "" : std::to_string(offset) + "+") + "%4a.log", arguments);
-  arguments.push_back("--array=" + indices +
+  arguments.push_back("--array=0-" + std::to_string(count - 1) +
                       (job.wishes.at_once > 0 ? "%" + std::to_string(job.wishes.at_once) : ""));
-  arguments.push_back("--comment=" + std::to_string(offset));  // by which squeue names the chunk
+  arguments.push_back("--comment=" + std::to_string(offset));  // by which squeue names the task
   if (!after.empty()) arguments.push_back(dependency(after));
   arguments.push_back(folder.task_script().string());
   arguments.push_back(std::to_string(offset));

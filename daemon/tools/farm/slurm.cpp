@@ -40,24 +40,6 @@ std::size_t array_size() {
   return usual_array_size;
 }
 
-// The tasks of an array, whose numbers count from `offset`.
-struct Array {
-  std::size_t offset = 0;
-  std::set<std::size_t> indices;
-};
-
-// Divides chunks into arrays of numbers that Slurm allows.
-std::vector<Array> arrays_of(const std::set<std::size_t>& chunks, std::size_t first,
-                             std::size_t end, std::size_t size) {
-  std::vector<Array> arrays;
-  for (auto at = chunks.lower_bound(first); at != chunks.end() && *at < end; ++at) {
-    const std::size_t offset = *at / size * size;
-    if (arrays.empty() || arrays.back().offset != offset) arrays.push_back({offset, {}});
-    arrays.back().indices.insert(*at - offset);
-  }
-  return arrays;
-}
-
 std::string quoted_command(const std::vector<std::string>& arguments) {
   std::string text = "sbatch";
   for (const std::string& argument : arguments)
@@ -73,25 +55,18 @@ std::string quoted_command(const std::vector<std::string>& arguments) {
 using Submit =
     std::function<std::string(const char* about, const std::vector<std::string>& arguments)>;
 
-// Hands over the arrays of these chunks, and then the last step.
-void for_each_job(const JobFolder& folder, const Job& job, const std::set<std::size_t>& chunks,
+// Hands over the arrays of so many tasks, and then the last step.
+void for_each_job(const JobFolder& folder, const Job& job, std::uint64_t tasks,
                   const std::vector<std::string>& more, const Submit& submit) {
-  const std::size_t size = array_size();
+  const std::uint64_t size = array_size();
   std::vector<std::string> all;
-  const auto add_arrays = [&](const char* about, std::size_t first, std::size_t end) {
-    const std::vector<std::string> needed = all;
-    std::string before;
-    for (const Array& array : arrays_of(chunks, first, end, size)) {
-      std::vector<std::string> after = needed;
-      // Slurm limits each array by itself.
-      if (job.wishes.at_once > 0 && !before.empty()) after.push_back(before);
-      before = submit(about, sbatch_arguments(folder, job, index_list(array.indices), array.offset,
-                                              after, more));
-      all.push_back(before);
-    }
-  };
-  add_arrays("render", 0, job.first_merge());
-  add_arrays("merge", job.first_merge(), job.chunks.size());
+  for (std::uint64_t offset = 0; offset < tasks; offset += size) {
+    std::vector<std::string> after;
+    // Slurm limits each array by itself.
+    if (job.wishes.at_once > 0 && !all.empty()) after.push_back(all.back());
+    all.push_back(submit("render", sbatch_arguments(folder, job, offset,
+                                                    std::min(size, tasks - offset), after, more)));
+  }
   submit("check", sbatch_finish_arguments(folder, job, all, more));
 }
 
@@ -116,22 +91,9 @@ std::uint64_t submit_one(const std::vector<std::string>& arguments) {
   if (!fault.empty())
     throw Error(why + "; a part may be in the queue already, and scancel cannot remove it (" +
                 fault + "); run `scancel " + name + "`");
-  try {
-    folder.write_submitted({});
-  } catch (const Error&) {
-    // The numbers of jobs that were cancelled do no harm.
-  }
+  std::error_code stays;
+  std::filesystem::remove(folder.submitted_file(), stays);
   throw Error(why + "; nothing was submitted");
-}
-
-// Returns the numbers of what was submitted, "17,18"; empty: nothing was.
-std::string submitted_numbers(const JobFolder& folder) {
-  const Submitted submitted = folder.read_submitted();
-  std::string numbers;
-  for (const std::uint64_t number : submitted.tasks)
-    add_to_list(numbers, std::to_string(number), ",");
-  if (submitted.finish) add_to_list(numbers, std::to_string(*submitted.finish), ",");
-  return numbers;
 }
 
 std::vector<std::string> fields_of(const std::string& line) {
@@ -153,7 +115,7 @@ std::optional<QueuedTask> task_of(const std::vector<std::string>& fields) {
   if (under == std::string::npos) return task;
   const auto index = number_in(fields[0].substr(under + 1));
   const auto offset = number_in(fields[1]);
-  if (index) task.chunk = static_cast<std::size_t>(*index + offset.value_or(0));
+  if (index) task.number = *index + offset.value_or(0);
   return task;
 }
 
@@ -163,64 +125,44 @@ bool has_slurm() {
   return run_program("sbatch", {"--version"}).is_good();
 }
 
-std::string index_list(const std::set<std::size_t>& indices) {
-  std::string list;
-  for (auto at = indices.begin(); at != indices.end();) {
-    const std::size_t first = *at;
-    std::size_t last = first;
-    while (++at != indices.end() && *at == last + 1) last = *at;
-    add_to_list(list, std::to_string(first) + (last > first ? "-" + std::to_string(last) : ""),
-                ",");
-  }
-  return list;
-}
-
-void write_scripts(const JobFolder& folder, const Job& job, const ScriptPlaces& places) {
+void write_scripts(const JobFolder& folder, const ScriptPlaces& places) {
   session::replace_file(folder.task_script(), slurm_tasks(places));
   session::replace_file(folder.finish_script(), slurm_finish(places));
-  session::replace_file(folder.loop_script(), shell_loop(places, job));
+  session::replace_file(folder.loop_script(), shell_loop(places));
 }
 
-void submit_chunks(const JobFolder& folder, const Job& job, const std::set<std::size_t>& chunks,
-                   const std::vector<std::string>& more, std::ostream& out) {
-  Submitted submitted;
-  std::string printed;
-  folder.write_submitted(submitted);
+void submit_tasks(const JobFolder& folder, const Job& job, std::uint64_t tasks,
+                  const std::vector<std::string>& more, std::ostream& out) {
+  std::string submitted;
   try {
-    for_each_job(folder, job, chunks, more,
+    for_each_job(folder, job, tasks, more,
                  [&](const std::string& about, const std::vector<std::string>& arguments) {
-                   const std::uint64_t number = submit_one(arguments);
-                   if (about == "check")
-                     submitted.finish = number;
-                   else
-                     submitted.tasks.push_back(number);
-                   folder.write_submitted(submitted);
-                   printed += about + ": job " + std::to_string(number) + "\n";
-                   return std::to_string(number);
+                   const std::string number = std::to_string(submit_one(arguments));
+                   submitted += about + ": job " + number + "\n";
+                   session::replace_file(folder.submitted_file(), submitted);
+                   return number;
                  });
   } catch (const std::exception& error) {
     take_back(folder, error.what());
   }
-  out << printed << std::flush;
+  out << submitted << std::flush;
 }
 
 void print_submission(const JobFolder& folder, const Job& job, const ScriptPlaces& places,
                       const std::vector<std::string>& more, std::ostream& out) {
-  std::set<std::size_t> chunks;
-  for (std::size_t chunk = 0; chunk < job.chunks.size(); ++chunk) chunks.insert(chunk);
   out << "# " << folder.task_script().string() << "\n" << slurm_tasks(places) << "\n";
   out << "# " << folder.finish_script().string() << "\n" << slurm_finish(places) << "\n";
-  for_each_job(folder, job, chunks, more,
-               [&](const std::string& about, const std::vector<std::string>& arguments) {
+  for_each_job(folder, job, job.tasks(job.frames()), more,
+               [&](const std::string&, const std::vector<std::string>& arguments) {
                  out << quoted_command(arguments) << "\n";
-                 return std::string(about == "merge" ? "MERGE" : "RENDER");
+                 return std::string("RENDER");
                });
   out << std::flush;
 }
 
 bool was_submitted(const JobFolder& folder) {
   std::error_code unknown;
-  return std::filesystem::exists(folder.path() / "submitted.json", unknown);
+  return std::filesystem::exists(folder.submitted_file(), unknown);
 }
 
 // squeue is asked for the job's name, which no file of the folder can choose, and by which a part
@@ -235,25 +177,6 @@ std::vector<QueuedTask> queued_tasks(const JobFolder& folder) {
     if (std::optional<QueuedTask> task = task_of(fields_of(line)))
       tasks.push_back(*std::move(task));
   return tasks;
-}
-
-std::string numbers_of_others(const JobFolder& folder) {
-  const std::string numbers = submitted_numbers(folder);
-  if (numbers.empty()) return "";
-  const ProgramResult result =
-      run_program("squeue", {"--noheader", "--jobs=" + numbers, "--format=%A|%j"});
-  // It does not know jobs that ended long ago.
-  if (!result.is_good() && result.errors.find("Invalid job id") != std::string::npos) return "";
-  if (!result.is_good()) throw Error("squeue does not respond: " + result.why());
-  std::set<std::string> others;
-  std::istringstream lines(result.out);
-  for (std::string line; std::getline(lines, line);) {
-    const std::vector<std::string> fields = fields_of(line);
-    if (fields.size() > 1 && fields[1] != folder.name()) others.insert(fields[0]);
-  }
-  std::string list;
-  for (const std::string& number : others) add_to_list(list, number, ",");
-  return list;
 }
 
 bool cancel_tasks(const JobFolder& folder) {

@@ -3,9 +3,7 @@
 
 #include <cstdint>
 #include <iosfwd>
-#include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -17,38 +15,32 @@ namespace previz::farm {
 
 bool has_slurm();
 
-// Submits these chunks, by the scripts in the folder, as arrays, merges after all others, and the
-// last step after all of them, and writes each number into the job's folder as soon as it is known;
-// prints them. Where the job limits how many tasks run at once, an array begins when the one before
-// it has ended. Throws previz::Error with sbatch's own words if one is refused; those before it are
-// then cancelled, or the error says that they cannot be.
-void submit_chunks(const JobFolder& folder, const Job& job, const std::set<std::size_t>& chunks,
-                   const std::vector<std::string>& more, std::ostream& out);
+// Submits so many tasks, by the scripts in the folder, as arrays, and the last step after all of
+// them, and writes each number into the job's folder as soon as it is known; prints them. Where the
+// job limits how many tasks run at once, an array begins when the one before it has ended. Throws
+// previz::Error with sbatch's own words if one is refused; those before it are then cancelled, or
+// the error says that they cannot be.
+void submit_tasks(const JobFolder& folder, const Job& job, std::uint64_t tasks,
+                  const std::vector<std::string>& more, std::ostream& out);
 // Writes the scripts into the job's folder.
-void write_scripts(const JobFolder& folder, const Job& job, const ScriptPlaces& places);
-// Prints the scripts and the commands that submit_chunks() would write and run.
+void write_scripts(const JobFolder& folder, const ScriptPlaces& places);
+// Prints the scripts and the commands that submit_tasks() would write and run.
 void print_submission(const JobFolder& folder, const Job& job, const ScriptPlaces& places,
                       const std::vector<std::string>& more, std::ostream& out);
 
 // A part of a job in the queue.
 struct QueuedTask {
-  std::optional<std::size_t> chunk;  // absent: the last step
-  std::string state;                 // as squeue(1) has it: "RUNNING", "PENDING"
-  std::string node, reason;          // as well: "node2", "DependencyNeverSatisfied"; may be empty
+  std::optional<std::uint64_t> number;  // absent: the last step
+  std::string state;                    // as squeue(1) has it: "RUNNING", "PENDING"
+  std::string node, reason;  // as well: "node2", "DependencyNeverSatisfied"; may be empty
 };
-// Returns whether the job was handed to Slurm, or an attempt was made.
+// Returns whether the job, or a part of it, was handed to Slurm.
 bool was_submitted(const JobFolder& folder);
 // Returns what is in the queue or runs under the job's name. Throws previz::Error where Slurm does
 // not answer.
 std::vector<QueuedTask> queued_tasks(const JobFolder& folder);
-// Returns the numbers that the folder names and that are in the queue under another name, as
-// "17,18": the folder was moved since, or they are another job's. Throws likewise.
-std::string numbers_of_others(const JobFolder& folder);
 // Cancels what queued_tasks() returns; returns false if that is nothing. Throws previz::Error where
 // Slurm does not answer or refuses.
 bool cancel_tasks(const JobFolder& folder);
-
-// Returns the numbers as sbatch takes them: "0-12,17".
-std::string index_list(const std::set<std::size_t>& indices);
 
 }  // namespace previz::farm

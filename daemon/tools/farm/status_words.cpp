@@ -18,15 +18,11 @@ std::string bar(double share) {
          std::string(static_cast<std::size_t>(width - full), '-') + "]";
 }
 
-std::string frames_done(const ChunkStatus& status) {
-  return std::to_string(status.done) + " of " + set::plural(status.frames, "frame") + " done";
-}
-
 // Returns where a task runs. Slurm knows it at once; the task's own word may be that of its last
 // machine.
-std::string machine_of(const ChunkStatus& status) {
-  if (!status.node.empty()) return status.node;
-  return status.state ? status.state->host : "a machine that says nothing";
+std::string machine_of(const TaskStatus& task) {
+  if (!task.node.empty()) return task.node;
+  return task.state ? task.state->host : "a machine that says nothing";
 }
 
 std::string refusal_of(const TaskState& state) {
@@ -35,17 +31,17 @@ std::string refusal_of(const TaskState& state) {
 
 // Returns how it stands with a task that runs, waits again or has failed; empty: there is nothing
 // to say about it.
-std::string words_of(const ChunkStatus& status) {
-  switch (status.phase()) {
+std::string words_of(const TaskStatus& task) {
+  switch (task.phase()) {
     case TaskPhase::running:
-      return "running on " + machine_of(status) + ", " + frames_done(status);
+      return "running on " + machine_of(task) + (task.frames.empty() ? "" : ", " + task.frames);
     case TaskPhase::again:
-      return (status.queue == "RUNNING" ? "waiting to be requeued: " : "waiting again: ") +
-             refusal_of(*status.state);
+      return (task.queue == "RUNNING" ? "waiting to be requeued: " : "waiting again: ") +
+             refusal_of(*task.state);
     case TaskPhase::failed:
-      return status.state->message.empty()
-                 ? "ended on " + status.state->host + " with " + frames_done(status)
-                 : refusal_of(*status.state);
+      if (!task.state) return "";
+      return task.state->message.empty() ? "ended on " + task.state->host + " before its time"
+                                         : refusal_of(*task.state);
     default:
       return "";
   }
@@ -59,9 +55,9 @@ std::string why_waiting(const std::string& queue, const std::string& reason) {
 
 void print_queue(const JobStatus& status, std::ostream& out) {
   std::map<std::string, std::size_t> reasons;
-  for (const ChunkStatus& chunk : status.chunks)
-    if (!chunk.queue.empty() && chunk.queue != "RUNNING" && chunk.phase() != TaskPhase::done)
-      ++reasons[why_waiting(chunk.queue, chunk.reason)];
+  for (const auto& [name, task] : status.tasks)
+    if (!task.queue.empty() && task.queue != "RUNNING")
+      ++reasons[why_waiting(task.queue, task.reason)];
   for (const auto& [reason, count] : reasons)
     out << "waiting in the queue: " << on_one_line(reason) << " (" << count
         << (count == 1 ? " task)" : " tasks)") << "\n";
@@ -99,56 +95,55 @@ void print_last_step(const JobFolder& folder, const Job& job, const JobStatus& s
 
 void print_words(const JobFolder& folder, const Job& job, const JobStatus& status, bool terminal,
                  std::ostream& out) {
-  const double share =
-      status.frames > 0 ? static_cast<double>(status.done) / static_cast<double>(status.frames) : 1;
-  if (terminal) out << bar(share) << " ";
-  out << status.done << " of " << set::plural(status.frames, "frame") << " done, "
-      << set::plural(status.running, "task") << " running, ";
+  const bool has_ranges = status.parts > status.frames;
+  const std::size_t running = status.count(TaskPhase::running);
+  const bool is_done = status.done == status.frames;
+  if (terminal)
+    out << bar(static_cast<double>(status.parts_done) / static_cast<double>(status.parts)) << " ";
+  out << status.done << " of " << set::plural(status.frames, "frame") << " done, ";
+  if (has_ranges)
+    out << status.parts_done << " of their " << set::plural(status.parts, "sample range") << ", ";
+  out << set::plural(running, "task") << " running, ";
   if (const std::size_t again = status.count(TaskPhase::again); again > 0)
     out << again << " waiting again, ";
-  out << status.count(TaskPhase::failed) << " failed";
-  if (const std::optional<double> left = status.seconds_left(); left && status.done < status.frames)
+  out << (is_done ? 0 : status.count(TaskPhase::failed)) << " failed";
+  if (const std::optional<double> left = status.seconds_left(); left && !is_done)
     out << ", about " << output::duration_words(*left) << " left";
   out << "\n";
   if (!status.stopped.empty()) out << "stopped: " << on_one_line(status.stopped) << "\n";
   print_queue(status, out);
-  for (std::size_t i = 0; i < status.chunks.size(); ++i)
-    if (const std::string words = words_of(status.chunks[i]); !words.empty())
-      out << "task " << i << ", " << on_one_line(words_of(job, job.chunks[i]) + ": " + words)
-          << "\n";
-  const bool is_idle = !status.is_queued && status.running == 0;
-  if (!status.others.empty())
-    out << "in the queue under another name: " << status.others
-        << "; they are this job's if its folder was moved or is given by another path, and "
-           "otherwise another job's: `squeue --jobs="
-        << status.others << "` shows them\n";
-  else if (status.done < status.frames && is_idle)
-    out << "nothing runs: `previz farm retry` renders what is missing\n";
-  if (status.done == status.frames) print_last_step(folder, job, status, out);
+  for (const auto& [name, task] : status.tasks)
+    if (const std::string words = words_of(task); !is_done && !words.empty())
+      out << "task " << name << ": " << on_one_line(words) << "\n";
+  const bool is_idle = !status.is_queued && running == 0;
+  if (!is_done && is_idle)
+    out << "nothing runs under this job's name, " << folder.name()
+        << ": `previz farm retry` renders what is missing\n";
+  if (is_done) print_last_step(folder, job, status, out);
   out << std::flush;
 }
 
-void print_json(const Job& job, const JobStatus& status, std::ostream& out) {
-  nlohmann::ordered_json json{{"frames", status.frames},   {"done", status.done},
-                              {"running", status.running}, {"is_queued", status.is_queued},
-                              {"stopped", status.stopped}, {"is_complete", status.is_complete()}};
+void print_json(const JobStatus& status, std::ostream& out) {
+  nlohmann::ordered_json json{{"frames", status.frames},
+                              {"done", status.done},
+                              {"running", status.count(TaskPhase::running)},
+                              {"is_queued", status.is_queued},
+                              {"stopped", status.stopped},
+                              {"is_complete", status.is_complete()}};
   if (const std::optional<double> left = status.seconds_left()) json["seconds_left"] = *left;
   json["tasks"] = nlohmann::ordered_json::array();
-  for (std::size_t i = 0; i < status.chunks.size(); ++i) {
-    const ChunkStatus& chunk = status.chunks[i];
-    nlohmann::ordered_json one{{"task", i},
-                               {"about", words_of(job, job.chunks[i])},
-                               {"frames", chunk.frames},
-                               {"done", chunk.done},
-                               {"running", chunk.is_running},
-                               {"failed", chunk.phase() == TaskPhase::failed}};
-    if (!chunk.queue.empty()) one["queue"] = chunk.queue;
-    if (!chunk.node.empty()) one["node"] = chunk.node;
-    if (!chunk.reason.empty()) one["reason"] = chunk.reason;
-    if (chunk.state) {
-      one["outcome"] = name_of(chunk.state->outcome);
-      one["host"] = chunk.state->host;
-      one["message"] = chunk.state->message;
+  for (const auto& [name, task] : status.tasks) {
+    nlohmann::ordered_json one{{"task", name},
+                               {"frames", task.frames},
+                               {"running", task.phase() == TaskPhase::running},
+                               {"failed", task.phase() == TaskPhase::failed}};
+    if (!task.queue.empty()) one["queue"] = task.queue;
+    if (!task.node.empty()) one["node"] = task.node;
+    if (!task.reason.empty()) one["reason"] = task.reason;
+    if (task.state) {
+      one["outcome"] = name_of(task.state->outcome);
+      one["host"] = task.state->host;
+      one["message"] = task.state->message;
     }
     json["tasks"].push_back(std::move(one));
   }

@@ -1,8 +1,9 @@
-// Renders a chunk of a job, as every task does.
+// Renders a part of a job, as every task does.
 #pragma once
 
 #include <cstdint>
 #include <iosfwd>
+#include <optional>
 #include <stop_token>
 #include <string>
 
@@ -13,12 +14,11 @@ namespace previz::farm {
 
 struct TaskOptions {
   std::filesystem::path job;
-  std::size_t chunk = 0;
+  // Of the task, which then ends with its share (Job::share); absent: it renders until no frame is
+  // left, and waits for those that others have.
+  std::optional<std::uint64_t> number;
   // The pictures may lie where the plan says, wherever that is (check_paths()).
   bool any_paths = false;
-  // Leaves a chunk alone that another machine is at, or whose sums are not all there; otherwise it
-  // waits, and takes over what another one does not finish.
-  bool not_if_taken = false;
   std::stop_token stop;
 };
 
@@ -26,9 +26,8 @@ struct TaskOptions {
 namespace task_status {
 inline constexpr int done = 0;
 inline constexpr int job_fault = 1;  // no retry mends it
-// Those of sysexits.h. EX_NOINPUT: what is to be merged was not rendered, and waiting for it is in
-// vain; EX_TEMPFAIL: another machine, or time, does it.
-inline constexpr int missing_sums = 66, machine_fault = 75;
+inline constexpr int machine_fault =
+    75;  // EX_TEMPFAIL of sysexits.h: another machine, or time, does
 }  // namespace task_status
 
 // Throws JobFault if pictures would be written outside of the job's folder and of the one that it
@@ -36,11 +35,11 @@ inline constexpr int missing_sums = 66, machine_fault = 75;
 // elsewhere does not choose where files are written and read.
 void check_paths(const JobFolder& folder, Job& job, bool any_paths);
 
-// Renders what is missing of a chunk into the chunk's own folder. Two tasks with one chunk share
-// its frames, or, where the file system has no locks that both see, one waits for the other. What a
-// task of the same chunk has finished before is kept if it is whole. All that can be known is
-// checked before the first frame, and the outcome is written into the job's folder; `out` gets the
-// same line. Returns a status of task_status; a stop counts as done.
+// Renders frames of the job that no other process has finished or is rendering, and merges sample
+// ranges of which all are there. Frames that another process has, which may die, are waited for
+// while its share is not done. All that can be known is checked before the first frame, and the
+// outcome is written into the job's folder; `out` gets the same line. Returns a status of
+// task_status; a stop counts as done.
 int run_task(const TaskOptions& options, const Machine& machine, std::ostream& out);
 
 // Writes down that a signal ended the process `task`, which ran the task, in these words; returns

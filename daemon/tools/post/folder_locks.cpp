@@ -7,6 +7,7 @@
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <ctime>
 #include <nlohmann/json.hpp>
@@ -30,6 +31,7 @@ constexpr std::uint64_t frames_end = video_byte - first_frame_byte;
 // The file has a few hundred bytes for each process that renders into the folder.
 constexpr std::uint64_t most_lines = 4096;
 constexpr std::size_t most_bytes = 1 << 20;
+constexpr const char* leases_name = "render.leases";
 
 struct flock range_of(std::uint64_t byte, short type) {
   struct flock range {};
@@ -38,11 +40,6 @@ struct flock range_of(std::uint64_t byte, short type) {
   range.l_start = static_cast<off_t>(byte);
   range.l_len = 1;
   return range;
-}
-
-std::string host_name() {
-  std::array<char, 256> name{};
-  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
 }
 
 std::string line_of(const FolderUser& user) {
@@ -85,46 +82,59 @@ std::string words_of(const FolderUser& user) {
   return "previzd " + std::to_string(user.pid) + " on host " + user.host + ", since " + user.since;
 }
 
+std::string host_name() {
+  if (const char* const node = std::getenv("SLURMD_NODENAME"); node && *node) return node;
+  std::array<char, 256> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
+}
+
 int call_fcntl(int descriptor, int command, struct flock* range) {
   return ::fcntl(descriptor, command, range);
 }
 
-std::string why_others_are_not_seen(int descriptor, const std::filesystem::path& folder,
-                                    LockCall call) {
+FolderLocks::FolderLocks(const std::filesystem::path& file, OwnedDescriptor open, LockCall call)
+    : file_(file), open_(std::move(open)), call_(call) {
   struct flock range = range_of(transaction_byte, F_WRLCK);
-  if (call(descriptor, F_OFD_GETLK, &range) != 0)
-    return std::string("the file system has no locks (") + std::strerror(errno) + ")";
-  const std::string kind = local_locks_of(folder);
-  return kind.empty() ? "" : "the file system's locks hold on this machine only (" + kind + ")";
-}
-
-bool is_in_use(const std::filesystem::path& folder, LockCall call) {
-  const std::filesystem::path file = folder / FolderLocks::file_name;
-  const OwnedDescriptor open(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-  if (!open && (errno == ENOENT || errno == ESTALE)) return false;  // nobody was, or has ended
-  if (!open) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
-  struct flock lines = range_of(first_line_byte, F_WRLCK);
-  lines.l_len = 0;  // all that follow
-  while (call(open.get(), F_OFD_GETLK, &lines) != 0)
-    if (errno != EINTR) return false;  // the file system has no locks
-  return lines.l_type != F_UNLCK;
+  has_locks_ = call_(open_.get(), F_OFD_GETLK, &range) == 0;
+  std::string why;
+  if (!has_locks_)
+    why = std::string("the file system has no locks (") + std::strerror(errno) + ")";
+  else if (const std::string kind = local_locks_of(file.parent_path()); !kind.empty())
+    why = "the file system's locks hold on this machine only (" + kind + ")";
+  if (!why.empty())
+    missing_ = file.string() + ": " + why + ": machines know each other by files in " +
+               leases_name + " beside it, and one that dies is replaced after three minutes";
 }
 
 FolderLocks::FolderLocks(const std::filesystem::path& folder, LockCall call)
-    : file_(folder / file_name), open_(open_lock_file(file_)), call_(call) {
+    : FolderLocks(folder / file_name, open_lock_file(folder / file_name), call) {
   self_.host = host_name();
   self_.pid = ::getpid();
   self_.since = fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)));
-  const std::string why = why_others_are_not_seen(open_.get(), folder, call_);
-  if (!why.empty())
-    missing_ = file_.string() + ": " + why +
-               ": no other machine may render into this folder at the same time";
-  struct flock range = range_of(transaction_byte, F_WRLCK);
-  has_locks_ = call_(open_.get(), F_OFD_GETLK, &range) == 0;
+  if (!missing_.empty()) leases_ = std::make_unique<Leases>(folder / leases_name);
+  look_for_leases();
+}
+
+std::vector<FolderUser> users_of(const std::filesystem::path& folder, LockCall call) {
+  const std::filesystem::path file = folder / FolderLocks::file_name;
+  OwnedDescriptor open(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  if (!open && (errno == ENOENT || errno == ESTALE)) return {};  // nobody was, or has ended
+  if (!open) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
+  FolderLocks locks(file, std::move(open), call);
+  locks.look_for_leases();
+  return locks.others();
+}
+
+// A machine whose locks are not seen by others may have come here since.
+void FolderLocks::look_for_leases() {
+  std::error_code unknown;
+  const std::filesystem::path folder = file_.parent_path() / leases_name;
+  if (!leases_ && std::filesystem::exists(std::filesystem::symlink_status(folder, unknown)))
+    leases_ = std::make_unique<Leases>(folder);
 }
 
 FolderLocks::~FolderLocks() {
-  if (line_ < 0 || !has_locks_) return;
+  if (line_ < 0) return;
   try {
     const Transaction transaction(*this);
     self_ = {};
@@ -136,6 +146,7 @@ FolderLocks::~FolderLocks() {
 
 FolderLocks::Transaction::Transaction(FolderLocks& locks, const std::stop_token& stop)
     : locks_(locks) {
+  locks_.look_for_leases();
   using Clock = std::chrono::steady_clock;
   constexpr std::chrono::minutes patience(5);
   const Clock::time_point begin = Clock::now();
@@ -158,6 +169,13 @@ FolderLocks::Transaction::~Transaction() {
 }
 
 bool FolderLocks::lock(std::uint64_t byte) {
+  if (!lock_in_file(byte)) return false;
+  if (!leases_ || leases_->take(byte)) return true;
+  unlock(byte);
+  return false;
+}
+
+bool FolderLocks::lock_in_file(std::uint64_t byte) {
   if (!has_locks_) return true;
   struct flock range = range_of(byte, F_WRLCK);
   while (call_(open_.get(), F_OFD_SETLK, &range) != 0) {
@@ -168,6 +186,7 @@ bool FolderLocks::lock(std::uint64_t byte) {
 }
 
 void FolderLocks::unlock(std::uint64_t byte) {
+  if (leases_) leases_->give_back(byte);
   if (!has_locks_) return;
   struct flock range = range_of(byte, F_UNLCK);
   while (call_(open_.get(), F_OFD_SETLK, &range) != 0 && errno == EINTR) {
@@ -175,6 +194,7 @@ void FolderLocks::unlock(std::uint64_t byte) {
 }
 
 bool FolderLocks::is_locked_by_another(std::uint64_t byte) const {
+  if (leases_ && leases_->is_at_another(byte)) return true;
   if (!has_locks_) return false;
   struct flock range = range_of(byte, F_WRLCK);
   look_at(range);
@@ -206,6 +226,9 @@ void FolderLocks::add_locked(std::uint64_t begin, std::uint64_t end,
 std::set<std::uint64_t> FolderLocks::lines_of_others() const {
   std::set<std::uint64_t> lines;
   if (has_locks_) add_locked(first_line_byte, first_line_byte + most_lines, lines);
+  if (!leases_) return lines;
+  for (const std::uint64_t byte : leases_->at_others(first_line_byte, first_line_byte + most_lines))
+    lines.insert(byte - first_line_byte);
   return lines;
 }
 
@@ -250,7 +273,6 @@ void FolderLocks::write_own_line() {
 }
 
 void FolderLocks::join() {
-  if (!has_locks_) return;
   std::int64_t line = 0;
   while (!lock(first_line_byte + static_cast<std::uint64_t>(line))) ++line;
   line_ = line;

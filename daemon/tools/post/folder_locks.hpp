@@ -1,16 +1,20 @@
 // Shares a folder of rendered pictures between processes, on one machine or on several over NFS:
 // says which frame is at whose, and lets one at a time change what is common. The locks are those
 // of fcntl(2), F_OFD_SETLK, on bytes of DIR/render.lock; they go with the death of their process.
-// The text in that file is for people and for messages; what holds is the locks.
+// The text in that file is for people and for messages; what holds is the locks. Where these do not
+// reach other machines, the same numbers are taken in DIR/render.leases, too (Leases), by everybody
+// who finds that folder there.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <set>
 #include <stop_token>
 #include <string>
 #include <vector>
 
+#include "daemon/tools/post/leases.hpp"
 #include "drivers/descriptor.hpp"
 
 struct flock;
@@ -28,18 +32,17 @@ struct FolderUser {
 // Returns "previz 4711 on host a, since 2026-11-25 14:03 UTC".
 std::string words_of(const FolderUser& user);
 
+// Returns the name of this machine, by which a cluster knows it (SLURMD_NODENAME) where it is
+// one's.
+std::string host_name();
+
 // fcntl(2); a test puts that of a file system without locks in its place.
 using LockCall = int (*)(int descriptor, int command, struct flock* range);
 int call_fcntl(int descriptor, int command, struct flock* range);
 
-// Returns why locks on a file of this folder are not seen by other machines: the file system has
-// none, or they hold on this machine only. Empty: they are seen.
-std::string why_others_are_not_seen(int descriptor, const std::filesystem::path& folder,
-                                    LockCall call = call_fcntl);
-
-// Returns whether a process is at work in the folder. Waits for none, and makes no file. Throws
+// Returns the processes that are at work in the folder. Waits for none, and makes no file. Throws
 // previz::Error where that cannot be known.
-bool is_in_use(const std::filesystem::path& folder, LockCall call = call_fcntl);
+std::vector<FolderUser> users_of(const std::filesystem::path& folder, LockCall call = call_fcntl);
 
 // Not for several threads at once; two objects exclude each other even in one process.
 class FolderLocks {
@@ -52,8 +55,8 @@ class FolderLocks {
   FolderLocks(const FolderLocks&) = delete;
   FolderLocks& operator=(const FolderLocks&) = delete;
 
-  // Why other machines are not seen: the file system has no locks, so that every claim succeeds, or
-  // they hold on this machine only. Empty: they are seen.
+  // Why other machines are seen by leases only, in words: the file system has no locks, or they
+  // hold on this machine. Empty: they are seen.
   const std::string& missing() const { return missing_; }
 
   // As long as it lives, no other process is in one.
@@ -85,7 +88,11 @@ class FolderLocks {
   bool claim_video();
 
  private:
+  friend std::vector<FolderUser> users_of(const std::filesystem::path& folder, LockCall call);
+  FolderLocks(const std::filesystem::path& file, OwnedDescriptor open, LockCall call);
+  void look_for_leases();
   bool lock(std::uint64_t byte);
+  bool lock_in_file(std::uint64_t byte);
   void unlock(std::uint64_t byte);
   bool is_locked_by_another(std::uint64_t byte) const;
   // Fills in a lock that is in the way of this one, or that there is none.
@@ -101,7 +108,8 @@ class FolderLocks {
   LockCall call_;
   bool has_locks_ = true;
   std::string missing_;
-  std::int64_t line_ = -1;  // of this process in the text; -1: none yet
+  std::unique_ptr<Leases> leases_;  // null: nobody has needed them here
+  std::int64_t line_ = -1;          // of this process in the text; -1: none yet
   FolderUser self_;
 };
 

@@ -301,7 +301,6 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
       << (options.sample_range ? ", range " + to_string(*options.sample_range) + " of them" : "")
       << (sums ? ", merged from their ranges" : "") << ", on " << render::device_name(*device)
       << std::endl;
-  if (options.on_begin) options.on_begin();
   output::Progress progress(
       out, options.terminal, to_do.size(), now_s(),
       only_neighbours(to_do, static_cast<std::uint64_t>(neighbours_of(take.set.quality)),
@@ -329,13 +328,13 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
   for (const std::string& doubt : light.doubts()) progress.note("light: " + doubt);
 }
 
-void report_opened(const RenderDirectory& directory, const RenderReport& report,
+void report_opened(const RenderDirectory& directory, const RenderReport& report, bool was_read,
                    std::ostream& out) {
   const std::string folder = directory.path().string();
   for (const std::string& note : directory.notes()) out << folder << ": " << note << std::endl;
   if (report.found_finished > 0)
-    out << folder << ": " << set::plural(report.found_finished, "frame")
-        << " already rendered, and the files are as they were written" << std::endl;
+    out << folder << ": " << set::plural(report.found_finished, "frame") << " already rendered"
+        << (was_read ? ", and the files are as they were written" : "") << std::endl;
   for (const auto& [why, frames] : directory.rejected())
     out << folder << ": rendered again: " << frames_words(frames) << ": " << why << std::endl;
 }
@@ -370,26 +369,28 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
   std::optional<SumsFolders> sums;
   if (!options.sums_from.empty())
     sums.emplace(options.sums_from, plan.settings, set.quality.samples);
-  RenderDirectory directory(set.output, plan.settings, options.force, plan.clock, range,
-                            options.stop, options.sample_range);
+  RenderDirectory directory(set.output, plan.settings, options.force, plan.clock,
+                            options.share ? no_frames : range, options.stop, options.sample_range);
 
   RenderReport report;
   report.directory = directory.path();
   std::set<std::uint64_t> to_do;
   for (std::uint64_t frame = range.first; frame <= range.last; ++frame)
-    if (options.is_elsewhere && options.is_elsewhere(frame))
+    if (options.is_left_out && options.is_left_out(frame))
       continue;
     else if (directory.finished(frame))
       ++report.found_finished;
     else
       to_do.insert(frame);
   for (const std::string& what : take.session.missing) out << "session: " << what << std::endl;
-  report_opened(directory, report, out);
+  report_opened(directory, report, /*was_read=*/!options.share, out);
 
   pipeline::Metrics metrics;
   const double start = now_s();
-  if (!to_do.empty())
-    render_all(options, take, to_do, directory, metrics, sums ? &*sums : nullptr, report, out);
+  const std::set<std::uint64_t> own =
+      options.share ? directory.claim(to_do, *options.share) : to_do;
+  if (!own.empty())
+    render_all(options, take, own, directory, metrics, sums ? &*sums : nullptr, report, out);
 
   const auto at_others = directory.at_others(to_do);
   for (std::uint64_t frame = range.first; frame <= range.last; ++frame)

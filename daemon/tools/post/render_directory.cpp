@@ -210,13 +210,14 @@ Claim RenderDirectory::claim(std::uint64_t frame) {
   return locks_->claim(frame) ? Claim::mine : Claim::at_another;
 }
 
-std::set<std::uint64_t> RenderDirectory::claim(const std::set<std::uint64_t>& frames) {
+std::set<std::uint64_t> RenderDirectory::claim(const std::set<std::uint64_t>& frames,
+                                               std::uint64_t most) {
   const std::lock_guard guard(mutex_);
   const FolderLocks::Transaction transaction(*locks_);
   read_lines();
   std::set<std::uint64_t> taken;
   for (const std::uint64_t frame : frames)
-    if (!finished(frame) && locks_->claim(frame)) taken.insert(frame);
+    if (taken.size() < most && !finished(frame) && locks_->claim(frame)) taken.insert(frame);
   return taken;
 }
 
@@ -293,31 +294,6 @@ std::vector<FinishedFrame> RenderDirectory::reject(
     at = next;
   }
   return rejected;
-}
-
-std::size_t RenderDirectory::adopt(RenderDirectory& from) {
-  const std::lock_guard guard(mutex_);
-  const FolderLocks::Transaction transaction(*locks_);
-  read_lines();
-  std::vector<FinishedFrame> taken;
-  std::string lines;
-  const auto end = from.finished_.upper_bound(from.range_.last);
-  for (auto at = from.finished_.lower_bound(from.range_.first); at != end; ++at) {
-    const auto& [frame, record] = *at;
-    if (finished(frame) || !from.finished(frame)) continue;
-    taken.push_back(record);
-    add_to_list(lines, to_json(record), "\n");
-  }
-  if (taken.empty()) return 0;
-  for (const FinishedFrame& record : taken)
-    for (const char* extension : extensions(record.status))
-      move_file(from.file(record.frame, extension), file(record.frame, extension));
-  session::sync_names(path());
-  append_line(path() / lines_name, lines);
-  for (const FinishedFrame& record : taken) finished_[record.frame] = record;
-  lines_state_ = state_of(path() / lines_name);
-  from.forget(taken);
-  return taken.size();
 }
 
 // The lines of others that reject() counts as not finished stay.

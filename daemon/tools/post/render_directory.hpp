@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <iosfwd>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -68,9 +69,10 @@ class RenderDirectory {
 
   // Takes a frame, so that no other process renders it.
   Claim claim(std::uint64_t frame);
-  // Takes those of the frames that are neither finished nor at another process, and returns them.
-  // No other process takes any of them meanwhile.
-  std::set<std::uint64_t> claim(const std::set<std::uint64_t>& frames);
+  // Takes those of the frames that are neither finished nor at another process, the first of them
+  // and at most `most`, and returns them. No other process takes any of them meanwhile.
+  std::set<std::uint64_t> claim(const std::set<std::uint64_t>& frames,
+                                std::uint64_t most = std::numeric_limits<std::uint64_t>::max());
   // Gives back a frame that was not written.
   void release(std::uint64_t frame);
   // Returns those of the frames that are neither finished nor free, by the process that has them:
@@ -84,13 +86,6 @@ class RenderDirectory {
   // frame back. Whoever shares the directory has claimed it.
   void write(const pipeline::Shot& shot, const set::Set& set, const MadeOn& made_on = {});
 
-  // Takes over what is finished in the range of another folder: the lines, then the files, which
-  // are moved, or copied and compared where it is on another file system; the other folder then has
-  // neither. Frames that are finished here stay as they are, in both folders. Whoever calls has
-  // found the settings of both the same. A crash between
-  // the moves of a frame's files is mended by take_back(). Returns
-  // the number of frames taken over.
-  std::size_t adopt(RenderDirectory& from);
   // Takes away the lines of these frames, which are then not finished; no file is removed.
   void forget(const std::vector<FinishedFrame>& frames);
   // Puts the lines in the order of the frames.

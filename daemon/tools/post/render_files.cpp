@@ -142,35 +142,4 @@ Frames finished_frames(const set::Output& output, bool has_sums, FrameRange rang
   return frames;
 }
 
-void take_back(const std::filesystem::path& folder, const std::filesystem::path& other) {
-  for (const auto& [frame, record] : frames_in(folder / lines_name))
-    for (const auto& [name, mark] : record.files) {
-      const std::filesystem::path here = folder / name, there = other / name;
-      std::error_code unknown;
-      if (!frame_of(name) ||
-          std::filesystem::exists(std::filesystem::symlink_status(here, unknown)) ||
-          !std::filesystem::is_regular_file(std::filesystem::symlink_status(there, unknown)))
-        continue;
-      if (mark_of(there) == mark) move_file(there, here);
-    }
-}
-
-void move_file(const std::filesystem::path& from, const std::filesystem::path& to) {
-  std::error_code code;
-  std::filesystem::rename(from, to, code);
-  if (!code) return;
-  if (code != std::errc::cross_device_link)
-    throw Error(to.string() + ": cannot be moved here from " + from.string() + ": " +
-                code.message());
-  session::Draft draft(to);
-  session::read_blocks(
-      from, [] { return false; }, [&](std::string_view block) { draft.file().append(block); });
-  draft.file().sync();
-  if (session::sha256_of(draft.path()) != session::sha256_of(from))
-    throw Error(to.string() + ": what was copied from " + from.string() +
-                " is read back with other content; look at the disk");
-  draft.put();
-  std::filesystem::remove(from, code);
-}
-
 }  // namespace previz::post

@@ -16,6 +16,7 @@
 namespace previz::post {
 
 inline constexpr FrameRange all_frames{0, std::numeric_limits<std::uint64_t>::max()};
+inline constexpr FrameRange no_frames{1, 0};
 inline constexpr const char* settings_name = "render.json";
 inline constexpr const char* lines_name = "frames.jsonl";
 inline constexpr const char* sums_extension = ".sums.exr";
@@ -48,14 +49,6 @@ Frames frames_in(const std::filesystem::path& lines);
 // these and without a lock. Throws like frames_in().
 Frames finished_frames(const set::Output& output, bool has_sums = false,
                        FrameRange range = all_frames);
-
-// Moves files of frames that `folder` has a line of back into it, where they are in `other` as
-// their line says: a crash came between the moves of a frame's files from the one to the other.
-void take_back(const std::filesystem::path& folder, const std::filesystem::path& other);
-
-// Gives the file another name, which may be on another disk: it is then copied and compared. Throws
-// previz::Error.
-void move_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
 // Returns the settings that differ: "samples is 16 there and 64 now". Both are objects.
 std::string differences(const nlohmann::json& there, const nlohmann::json& now);

@@ -55,12 +55,12 @@ struct RenderOptions {
   std::vector<std::pair<std::string, std::filesystem::path>> set_assets;
   // Rendered on in place of a device that is opened by `device`; null: none is open.
   std::shared_ptr<render::Device> open_device;
-  // Called once all that the take and the set name has been read, and frames are next: what fails
-  // before it fails on every machine that sees the same files. Not called if no frame is to do.
-  std::function<void()> on_begin;
-  // Returns whether a frame is finished elsewhere, so that it is not rendered and not reported.
-  // Asked of each frame in their order, once this process is known to be at work in the folder.
-  std::function<bool(std::uint64_t frame)> is_elsewhere;
+  // One of many processes that share the take: it renders no more than the first so many frames
+  // that are free, and does not read what others have finished.
+  std::optional<std::uint64_t> share;
+  // Returns whether a frame is to be left out: it is not rendered and not reported. Asked of each
+  // frame in their order, once this process is known to be at work in the folder.
+  std::function<bool(std::uint64_t frame)> is_left_out;
   // Only these samples of every frame are rendered, and their sums are written in place of pictures
   // and video: NNNN.sums.exr (output::write_sums_exr). check_sample_range() says what is refused.
   std::optional<render::SampleRange> sample_range;

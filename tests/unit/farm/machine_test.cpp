@@ -12,7 +12,6 @@ class MachineTest : public testing::Test {
     session::write_content(directory_ / "take/session.toml", "");
     std::filesystem::create_directories(directory_ / "job/state");
     job_.software = "previzd 1.2";
-    job_.chunks.resize(1);
     JobTake take;
     take.session = directory_ / "take";
     take.pictures = directory_ / "out";
@@ -24,7 +23,7 @@ class MachineTest : public testing::Test {
     machine_.free_bytes = [](const auto&) { return std::uint64_t{200'000'000}; };
   }
   std::string why() {
-    return why_not_here(JobFolder(directory_ / "job"), job_, job_.chunks[0], machine_);
+    return why_not_here(JobFolder(directory_ / "job"), job_, job_.takes[0], machine_);
   }
   test::TemporaryDirectory directory_;
   Job job_;

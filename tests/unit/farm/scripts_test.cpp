@@ -66,47 +66,30 @@ TEST_F(Scripts, RequeueWhatAnotherMachineMayDo) {
   const ProgramResult last = run(slurm_tasks(places_), 75, "SLURM_RESTART_COUNT=3");
   EXPECT_EQ(last.status, 75);
   EXPECT_THAT(last.out, Not(HasSubstr("requeue")));
-  const ProgramResult no_sums = run(slurm_tasks(places_), 66);
-  EXPECT_EQ(no_sums.status, 66);
-  EXPECT_THAT(no_sums.out, Not(AnyOf(HasSubstr("requeue"), HasSubstr("scancel"))));
   const ProgramResult mistake = run(slurm_tasks(places_), 1);
   EXPECT_EQ(mistake.status, 1);
   EXPECT_THAT(mistake.out, HasSubstr("scancel --state=PENDING 90\n"));
 }
 
-TEST_F(Scripts, LoopOverAllChunksAndFinish) {
-  Job job;
-  job.chunks.resize(2);
-  const ProgramResult result = run(shell_loop(places_, job), 0);
+TEST_F(Scripts, LoopUntilNothingIsLeftAndFinish) {
+  const ProgramResult result = run(shell_loop(places_), 0);
   const std::string name = "<" + places_.job.string() + ">\n";
-  std::string expected;
-  for (const char* waits : {"<--not-if-taken>\n", ""})
-    for (const char* chunk : {"<0>\n", "<1>\n"})
-      expected += "previzd\n<farm>\n<task>\n" + name + chunk + waits;
-  EXPECT_EQ(result.out, expected + "previzd\n<farm>\n<finish>\n" + name);
-  const ProgramResult mistake = run(shell_loop(places_, job), 1);
-  EXPECT_EQ(mistake.out, "previzd\n<farm>\n<task>\n" + name + "<0>\n<--not-if-taken>\n");
-}
-
-// It would refuse all others as well, in seconds, and the last step is not its business.
-TEST_F(Scripts, AMachineThatRefusesATaskLeavesTheLoop) {
-  Job job;
-  job.chunks.resize(2);
-  const ProgramResult result = run(shell_loop(places_, job), 75);
-  EXPECT_EQ(result.status, 75);
-  EXPECT_EQ(result.out,
-            "previzd\n<farm>\n<task>\n<" + places_.job.string() + ">\n<0>\n<--not-if-taken>\n");
-  EXPECT_THAT(result.errors, HasSubstr("this machine leaves the loop"));
+  const std::string task = "previzd\n<farm>\n<task>\n" + name;
+  EXPECT_EQ(result.out, task + "previzd\n<farm>\n<finish>\n" + name);
+  EXPECT_EQ(run(shell_loop(places_), 1).out, task);
+  // It is for machines that can render to do the last step.
+  const ProgramResult refused = run(shell_loop(places_), 75);
+  EXPECT_EQ(refused.status, 75);
+  EXPECT_EQ(refused.out, task);
+  EXPECT_THAT(refused.errors, HasSubstr("this machine leaves the job"));
 }
 
 // A task that Ctrl-C ends has status 0, by which a shell takes it that the signal was dealt with.
 TEST_F(Scripts, CtrlCEndsTheLoop) {
-  Job job;
-  job.chunks.resize(2);
   previzd_does_ = "kill -INT $PPID; exit 0";
-  const ProgramResult result = run(shell_loop(places_, job), 0);
+  const ProgramResult result = run(shell_loop(places_), 0);
   EXPECT_EQ(result.status, 130);
-  EXPECT_THAT(result.out, AllOf(HasSubstr("<0>"), Not(HasSubstr("<1>"))));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("<task>"), Not(HasSubstr("<finish>"))));
 }
 
 // scancel ends the waiting, or this script, or both.
@@ -127,19 +110,19 @@ TEST_F(Scripts, ATaskThatIsCanceledWhileItWaitsIsNotRequeued) {
 TEST_F(Scripts, DescribeTheJobForOtherSchedulers) {
   places_.job = "/jobs/a \"quoted\" name";
   Job job;
-  job.chunks.resize(10);
-  for (std::size_t i = 8; i < 10; ++i) job.chunks[i].kind = ChunkKind::merge;
+  job.takes.resize(1);
+  job.takes[0].frames = {0, 15};
+  job.share = 2;
   const auto json = nlohmann::json::parse(openjd_template(places_, job, "previz-1"));
   EXPECT_EQ(json["specificationVersion"], "jobtemplate-2023-09");
   EXPECT_EQ(json["parameterDefinitions"][0]["default"], places_.job.string());
-  ASSERT_EQ(json["steps"].size(), 3u);
+  ASSERT_EQ(json["steps"].size(), 2u);
   const auto& range = json["steps"][0]["parameterSpace"]["taskParameterDefinitions"][0];
   EXPECT_EQ(range["range"], "0-7");
   EXPECT_EQ(json["steps"][1]["dependencies"][0]["dependsOn"], "Render");
-  EXPECT_EQ(json["steps"][2]["dependencies"][0]["dependsOn"], "Merge");
   EXPECT_EQ(
       json["steps"][0]["script"]["actions"]["onRun"]["args"],
-      (std::vector<std::string>{"farm", "task", "{{Param.JobFolder}}", "{{Task.Param.Chunk}}"}));
+      (std::vector<std::string>{"farm", "task", "{{Param.JobFolder}}", "{{Task.Param.Number}}"}));
   places_.job = directory_ / hostile;
   EXPECT_THAT(test::error_of([&] { openjd_template(places_, job, "previz-1"); }),
               HasSubstr("no control characters"));

@@ -12,7 +12,6 @@ namespace previz::farm::slurm_test {
 class Slurm : public testing::Test {
  protected:
   Slurm() {
-    job_.chunks.resize(2500);
     session::write_content(folder_.plan(), "");
     stand_in("scontrol", "echo 'MaxArraySize            = 1001'");
     stand_in("sbatch",
@@ -20,7 +19,7 @@ class Slurm : public testing::Test {
              "echo $n");
     stand_in("scancel", "");
     stand_in("squeue", "");
-    write_scripts(folder_, job_, {"/usr/bin/previzd", folder_.path(), false});
+    write_scripts(folder_, {"/usr/bin/previzd", folder_.path(), false});
   }
   // Puts a script in the place of a program; it appends its name and arguments to `calls`.
   void stand_in(const std::string& name, const std::string& body) {
@@ -41,9 +40,7 @@ class Slurm : public testing::Test {
 
 TEST_F(Slurm, GetsArraysThatItAllowsAndTheLastStepAfterThem) {
   job_.wishes = {8, "render", "1:00:00", ""};
-  std::set<std::size_t> chunks;
-  for (std::size_t i = 0; i < 2500; ++i) chunks.insert(i);
-  submit_chunks(folder_, job_, chunks, {"--account=film"}, out_);
+  submit_tasks(folder_, job_, 2500, {"--account=film"}, out_);
   EXPECT_EQ(out_.str(), "render: job 17\nrender: job 18\nrender: job 19\ncheck: job 20\n");
   const std::string all = calls();
   EXPECT_THAT(all, HasSubstr("--array=0-1000%8 "));
@@ -51,26 +48,21 @@ TEST_F(Slurm, GetsArraysThatItAllowsAndTheLastStepAfterThem) {
               HasSubstr("--partition=render --time=1:00:00 --exclusive --mem=0 --account=film "));
   EXPECT_THAT(all, HasSubstr("tasks.sh 2002\n"));
   EXPECT_THAT(all, HasSubstr("--dependency=afterany:17:18:19 "));
-  const Submitted submitted = folder_.read_submitted();
-  EXPECT_EQ(submitted.tasks, (std::vector<std::uint64_t>{17, 18, 19}));
-  EXPECT_EQ(submitted.finish, 20u);
+  EXPECT_EQ(session::content_of(folder_.submitted_file()), out_.str());
 }
 
 // Slurm counts the tasks of each array by itself, so that only one array may run.
 TEST_F(Slurm, LimitsTheTasksOfAllArrays) {
   job_.wishes.at_once = 8;
-  for (std::size_t i = 2200; i < 2500; ++i) job_.chunks[i].kind = ChunkKind::merge;
-  submit_chunks(folder_, job_, {0, 1500, 2100, 2300}, {}, out_);
-  EXPECT_EQ(out_.str(),
-            "render: job 17\nrender: job 18\nrender: job 19\nmerge: job 20\ncheck: job 21\n");
-  EXPECT_THAT(calls(), HasSubstr("--array=499%8 --comment=1001 --dependency=afterany:17 "));
-  EXPECT_THAT(calls(), HasSubstr("--array=98%8 --comment=2002 --dependency=afterany:18 "));
+  submit_tasks(folder_, job_, 2100, {}, out_);
+  EXPECT_THAT(calls(), HasSubstr("--array=0-1000%8 --comment=1001 --dependency=afterany:17 "));
+  EXPECT_THAT(calls(), HasSubstr("--array=0-97%8 --comment=2002 --dependency=afterany:18 "));
   EXPECT_THAT(calls(), HasSubstr("--dependency=afterany:17:18:19 "));
 }
 
 // The user's own arguments come before those that the job is found by: sbatch takes the last.
 TEST_F(Slurm, TakesNoNameAndNoPlaceFromTheUser) {
-  submit_chunks(folder_, job_, {1500}, {"--gres=gpu:a100:1", "--job-name=x", "--comment=x"}, out_);
+  submit_tasks(folder_, job_, 1500, {"--gres=gpu:a100:1", "--job-name=x", "--comment=x"}, out_);
   const std::string all = calls();
   for (const char* fixed : {"--job-name=previz-", "--comment=1001", "--chdir=", "--output=log/"})
     EXPECT_GT(all.find(fixed), all.find("--comment=x")) << fixed;
@@ -78,19 +70,11 @@ TEST_F(Slurm, TakesNoNameAndNoPlaceFromTheUser) {
 }
 
 TEST_F(Slurm, IsAskedForAGraphicsCardOrAWholeProcessor) {
-  submit_chunks(folder_, job_, {0}, {}, out_);
+  submit_tasks(folder_, job_, 1, {}, out_);
   EXPECT_THAT(calls(), AllOf(HasSubstr("--exclusive --mem=0"), Not(HasSubstr("--gres"))));
   job_.on_gpu = true;
-  submit_chunks(folder_, job_, {3, 7, 8, 9}, {}, out_);
-  EXPECT_THAT(calls(), AllOf(HasSubstr("--gres=gpu:1"), HasSubstr("--array=3,7-9 ")));
-}
-
-TEST_F(Slurm, MergesAfterAllSums) {
-  for (std::size_t i = 2000; i < 2500; ++i) job_.chunks[i].kind = ChunkKind::merge;
-  submit_chunks(folder_, job_, {0, 1, 2001, 2002}, {}, out_);
-  EXPECT_EQ(out_.str(), "render: job 17\nmerge: job 18\nmerge: job 19\ncheck: job 20\n");
-  EXPECT_THAT(calls(), HasSubstr("--dependency=afterany:17 "));
-  EXPECT_THAT(calls(), HasSubstr("--dependency=afterany:17:18:19 "));
+  submit_tasks(folder_, job_, 1, {}, out_);
+  EXPECT_THAT(calls(), AllOf(HasSubstr("--gres=gpu:1"), HasSubstr("--array=0-0 ")));
 }
 
 // One array was taken and the next is refused: nothing stays in the queue.
@@ -99,18 +83,16 @@ TEST_F(Slurm, ThatRefusesAPartGetsNothing) {
            "[ -e \"$HERE/first\" ] && { echo 'sbatch: error: Invalid partition' >&2; exit 1; }; "
            "touch \"$HERE/first\"; echo '17;cluster'");
   EXPECT_EQ(
-      test::error_of([&] {
-        submit_chunks(folder_, job_, {0, 1500}, {}, out_);
-      }),
+      test::error_of([&] { submit_tasks(folder_, job_, 1500, {}, out_); }),
       "sbatch does not take the job: sbatch: error: Invalid partition; nothing was submitted");
   EXPECT_THAT(calls(), HasSubstr("scancel --name=" + folder_.name() + "\n"));
-  EXPECT_TRUE(folder_.read_submitted().tasks.empty());
+  EXPECT_FALSE(was_submitted(folder_));
 }
 
 // An sbatch that prints no number may have submitted its part: it is canceled by the job's name.
 TEST_F(Slurm, ThatPrintsNoNumberGetsNothing) {
   stand_in("sbatch", "echo accepted");
-  EXPECT_THAT(test::error_of([&] { submit_chunks(folder_, job_, {0}, {}, out_); }),
+  EXPECT_THAT(test::error_of([&] { submit_tasks(folder_, job_, 1, {}, out_); }),
               AllOf(HasSubstr("prints no number"), HasSubstr("nothing was submitted")));
   EXPECT_THAT(calls(), HasSubstr("scancel --name=" + folder_.name() + "\n"));
 }
@@ -118,36 +100,34 @@ TEST_F(Slurm, ThatPrintsNoNumberGetsNothing) {
 // Each number is on disk before the next array is handed over: a crash then hides none.
 TEST_F(Slurm, NumbersAreWrittenAtOnce) {
   const std::string seen =
-      "cat '" + (folder_.path() / "submitted.json").string() + "' >> \"$HERE/seen\"; echo 17";
+      "cat '" + folder_.submitted_file().string() + "' >> \"$HERE/seen\"; echo 17";
   stand_in("sbatch", seen);
-  submit_chunks(folder_, job_, {0}, {}, out_);
+  submit_tasks(folder_, job_, 1, {}, out_);
   EXPECT_THAT(session::content_of(directory_ / "seen"), HasSubstr("17"));
 }
 
 TEST_F(Slurm, ThatCannotCancelIsReported) {
   stand_in("sbatch", "[ -e \"$HERE/first\" ] && exit 1; touch \"$HERE/first\"; echo 17");
   stand_in("scancel", "echo 'scancel: error: Unable to contact slurm controller' >&2; exit 1");
-  EXPECT_THAT(test::error_of([&] {
-                submit_chunks(folder_, job_, {0, 1500}, {}, out_);
-              }),
+  EXPECT_THAT(test::error_of([&] { submit_tasks(folder_, job_, 1500, {}, out_); }),
               AllOf(HasSubstr("may be in the queue already"), HasSubstr("Unable to contact"),
                     HasSubstr("run `scancel --name=" + folder_.name() + "`"),
                     Not(HasSubstr("nothing was submitted"))));
-  EXPECT_EQ(folder_.read_submitted().tasks, std::vector<std::uint64_t>{17});
+  EXPECT_EQ(session::content_of(folder_.submitted_file()), "render: job 17\n");
 }
 
 TEST_F(Slurm, SaysWhichTasksRun) {
-  submit_chunks(folder_, job_, {0, 1500}, {}, out_);
+  submit_tasks(folder_, job_, 1500, {}, out_);
   stand_in("squeue",
            "echo '17_0|0|RUNNING|node2|None'; echo '18_499|1001|PENDING||Priority'; "
            "echo '19||PENDING||Dependency'");
   const std::vector<QueuedTask> tasks = queued_tasks(folder_);
   ASSERT_EQ(tasks.size(), 3u);
-  EXPECT_EQ(tasks[0].chunk, 0u);
+  EXPECT_EQ(tasks[0].number, 0u);
   EXPECT_EQ(tasks[0].node, "node2");
-  EXPECT_EQ(tasks[1].chunk, 1500u);
+  EXPECT_EQ(tasks[1].number, 1500u);
   EXPECT_EQ(tasks[1].reason, "Priority");
-  EXPECT_FALSE(tasks[2].chunk);
+  EXPECT_FALSE(tasks[2].number);
   EXPECT_THAT(calls(), HasSubstr("squeue --noheader --array --name=" + folder_.name() + " "));
 }
 
@@ -158,29 +138,14 @@ TEST_F(Slurm, ThatDoesNotAnswerIsAnError) {
   EXPECT_THAT(test::error_of([&] { queued_tasks(folder_); }), HasSubstr("Unable to contact"));
 }
 
-// The folder was moved, or the numbers come from elsewhere.
-TEST_F(Slurm, KnowsTheNumbersUnderAnotherName) {
-  EXPECT_EQ(numbers_of_others(folder_), "");  // nothing was submitted
-  submit_chunks(folder_, job_, {0, 1500}, {}, out_);
-  stand_in("squeue", "echo '17|previz-01234567'; echo '18|" + folder_.name() + "'");
-  EXPECT_EQ(numbers_of_others(folder_), "17");
-  EXPECT_THAT(calls(), HasSubstr("--jobs=17,18,19 "));
-  // It does not know jobs that ended long ago.
-  stand_in("squeue", "echo 'slurm_load_jobs error: Invalid job id specified' >&2; exit 1");
-  EXPECT_EQ(numbers_of_others(folder_), "");
-}
-
-// The numbers come from a file in the folder, and the name does not.
+// The job's name goes by the folder's, and no file in it has a say.
 TEST_F(Slurm, CancelsOnlyWhatHasTheJobsName) {
-  session::write_content(folder_.path() / "submitted.json", R"({"tasks": [1, 2], "finish": 3})");
+  session::write_content(folder_.submitted_file(), "render: job 1\n");
   EXPECT_FALSE(cancel_tasks(folder_));
   EXPECT_THAT(calls(), Not(HasSubstr("scancel")));
   stand_in("squeue", "echo '2_0|0|RUNNING|node2|None'");
   EXPECT_TRUE(cancel_tasks(folder_));
   EXPECT_THAT(calls(), HasSubstr("scancel --name=" + folder_.name() + "\n"));
-  session::write_content(folder_.path() / "submitted.json", R"({"tasks": ["--user=root"]})");
-  EXPECT_THAT(test::error_of([&] { numbers_of_others(folder_); }),
-              HasSubstr("cannot be understood"));
 }
 
 // Its daemon may be down, and its programs then wait for minutes.

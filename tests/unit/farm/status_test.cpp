@@ -5,6 +5,7 @@
 #include "daemon/core/report/printable.hpp"
 #include "daemon/tools/farm/farm.hpp"
 #include "daemon/tools/farm/finish.hpp"
+#include "daemon/tools/post/folder_locks.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/test.hpp"
@@ -19,12 +20,8 @@ class FarmStatus : public testing::Test {
     job_.takes[0].pictures = directory_ / "out";
     job_.takes[0].frames = {0, 3};
     job_.takes[0].settings = "{}";
-    for (std::uint64_t first : {0, 2}) {
-      job_.chunks.emplace_back();
-      job_.chunks.back().frames = {first, first + 1};
-    }
     std::filesystem::create_directories(folder_.path() / "state");
-    session::write_content(folder_.path() / "submitted.json", R"({"tasks": [17], "finish": 18})");
+    session::write_content(folder_.submitted_file(), "render: job 17\n");
     stand_in("sbatch", "");
     queue("");
   }
@@ -39,16 +36,13 @@ class FarmStatus : public testing::Test {
     stand_in("squeue",
              "case \"$*\" in *--name=*) cat '" + (directory_ / "queue").string() + "';; esac");
   }
-  void say(std::size_t chunk, TaskOutcome outcome, const std::string& message) {
-    folder_.write_state(chunk, {outcome, "node1", 1, "2026-11-28 20:03:11 UTC", message});
+  void say(std::uint64_t task, TaskOutcome outcome, const std::string& message) {
+    folder_.write_state(task_name(task, ""),
+                        {outcome, "node1", 1, "2026-11-28 20:03:11 UTC", message});
   }
-  // Both chunks have finished their frames.
   static JobStatus all_done() {
     JobStatus status;
-    status.frames = status.done = 4;
-    status.chunks.resize(2);
-    for (ChunkStatus& chunk : status.chunks) chunk.frames = chunk.done = 2;
-    status.has_parts = true;
+    status.frames = status.done = status.parts = status.parts_done = 4;
     return status;
   }
   std::string words(const JobStatus& status) const {
@@ -71,16 +65,15 @@ TEST_F(FarmStatus, NamesWhyATaskWaitsToBeRequeued) {
   queue("17_0|0|RUNNING|node1|None\n17_1|0|RUNNING|node2|None\n18||PENDING||Dependency\n");
   EXPECT_EQ(words(),
             "0 of 4 frames done, 1 task running, 1 waiting again, 0 failed\n"
-            "task 0, frames 0 to 1 of 12A: waiting to be requeued: node1: previzd 0.0 is installed "
-            "here\n"
-            "task 1, frames 2 to 3 of 12A: running on node2, 0 of 2 frames done\n");
+            "task 0000: waiting to be requeued: node1: previzd 0.0 is installed here\n"
+            "task 0001: running on node2\n");
 }
 
 // The task runs again elsewhere, and has not said so yet.
 TEST_F(FarmStatus, NamesTheMachineThatSlurmKnows) {
   say(0, TaskOutcome::stopped, "");
   queue("17_0|0|RUNNING|node3|None\n");
-  EXPECT_THAT(words(), HasSubstr("task 0, frames 0 to 1 of 12A: running on node3, 0 of 2"));
+  EXPECT_THAT(words(), HasSubstr("task 0000: running on node3\n"));
 }
 
 TEST_F(FarmStatus, SaysWhyTasksWait) {
@@ -109,16 +102,10 @@ TEST_F(FarmStatus, OfATaskThatIsGoneIsAFailure) {
   say(1, TaskOutcome::machine, "no Vulkan device");
   EXPECT_EQ(words(),
             "0 of 4 frames done, 0 tasks running, 2 failed\n"
-            "task 0, frames 0 to 1 of 12A: ended on node1 with 0 of 2 frames done\n"
-            "task 1, frames 2 to 3 of 12A: node1: no Vulkan device\n"
-            "nothing runs: `previz farm retry` renders what is missing\n");
-}
-
-// The folder was moved, or is given by another path: a retry would submit all again.
-TEST_F(FarmStatus, NamesJobsOfAnotherName) {
-  stand_in("squeue", "case \"$*\" in *--name=*) ;; *) echo '17|previz-01234567';; esac");
-  EXPECT_THAT(words(),
-              AllOf(HasSubstr("in the queue under another name: 17; "), Not(HasSubstr("retry"))));
+            "task 0000: ended on node1 before its time\n"
+            "task 0001: node1: no Vulkan device\n"
+            "nothing runs under this job's name, " +
+                folder_.name() + ": `previz farm retry` renders what is missing\n");
 }
 
 TEST_F(FarmStatus, SaysWhatIsToBeDoneAfterALastStepThatFailed) {
@@ -142,23 +129,47 @@ TEST_F(FarmStatus, SaysWhatIsToBeDoneAfterALastStepThatFailed) {
               testing::EndsWith("\npictures: " + (directory_ / "out").string() + "\n"));
 }
 
-// Chunk 0 was rendered before, so that it has no folder, and the others are still in theirs.
-TEST_F(FarmStatus, NamesThePicturesOnlyWhenTheyAreThere) {
+// Without Slurm a task is known by its place in the job's folder, and its frames by theirs.
+TEST_F(FarmStatus, KnowsWhoIsAlive) {
+  std::filesystem::create_directories(directory_ / "out");
+  stand_in("sbatch", "exit 1");
+  std::optional<post::FolderLocks> job(std::in_place, folder_.path()),
+      pictures(std::in_place, directory_ / "out");
+  for (auto* locks : {&*job, &*pictures}) {
+    const post::FolderLocks::Transaction transaction(*locks);
+    locks->join();
+    if (locks == &*pictures) {
+      EXPECT_TRUE(locks->claim(2));
+    }
+  }
+  const std::string name = task_name({}, post::host_name());
+  folder_.write_state(name, state_now(TaskOutcome::running, post::host_name(), ""));
+  EXPECT_THAT(words(), AllOf(HasSubstr("1 task running, 0 failed"),
+                             HasSubstr("task " + name + ": running on " + post::host_name() +
+                                       ", frame 2 of 12A\n")));
+  pictures.reset();
+  job.reset();
+  EXPECT_THAT(words(), HasSubstr("0 tasks running, 1 failed"));
+}
+
+TEST_F(FarmStatus, CountsSampleRanges) {
   JobStatus status = all_done();
-  EXPECT_THAT(words(status), Not(HasSubstr("pictures:")));
-  status.has_parts = false;  // a last step that left no word
-  EXPECT_THAT(words(status), HasSubstr("pictures:"));
+  status.parts = 16;
+  status.done = 1;
+  status.parts_done = 7;
+  status.seconds_a_part = 60;
+  status.tasks["0000"].is_running = true;
+  EXPECT_THAT(words(status), StartsWith("1 of 4 frames done, 7 of their 16 sample ranges, 1 task "
+                                        "running, 0 failed, about 9:00 left\n"));
 }
 
 // What stands in files is data: it moves no cursor, and no line of it looks like one of ours.
 TEST_F(FarmStatus, PrintsEveryTextOnOneLine) {
-  job_.takes[0].session = "/takes/12A\x1b[2J";
   say(0, TaskOutcome::machine, "a\nb\x1b]0;title\x07");
   say(1, TaskOutcome::running, "");
   session::write_content(folder_.stopped_file(), "chunk 0: \x1b[31mred\r\nnothing runs\n");
   const std::string said = words();
-  EXPECT_THAT(said,
-              HasSubstr("task 0, frames 0 to 1 of 12A\\x1b[2J: node1: a b\\x1b]0;title\\x07\n"));
+  EXPECT_THAT(said, HasSubstr("task 0000: node1: a b\\x1b]0;title\\x07\n"));
   EXPECT_THAT(said, HasSubstr("\nstopped: chunk 0: \\x1b[31mred\\x0d nothing runs\n"));
   EXPECT_THAT(said, Not(HasSubstr("\x1b")));
 }

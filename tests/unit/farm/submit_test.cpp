@@ -77,12 +77,12 @@ TEST_F(FarmSubmission, ThatIsRefusedLeavesAFolderThatWasThere) {
 TEST_F(FarmSubmission, TakesNoWordOfAnEarlierJob) {
   std::filesystem::create_directories(folder_.path() / "state");
   const TaskState done = state_now(TaskOutcome::done, "node1", "");
-  folder_.write_finish_state(done);
-  folder_.write_state(0, done);
+  folder_.write_state(finish_name, done);
+  folder_.write_state("0000", done);
   stand_in("sbatch", "echo 17");
   EXPECT_EQ(refusal(), "");
-  EXPECT_FALSE(folder_.read_finish_state());
-  EXPECT_FALSE(folder_.read_state(0));
+  EXPECT_FALSE(folder_.read_state(finish_name));
+  EXPECT_FALSE(folder_.read_state("0000"));
 }
 
 // A part that cannot be taken back is canceled by the folder.
@@ -150,7 +150,7 @@ TEST_F(FarmSubmission, MayBeTriedAgainWithOtherWishes) {
 TEST_F(FarmSubmission, ThatIsCanceledIsStopped) {
   submit();
   cancel(job(), out_);
-  EXPECT_THAT(out_.str(), HasSubstr(": nothing is in the queue\n"));
+  EXPECT_THAT(out_.str(), HasSubstr(": nothing is in the queue under the job's name, previz-"));
   EXPECT_EQ(folder_.read_stopped(), "");
   stand_in("squeue", "echo '17_0|0|RUNNING|node1|None'");
   cancel(job(), out_);

@@ -12,10 +12,12 @@
 #include "daemon/tools/farm/status.hpp"
 #include "daemon/tools/post/folder_locks.hpp"
 #include "daemon/tools/post/render.hpp"
+#include "daemon/tools/post/render_files.hpp"
 #include "tests/support/environment_variable.hpp"
 #include "tests/support/session_fixture.hpp"
 #include "tests/support/small_take.hpp"
 #include "tests/support/test.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::farm::task_test {
 
@@ -40,13 +42,16 @@ class FarmTask : public testing::Test {
     };
   }
   void submit() { farm::submit(options_, out_); }
-  int run(std::size_t chunk, const std::stop_token& stop = {}, bool not_if_taken = false) {
+  // Without a number it renders until nothing is left.
+  int run(std::optional<std::uint64_t> number = {}, const std::stop_token& stop = {}) {
     TaskOptions task;
     task.stop = stop;
-    task.not_if_taken = not_if_taken;
     task.job = folder_.path();
-    task.chunk = chunk;
+    task.number = number;
     return run_task(task, machine_, out_);
+  }
+  std::string said(std::uint64_t number) const {
+    return state_of(folder_.read_state(task_name(number, "")));
   }
   int finish() {
     out_.str("");
@@ -57,14 +62,24 @@ class FarmTask : public testing::Test {
     job.job = folder_.path();
     return job;
   }
+  void divide_samples(int ranges) {
+    options_.render.samples = 256;
+    options_.render.neighbours = 0;
+    options_.division.sample_ranges = ranges;
+  }
+  bool has_picture(std::uint64_t frame) const {
+    return std::filesystem::exists(directory_ / "out" / post::frame_file(frame, ".exr"));
+  }
   void run_all() {
-    for (std::size_t chunk = 0; chunk < folder_.read_plan().chunks.size(); ++chunk)
-      EXPECT_EQ(run(chunk), task_status::done) << out_.str();
+    const Job job = folder_.read_plan();
+    for (std::uint64_t number = 0; number < job.tasks(job.frames()); ++number)
+      EXPECT_EQ(run(number), task_status::done) << out_.str();
   }
   // Renders the take in one run beside the job's pictures, and compares every file.
   void expect_pictures_of_one_run(post::RenderOptions options) {
     options.session = directory_ / "session";
     options.directory = directory_ / "one";
+    options.video = true;
     std::ostringstream out;
     post::render_session(options, out);
     std::size_t files = 0;
@@ -92,27 +107,25 @@ TEST_F(FarmTask, MakesThePicturesOfOneRun) {
   submit();
   EXPECT_THAT(out_.str(), HasSubstr("8 frames of 1 take in 3 tasks"));
   EXPECT_THAT(out_.str(), HasSubstr("There is no Slurm here"));
+  EXPECT_EQ(run(0), task_status::done) << out_.str();
+  EXPECT_TRUE(has_picture(2));
+  EXPECT_FALSE(has_picture(3)) << "it ends with its share";
   run_all();
   EXPECT_EQ(finish(), task_status::done) << out_.str();
   EXPECT_FALSE(std::filesystem::exists(folder_.missing_file()));
-  EXPECT_FALSE(std::filesystem::exists(folder_.chunk(0)));
   expect_pictures_of_one_run({});
 }
 
 TEST_F(FarmTask, MergesSampleRangesToThePicturesOfOneRun) {
-  options_.render.samples = 256;
-  options_.render.neighbours = 0;
-  options_.division.sample_ranges = 4;
+  divide_samples(4);
   submit();
-  EXPECT_EQ(folder_.read_plan().chunks.size(), std::size_t{3 * 4 + 3});
+  EXPECT_EQ(folder_.read_plan().tasks(8), 11u);
   run_all();
   EXPECT_EQ(finish(), task_status::done) << out_.str();
-  post::RenderOptions one;
-  one.samples = 256;
-  one.neighbours = 0;
-  expect_pictures_of_one_run(one);
+  EXPECT_FALSE(std::filesystem::exists(folder_.place("sums")));
+  expect_pictures_of_one_run(options_.render);
   out_.str("");
-  run_all();  // as a machine that comes to the loop late
+  EXPECT_EQ(run(), task_status::done);  // as a machine that comes to the loop late
   EXPECT_THAT(out_.str(), Not(HasSubstr("samples in")));
 }
 
@@ -145,13 +158,12 @@ TEST_F(FarmTask, OfAnotherSetStopsTheJob) {
   text.replace(text.find("samples = 2"), 11, "samples = 3");
   write_content(file, text);
   EXPECT_EQ(run(0), task_status::job_fault);
-  EXPECT_THAT(
-      state_of(folder_.read_state(0)),
-      AllOf(StartsWith("job: "), HasSubstr("was changed since the job was made (samples is")));
+  EXPECT_THAT(said(0), AllOf(StartsWith("job: "),
+                             HasSubstr("was changed since the job was made (samples is 2")));
   EXPECT_EQ(run(1), task_status::job_fault);
-  EXPECT_THAT(out_.str(), HasSubstr("the job was stopped: chunk 0: "));
-  EXPECT_EQ(state_of(folder_.read_state(1)), "none");
-  EXPECT_FALSE(std::filesystem::exists(directory_ / "out/0000.exr"));
+  EXPECT_THAT(out_.str(), HasSubstr("the job was stopped: task 0000: "));
+  EXPECT_EQ(said(1), "none");
+  EXPECT_FALSE(has_picture(0));
 }
 
 TEST_F(FarmTask, OnAMachineThatCannotIsForAnother) {
@@ -159,17 +171,16 @@ TEST_F(FarmTask, OnAMachineThatCannotIsForAnother) {
   machine_.host = "node2";
   machine_.software = "previzd 0.0";
   EXPECT_EQ(run(1), task_status::machine_fault);
-  EXPECT_THAT(state_of(folder_.read_state(1)),
-              StartsWith("machine: previzd 0.0 is installed here"));
+  EXPECT_THAT(said(1), StartsWith("machine: previzd 0.0 is installed here"));
   machine_ = this_machine();
   machine_.open_device = [](const auto&) -> std::shared_ptr<render::Device> {
     throw Error("no Vulkan device");
   };
   EXPECT_EQ(run(2), task_status::machine_fault);
-  EXPECT_EQ(state_of(folder_.read_state(2)), "machine: no Vulkan device");
+  EXPECT_EQ(said(2), "machine: no Vulkan device");
   print_status(job_options(), out_);
   EXPECT_THAT(out_.str(), HasSubstr("0 of 8 frames done, 0 tasks running, 2 failed"));
-  EXPECT_THAT(out_.str(), HasSubstr("task 1, frames 3 to 5 of session: node2: previzd 0.0 is"));
+  EXPECT_THAT(out_.str(), HasSubstr("task 0001: node2: previzd 0.0 is installed here"));
 }
 
 TEST_F(FarmTask, ThatIsMissingIsNamedAndTriedAgain) {
@@ -177,42 +188,49 @@ TEST_F(FarmTask, ThatIsMissingIsNamedAndTriedAgain) {
   EXPECT_EQ(run(0), task_status::done);
   EXPECT_EQ(run(2), task_status::done);
   EXPECT_EQ(finish(), task_status::machine_fault);
-  EXPECT_THAT(out_.str(), HasSubstr("session: frames 3 to 5: not begun"));
-  EXPECT_THAT(out_.str(), HasSubstr("3 frames are missing; `previz farm retry`"));
+  EXPECT_THAT(out_.str(), HasSubstr("session: frames 6 to 7: not rendered: no task has come"));
+  EXPECT_THAT(out_.str(), HasSubstr("2 frames are missing; `previz farm retry`"));
   const auto missing = nlohmann::json::parse(content_of(folder_.missing_file()));
-  EXPECT_EQ(missing[0]["frames"], (std::vector<int>{3, 4, 5}));
+  EXPECT_EQ(missing[0]["frames"], (std::vector<int>{6, 7}));
   const auto before = std::filesystem::last_write_time(directory_ / "out/0000.exr");
-  run_all();
+  EXPECT_EQ(run(1), task_status::done);
   EXPECT_EQ(finish(), task_status::done) << out_.str();
   EXPECT_EQ(std::filesystem::last_write_time(directory_ / "out/0000.exr"), before);
   EXPECT_FALSE(std::filesystem::exists(folder_.missing_file()));
 }
 
-// Before the last step and after it.
+// What a task has said is named where nobody has rendered the frames.
+TEST_F(FarmTask, ThatFailedIsTheReasonForWhatIsMissing) {
+  submit();
+  machine_.host = "node2";
+  machine_.free_bytes = [](const auto&) -> std::uint64_t { return 0; };
+  EXPECT_EQ(run(0), task_status::machine_fault);
+  EXPECT_EQ(finish(), task_status::machine_fault);
+  EXPECT_THAT(out_.str(), HasSubstr("session: frames 0 to 7: on node2: "));
+  EXPECT_THAT(out_.str(), HasSubstr("0 MB are free"));
+}
+
 TEST_F(FarmTask, WhosePictureWasDamagedIsFoundAndTriedAgain) {
   submit();
   run_all();
-  write_content(folder_.chunk(0) / "0001.exr", "damaged");
-  EXPECT_EQ(finish(), task_status::machine_fault);
-  EXPECT_THAT(out_.str(), HasSubstr("session: frame 1: its .exr has another size"));
-  EXPECT_EQ(run(0), task_status::done);
-  EXPECT_EQ(finish(), task_status::done) << out_.str();
-  write_content(directory_ / "out/0004.png", "damaged");
-  EXPECT_EQ(finish(), task_status::machine_fault);
-  EXPECT_EQ(run(1), task_status::done);
-  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  for (const char* picture : {"0001.exr", "0004.png"}) {
+    write_content(directory_ / "out" / picture, "damaged");
+    EXPECT_EQ(finish(), task_status::machine_fault);
+    EXPECT_THAT(out_.str(), HasSubstr(" has another size"));
+    EXPECT_THAT(out_.str(), HasSubstr("1 frame is missing"));
+    farm::retry(job_options(), out_);
+    EXPECT_EQ(run(0), task_status::done);
+    EXPECT_EQ(finish(), task_status::done) << out_.str();
+  }
   expect_pictures_of_one_run({});
 }
 
-// A chunk of which some frames are there, so that these are looked at before the first one is
-// rendered.
 TEST_F(FarmTask, ThatIsStoppedAtItsStartStopsNoOther) {
   submit();
-  run_all();
   std::stop_source stop;
   stop.request_stop();
   EXPECT_EQ(run(0, stop.get_token()), task_status::done);
-  EXPECT_THAT(state_of(folder_.read_state(0)), StartsWith("stopped: "));
+  EXPECT_THAT(said(0), StartsWith("stopped: "));
   EXPECT_EQ(folder_.read_stopped(), "");
   EXPECT_EQ(run(0), task_status::done) << out_.str();
 }
@@ -222,56 +240,50 @@ TEST_F(FarmTask, ThatCannotReadTheTakeIsForAnotherMachine) {
   submit();
   std::filesystem::remove_all(directory_ / "session/observer.mkv");
   EXPECT_EQ(run(0), task_status::machine_fault);
-  EXPECT_THAT(state_of(folder_.read_state(0)), StartsWith("machine: "));
+  EXPECT_THAT(said(0), StartsWith("machine: "));
   EXPECT_EQ(folder_.read_stopped(), "");
 }
 
-// A task that is started after all sums have ended would wait in vain for one that is missing.
 TEST_F(FarmTask, ThatMergesNeedsAllSums) {
-  options_.render.samples = 256;
-  options_.render.neighbours = 0;
-  options_.division.sample_ranges = 2;
-  options_.division.chunk = 4;
-  submit();  // sums: 0 to 3, merges: 4 and 5
-  for (const std::size_t chunk : {0, 2, 3}) EXPECT_EQ(run(chunk), task_status::done);
-  EXPECT_EQ(run(4, {}, /*not_if_taken=*/true), task_status::done);
-  EXPECT_THAT(out_.str(), HasSubstr("the sums that are merged in it are not all there yet"));
-  EXPECT_EQ(state_of(folder_.read_state(4)), "none");
-  EXPECT_EQ(run(4), task_status::missing_sums);
-  EXPECT_EQ(state_of(folder_.read_state(4)),
-            "machine: chunk 1 (frames 0 to 3 of session, sample range 2 of 2) is not rendered, so "
-            "that there is nothing to merge; `previz farm retry` renders it");
-  EXPECT_EQ(run(5), task_status::done) << out_.str();
+  divide_samples(2);
+  options_.division.chunk = 8;  // a range of all frames
+  submit();
+  EXPECT_EQ(run(0), task_status::done);
+  EXPECT_FALSE(has_picture(0));
   EXPECT_EQ(finish(), task_status::machine_fault);
+  EXPECT_THAT(out_.str(), HasSubstr("8 frames are missing"));
+  // A sum that was damaged is rendered again.
+  write_content(folder_.sums(0, 1) / "0003.sums.exr", "damaged");
+  farm::retry(job_options(), out_);
   run_all();
+  EXPECT_EQ(run(), task_status::done) << out_.str();
   EXPECT_EQ(finish(), task_status::done) << out_.str();
+  expect_pictures_of_one_run(options_.render);
 }
 
 // Sums are rendered of those frames only whose pictures are not there yet.
 TEST_F(FarmTask, ThatMergesNeedsNoSumsOfAFrameThatIsThere) {
-  options_.render.samples = 256;
-  options_.render.neighbours = 0;
-  options_.division.sample_ranges = 2;
-  options_.division.chunk = 4;
+  divide_samples(2);
   post::RenderOptions one = options_.render;
   one.session = directory_ / "session";
   one.frames = {0, 1};
   one.video = false;
   post::render_session(one, out_);
   submit();
+  out_.str("");
   run_all();
+  EXPECT_THAT(out_.str(), Not(HasSubstr("frame 0:")));
   EXPECT_EQ(finish(), task_status::done) << out_.str();
-  EXPECT_FALSE(std::filesystem::exists(folder_.chunk(0)));
 }
 
 // Folders of the job that lead elsewhere: nothing is written or removed there.
 TEST_F(FarmTask, OfAJobWithLinksIsRefused) {
   test::TemporaryDirectory victim;
-  std::filesystem::create_directories(victim / "0000");
-  write_content(victim / "0000/notes.txt", "mine");
+  write_content(victim / "notes.txt", "mine");
+  divide_samples(2);
   submit();
   run_all();
-  for (const char* name : {"chunks", "state", "log", "set", "chunks/0001"}) {
+  for (const char* name : {"sums", "state", "log", "set", "sums/0000", "sums/0000/1"}) {
     const std::filesystem::path place = folder_.place(name), kept = directory_ / "kept";
     std::filesystem::rename(place, kept);
     std::filesystem::create_directory_symlink(victim.path(), place);
@@ -281,18 +293,18 @@ TEST_F(FarmTask, OfAJobWithLinksIsRefused) {
     std::filesystem::remove(place);
     std::filesystem::rename(kept, place);
   }
-  EXPECT_EQ(content_of(victim / "0000/notes.txt"), "mine");
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(victim.path()), {}), 1);
 }
 
-// What others have put into a chunk's folder stays when the job is complete.
+// What others have put into a folder of sums stays when the job is complete.
 TEST_F(FarmTask, RemovesItsOwnFilesOnly) {
+  divide_samples(2);
   submit();
   run_all();
-  write_content(folder_.chunk(1) / "notes.txt", "mine");
+  write_content(folder_.sums(0, 1) / "notes.txt", "mine");
   EXPECT_EQ(finish(), task_status::done) << out_.str();
-  EXPECT_EQ(content_of(folder_.chunk(1) / "notes.txt"), "mine");
-  EXPECT_FALSE(std::filesystem::exists(folder_.chunk(0)));
+  EXPECT_EQ(content_of(folder_.sums(0, 1) / "notes.txt"), "mine");
+  EXPECT_FALSE(std::filesystem::exists(folder_.sums(0, 2)));
 }
 
 // The loop on several machines ends with the last step on each.
@@ -307,30 +319,22 @@ TEST_F(FarmTask, IsFinishedByTwoMachinesAtOnce) {
   }
   EXPECT_EQ(other, task_status::done) << out.str();
   EXPECT_FALSE(std::filesystem::exists(folder_.missing_file()));
-  EXPECT_EQ(state_of(folder_.read_finish_state()), "done: ");
+  EXPECT_EQ(state_of(folder_.read_state(finish_name)), "done: ");
   expect_pictures_of_one_run({});
 }
 
-// A process at work in a chunk's folder.
+// A process that renders a frame into the folder of pictures.
 class OtherProcess {
  public:
-  explicit OtherProcess(const std::filesystem::path& chunk) : locks_(chunk) {
+  OtherProcess(const std::filesystem::path& pictures, std::uint64_t frame) : locks_(pictures) {
     const post::FolderLocks::Transaction transaction(locks_);
     locks_.join();
+    EXPECT_TRUE(locks_.claim(frame));
   }
 
  private:
   post::FolderLocks locks_;
 };
-
-TEST_F(FarmTask, ThatAnotherHasMayBeLeftToIt) {
-  submit();
-  std::filesystem::create_directories(folder_.chunk(1));
-  const OtherProcess other(folder_.chunk(1));
-  EXPECT_EQ(run(1, {}, /*not_if_taken=*/true), task_status::done);
-  EXPECT_THAT(out_.str(), HasSubstr("another machine is rendering it"));
-  EXPECT_EQ(state_of(folder_.read_state(1)), "none");
-}
 
 // A job has one name, by whatever way it is reached.
 TEST_F(FarmTask, IsKnownThroughALink) {
@@ -347,8 +351,9 @@ TEST_F(FarmTask, ThatRunsTwiceDoesNoHarm) {
     const std::jthread other([&] {
       TaskOptions task;
       task.job = folder_.path();
+      task.number = 0;
       std::ostringstream out;
-      EXPECT_EQ(run_task(task, machine_, out), task_status::done) << out.str();
+      EXPECT_EQ(run_task(task, this_machine(), out), task_status::done) << out.str();
     });
     EXPECT_EQ(run(0), task_status::done) << out_.str();
   }
@@ -359,57 +364,42 @@ TEST_F(FarmTask, ThatRunsTwiceDoesNoHarm) {
 
 TEST_F(FarmTask, ThatIsAtWorkIsLeftAloneByTheLastStep) {
   submit();
-  run_all();
-  const std::filesystem::path lines = folder_.chunk(1) / "frames.jsonl";
-  const std::string text = content_of(lines);
-  write_content(lines, text.substr(0, text.find('\n') + 1));  // of its three frames
-  const OtherProcess other(folder_.chunk(1));
+  EXPECT_EQ(run(0), task_status::done);
+  const OtherProcess other(directory_ / "out", 4);
   EXPECT_EQ(finish(), task_status::machine_fault);
-  EXPECT_THAT(out_.str(), HasSubstr("session: frames 3 to 5: is being rendered"));
+  EXPECT_THAT(out_.str(), HasSubstr("session: frame 4: is being rendered by previzd"));
 }
 
-// The last step of another machine ends while a task of this one opens its device: pictures of
-// whole frames, then of sample ranges, whose sums are gone by then.
-TEST_F(FarmTask, ThatComesTooLateRendersNothing) {
-  for (const int ranges : {1, 2}) {
-    options_.render.samples = 128;
-    options_.render.neighbours = 0;
-    options_.division.sample_ranges = ranges;
-    options_.render.directory = directory_ / ("out" + std::to_string(ranges));
-    options_.render.force = ranges > 1;
-    options_.job = directory_ / ("job" + std::to_string(ranges));
-    submit();
-    const JobFolder folder(*options_.job);
-    TaskOptions task;
-    task.job = folder.path();
-    const std::size_t chunks = folder.read_plan().chunks.size();
-    for (task.chunk = 0; task.chunk < chunks; ++task.chunk)
-      EXPECT_EQ(run_task(task, machine_, out_), task_status::done) << out_.str();
-    Machine late = machine_;
-    late.open_device = [&](const render::DeviceOptions& options) {
-      JobOptions job;
-      job.job = folder.path();
-      EXPECT_EQ(farm::finish(job, out_), task_status::done) << out_.str();
-      out_.str("");
-      return machine_.open_device(options);
-    };
-    task.chunk = chunks - 1;
-    EXPECT_EQ(run_task(task, late, out_), task_status::done) << out_.str();
-    EXPECT_THAT(out_.str(), Not(HasSubstr("samples in")));
-    EXPECT_EQ(state_of(folder.read_state(task.chunk)), "done: ");
-  }
-}
-
-// The first to end of two that share a chunk says nothing while the other is at work.
-TEST_F(FarmTask, ThatSharesAChunkLeavesTheLastWordToTheOther) {
+// A frame that another process has is waited for: that process may die.
+TEST_F(FarmTask, TakesOverWhatAnotherDoesNotFinish) {
   submit();
-  EXPECT_EQ(run(1), task_status::done) << out_.str();
-  std::optional<OtherProcess> other(std::in_place, folder_.chunk(1));
-  EXPECT_EQ(run(1), task_status::done) << out_.str();
-  EXPECT_EQ(state_of(folder_.read_state(1)), "running: ");
-  other.reset();
-  EXPECT_EQ(run(1), task_status::done) << out_.str();
-  EXPECT_EQ(state_of(folder_.read_state(1)), "done: ");
+  std::optional<OtherProcess> other(std::in_place, directory_ / "out", 4);
+  const std::jthread end([&] {
+    EXPECT_TRUE(test::wait_until("all other frames are there",
+                                 [&] { return has_picture(7) && has_picture(3); }));
+    EXPECT_FALSE(has_picture(4));
+    other.reset();
+  });
+  EXPECT_EQ(run(), task_status::done) << out_.str();
+  EXPECT_TRUE(has_picture(4));
+}
+
+// The last step of another machine ends while a task of this one opens its device, and removes the
+// sums.
+TEST_F(FarmTask, ThatComesTooLateRendersNothing) {
+  divide_samples(2);
+  submit();
+  Machine late = machine_;
+  late.open_device = [&](const render::DeviceOptions& options) {
+    run_all();
+    EXPECT_EQ(finish(), task_status::done) << out_.str();
+    out_.str("");
+    return machine_.open_device(options);
+  };
+  TaskOptions task;
+  task.job = folder_.path();
+  EXPECT_EQ(run_task(task, late, out_), task_status::done) << out_.str();
+  EXPECT_THAT(out_.str(), Not(HasSubstr("samples in")));
 }
 
 // A retry that finds frames missing takes back what an earlier last step said.
@@ -419,26 +409,7 @@ TEST_F(FarmTask, ThatIsToBeRetriedTakesBackThatTheJobIsDone) {
   EXPECT_EQ(finish(), task_status::done) << out_.str();
   std::filesystem::remove(directory_ / "out/0004.exr");
   farm::retry(job_options(), out_);
-  EXPECT_EQ(state_of(folder_.read_finish_state()), "none");
-}
-
-// In the loop machines come to the end one after the other.
-TEST_F(FarmTask, ThatOnlyLooksIsWaitedForByTheLastStep) {
-  post::RenderOptions one;
-  one.session = directory_ / "session";
-  one.directory = options_.render.directory;
-  one.frames = {3, 3};
-  one.video = false;
-  post::render_session(one, out_);  // a part of chunk 1 is among the pictures already
-  submit();
-  run_all();
-  std::optional<OtherProcess> other(std::in_place, folder_.chunk(1));
-  const std::jthread end([&] {
-    // Time for the last step to meet it.
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
-    other.reset();
-  });
-  EXPECT_EQ(finish(), task_status::done) << out_.str();
+  EXPECT_EQ(state_of(folder_.read_state(finish_name)), "none");
 }
 
 TEST_F(FarmTask, OfAnotherKindOfDeviceIsNotTaken) {
@@ -446,19 +417,19 @@ TEST_F(FarmTask, OfAnotherKindOfDeviceIsNotTaken) {
   options_.on_gpu = render::is_gpu(*machine_.open_device({}));
   submit();
   run_all();
-  const std::filesystem::path file = folder_.chunk(2) / "frames.jsonl";
+  const std::filesystem::path file = directory_ / "out/frames.jsonl";
   std::string lines = content_of(file);
   const std::string is = options_.on_gpu.value() ? "true" : "false",
                     is_not = is == "true" ? "false" : "true";
-  lines.replace(lines.find("\"is_gpu\":" + is), 9 + is.size(), "\"is_gpu\":" + is_not);
+  lines.replace(lines.rfind("\"is_gpu\":" + is), 9 + is.size(), "\"is_gpu\":" + is_not);
   write_content(file, lines);
   EXPECT_EQ(finish(), task_status::machine_fault);
-  EXPECT_THAT(out_.str(), HasSubstr("session: frame 6: was rendered on "));
+  EXPECT_THAT(out_.str(), HasSubstr("session: frame 7: was rendered on "));
   EXPECT_THAT(out_.str(), HasSubstr("--any-device` takes both"));
   EXPECT_EQ(finish(), task_status::machine_fault);  // it is still known
-  EXPECT_THAT(out_.str(), HasSubstr("session: frame 6: was rendered on "));
+  EXPECT_THAT(out_.str(), HasSubstr("session: frame 7: was rendered on "));
   farm::retry(job_options(), out_);
-  EXPECT_EQ(run(2), task_status::done) << out_.str();
+  EXPECT_EQ(run(0), task_status::done) << out_.str();
   EXPECT_EQ(finish(), task_status::done) << out_.str();
 }
 
@@ -476,6 +447,20 @@ TEST_F(FarmTask, OfAnotherKindOfDeviceMayBeTakenLater) {
   JobOptions both = job_options();
   both.any_device = true;
   EXPECT_EQ(farm::finish(both, out_), task_status::done) << out_.str();
+}
+
+// Before the night, and not after it.
+TEST_F(FarmTask, OfAnotherKindOfDeviceIsRefusedWhereItWasRenderedBefore) {
+  post::RenderOptions before = options_.render;
+  before.session = directory_ / "session";
+  before.frames = post::FrameRange{0, 1};
+  post::render_session(before, out_);
+  options_.any_device = false;
+  options_.on_gpu = !render::is_gpu(*machine_.open_device({}));
+  EXPECT_THAT(test::error_of([&] { submit(); }),
+              AllOf(HasSubstr("frame 0: was rendered on "), HasSubstr("--force")));
+  options_.render.force = true;
+  submit();
 }
 
 // A plan that came from elsewhere chooses neither a place nor a program.
@@ -510,7 +495,7 @@ TEST_F(FarmTask, ReadsInTheJobOnlyUnlessItIsAllowed) {
     write_content(folder_.plan(), json.dump());
   };
   std::filesystem::create_directory_symlink(elsewhere.path(), folder_.path() / "evil");
-  for (const char* place : {"evil/secret.toml", "chunks/../evil/secret.toml"}) {
+  for (const char* place : {"evil/secret.toml", "state/../evil/secret.toml"}) {
     name_in_plan(place);
     expect_refused("lies outside the job's folder");
   }
@@ -547,34 +532,27 @@ TEST_F(FarmTask, LeavesOutWhatIsRenderedAlready) {
   before.frames = post::FrameRange{0, 4};
   std::ostringstream out;
   post::render_session(before, out);
+  const auto written = std::filesystem::last_write_time(directory_ / "out/0004.exr");
   submit();
-  EXPECT_EQ(run(1), task_status::done);
-  EXPECT_FALSE(std::filesystem::exists(folder_.chunk(1) / "0003.exr"));
-  EXPECT_TRUE(std::filesystem::exists(folder_.chunk(1) / "0005.exr"));
-  EXPECT_EQ(run(2), task_status::done);
+  EXPECT_EQ(run(0), task_status::done);
+  EXPECT_EQ(std::filesystem::last_write_time(directory_ / "out/0004.exr"), written);
+  EXPECT_TRUE(has_picture(7));
   EXPECT_EQ(finish(), task_status::done) << out_.str();
 }
 
-// The last step looks at every chunk, and must not look at all others for each of them: with 20,000
-// that would take minutes, and the test would be ended.
+// The plan has no word for each of them, and the last step looks at each once.
 TEST_F(FarmTask, OfManyFramesIsPlannedAndProvedInLittleTimeAndSpace) {
-  std::set<std::uint64_t> frames;
-  for (std::uint64_t frame = 0; frame < 10'000; ++frame) frames.insert(frame);
   Job job;
   job.takes.emplace_back();
   job.takes[0].session = job.takes[0].pictures = "/a";
-  job.takes[0].frames = {0, 9'999};
+  job.takes[0].frames = {0, 99'999};
   job.takes[0].settings = "{}";
-  Division division;
-  division.chunk = 1;
-  divide(frames, 0, 1, division, job.chunks);
   const std::string text = to_json(job);
-  EXPECT_LT(text.size(), 2'000'000u);
+  EXPECT_LT(text.size(), 2'000u);
   Job read = job_from_json(text, "plan");
-  EXPECT_EQ(read.chunks.size(), 10'000u);
   read.takes[0].pictures = directory_ / "out";
-  const Proof proof = prove(folder_, read, Foreign::keep, out_, {});
-  EXPECT_EQ(proof.chunks.size(), 10'000u);
+  std::filesystem::create_directory(folder_.path());
+  EXPECT_EQ(prove(folder_, read, Foreign::keep, out_, {}).missing_frames(), 100'000u);
 }
 
 TEST_F(FarmTask, DryRunWritesNothing) {

@@ -105,73 +105,21 @@ TEST_F(RenderDirectoryTest, ALineSaysWhichDeviceMadeTheFrame) {
   EXPECT_EQ(again.finished(1)->made_on, MadeOn{});
 }
 
-// Frame 1 is in both folders, and the one that is there stays; frame 3 is beyond the range.
-TEST_F(RenderDirectoryTest, TakesOverWhatAnotherFolderHas) {
-  const set::Output part{directory_ / "part", true, true, false};
-  {
-    RenderDirectory from(part, settings, false);
-    for (const std::uint64_t frame : {0, 1, 2, 3}) from.write(sample_shot(frame), set_);
-  }
-  open().write(sample_shot(1), set_, {"the first", false});
-  const std::string exr = content_of(directory_ / "part/0002.exr");
-  {
-    RenderDirectory from(part, settings, false, {}, {0, 2});
-    EXPECT_EQ(open().adopt(from), 2u);
-  }
-  RenderDirectory left(part, settings, false);
-  EXPECT_EQ(finished(left, 3), "nyny");
-  EXPECT_TRUE(left.rejected().empty());
-  EXPECT_EQ(content_of(directory_ / "out/0002.exr"), exr);
-  EXPECT_FALSE(std::filesystem::exists(directory_ / "part/0002.exr"));
-  EXPECT_FALSE(std::filesystem::exists(directory_ / "part/0002.png"));
-  EXPECT_TRUE(std::filesystem::exists(directory_ / "part/0003.exr"));
-  const RenderDirectory again = open();
-  EXPECT_EQ(finished(again, 3), "yyyn");
-  EXPECT_EQ(again.finished(1)->made_on.device, "the first");
-  EXPECT_TRUE(again.rejected().empty());
-  EXPECT_EQ(open().adopt(left), 1u);
-}
-
-// A crash after each of the moves of two frames of two files, and after the lines were written.
-TEST_F(RenderDirectoryTest, LosesNoFrameWhereACrashCutsTheTakingOver) {
-  const set::Output part{directory_ / "part", true, true, false};
-  const std::vector<const char*> moves{"0000.exr", "0000.png", "0001.exr", "0001.png", ""};
-  for (std::size_t moved = 0; moved <= moves.size(); ++moved) {
-    std::filesystem::remove_all(directory_ / "part");
-    std::filesystem::remove_all(directory_ / "out");
-    {
-      RenderDirectory from(part, settings, false);
-      for (const std::uint64_t frame : {0, 1}) from.write(sample_shot(frame), set_);
-    }
-    open();
-    for (std::size_t i = 0; i < moved && *moves[i] != 0; ++i)
-      std::filesystem::rename(directory_ / "part" / moves[i], directory_ / "out" / moves[i]);
-    if (moved == moves.size())
-      std::filesystem::copy_file(directory_ / "part/frames.jsonl", directory_ / "out/frames.jsonl",
-                                 std::filesystem::copy_options::overwrite_existing);
-    take_back(directory_ / "part", directory_ / "out");
-    RenderDirectory from(part, settings, false);
-    RenderDirectory to = open();
-    to.adopt(from);
-    EXPECT_EQ(finished(to, 1), "yy") << moved;
-    EXPECT_TRUE(from.rejected().empty()) << moved;
-    EXPECT_EQ(finished(open(), 1), "yy") << moved;
-  }
-}
-
-// The lines of what is not taken over stay, with their files.
+// Their lines stay, until they are forgotten, and so do their files.
 TEST_F(RenderDirectoryTest, KeepsWhatItCountsAsNotFinished) {
-  const set::Output part{directory_ / "part", true, true, false};
-  RenderDirectory from(part, settings, false);
-  from.write(sample_shot(0), set_, {"a card", true});
-  from.write(sample_shot(1), set_, {"a processor", false});
-  const auto rejected =
-      from.reject([](const FinishedFrame& frame) { return frame.made_on.is_gpu; });
-  ASSERT_EQ(rejected.size(), 1u);
-  EXPECT_EQ(open().adopt(from), 1u);
-  const RenderDirectory again(part, settings, false);
-  EXPECT_EQ(finished(again, 1), "yn");
-  EXPECT_TRUE(again.rejected().empty());
+  {
+    RenderDirectory directory = open();
+    directory.write(sample_shot(0), set_, {"a card", true});
+    directory.write(sample_shot(1), set_, {"a processor", false});
+    const auto rejected =
+        directory.reject([](const FinishedFrame& frame) { return frame.made_on.is_gpu; });
+    ASSERT_EQ(rejected.size(), 1u);
+    EXPECT_EQ(finished(directory, 1), "ny");
+    EXPECT_EQ(finished(open(), 1), "yy");
+    directory.forget(rejected);
+  }
+  EXPECT_EQ(finished(open(), 1), "ny");
+  EXPECT_TRUE(std::filesystem::exists(directory_ / "out/0000.exr"));
 }
 
 TEST_F(RenderDirectoryTest, UntouchedFrameSaysWhyAndHasNoPose) {
@@ -337,6 +285,8 @@ TEST_F(RenderDirectoryTest, ARunOfFramesIsTakenAsFarAsItIsFree) {
   EXPECT_EQ(first.claim({4, 5}), (std::set<std::uint64_t>{4, 5}));
   EXPECT_EQ(second.claim({2, 3, 4, 6}), (std::set<std::uint64_t>{3, 6}));
   EXPECT_EQ(first.claim({3, 6}), std::set<std::uint64_t>{});
+  EXPECT_EQ(first.claim({6, 7, 8, 9}, 2), (std::set<std::uint64_t>{7, 8}));
+  EXPECT_EQ(second.claim({9, 10}), (std::set<std::uint64_t>{9, 10}));
 }
 
 // The other process holds a frame, is in the middle of a picture and of a line, and is killed.
@@ -418,21 +368,6 @@ TEST_F(RenderDirectoryTest, NothingIsWrittenThroughALink) {
   EXPECT_FALSE(std::filesystem::is_symlink(directory_ / "out/0000.png"));
   EXPECT_EQ(content_of(directory_ / "picture"), before);
   EXPECT_EQ(content_of(directory_ / "elsewhere"), "mine");
-}
-
-// fcntl(2) of a file system without locks.
-TEST(FolderLocks, WithoutLocksOfTheFileSystemEveryClaimSucceedsAndThatIsSaid) {
-  const test::TemporaryDirectory directory;
-  FolderLocks locks(directory.path(), [](int, int, struct flock*) {
-    errno = EOPNOTSUPP;
-    return -1;
-  });
-  EXPECT_THAT(locks.missing(), HasSubstr("the file system has no locks"));
-  const FolderLocks::Transaction transaction(locks);
-  locks.join();
-  EXPECT_TRUE(locks.claim(3));
-  EXPECT_FALSE(locks.is_at_another(3));
-  EXPECT_TRUE(locks.others().empty());
 }
 
 // Lines count whose bytes are locked; a file of a million others is made small.

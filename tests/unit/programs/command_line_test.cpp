@@ -81,6 +81,29 @@ TEST(CommandLine, AnUnknownOptionHasTheOneThatIsMeant) {
   EXPECT_EQ(meant("render session more"), "");
 }
 
+// CLI11 of Debian 13 (2.4) takes them for one name, and no command can be read at all.
+TEST(CommandLine, GivesNoPositionalTheNameOfAnOption) {
+  const auto expect_distinct = [](auto& self, const CLI::App& app) -> void {
+    std::set<std::string> names;
+    for (const CLI::Option* option : app.get_options()) {
+      for (const std::string& name : option->get_lnames())
+        EXPECT_TRUE(names.insert(name).second) << app.get_name() << ": " << name;
+      if (option->get_positional()) {
+        EXPECT_TRUE(names.insert(option->get_name(true)).second) << app.get_name();
+      }
+    }
+    for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; }))
+      self(self, *command);
+  };
+  CLI::App rig, tools;
+  CommandLine rig_said;
+  tools::CommandLine tools_said;
+  add_commands(rig, rig_said);
+  add_commands(tools, tools_said);
+  expect_distinct(expect_distinct, rig);
+  expect_distinct(expect_distinct, tools);
+}
+
 // A range lets "nan" pass, and a job of the farm with it could not be read by any machine.
 TEST(CommandLine, NoOptionTakesWhatIsNoNumber) {
   CLI::App of_the_rig, of_the_tools;
