@@ -137,7 +137,7 @@ void submit_tasks(const JobFolder& folder, const Job& job, std::uint64_t tasks,
   try {
     for_each_job(folder, job, tasks, more,
                  [&](const std::string& about, const std::vector<std::string>& arguments) {
-                   const std::string number = std::to_string(submit_one(arguments));
+                   std::string number = std::to_string(submit_one(arguments));
                    submitted += about + ": job " + number + "\n";
                    session::replace_file(folder.submitted_file(), submitted);
                    return number;

@@ -173,10 +173,10 @@ void Task::merge(std::size_t index, Round& round) {
                                          /*has_sums=*/true, take.frames));
   }
   std::set<std::uint64_t> whole;
-  for (const auto& [frame, record] : sums.front())
-    if (!pictures.contains(frame) &&
-        std::ranges::all_of(sums, [&](const post::Frames& one) { return one.contains(frame); }))
-      whole.insert(frame);
+  for (const auto& one : sums.front()) {
+    const auto is_in = [&](const post::Frames& frames) { return frames.contains(one.first); };
+    if (!is_in(pictures) && std::ranges::all_of(sums, is_in)) whole.insert(one.first);
+  }
   if (whole.empty() || is_stopped()) return;
   options.is_left_out = [&](std::uint64_t frame) { return !whole.contains(frame); };
   render_some(options, whole.size(), round);

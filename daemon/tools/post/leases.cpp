@@ -52,11 +52,11 @@ std::optional<std::uint64_t> number_of(const std::filesystem::path& file) {
 std::optional<Seconds> age_of(const std::filesystem::path& file) {
   struct stat found {};
   if (::lstat(file.c_str(), &found) != 0) return std::nullopt;
-  std::int64_t now_s = std::time(nullptr);
+  std::int64_t now_s = 0;
   try {
     now_s = time_of_disk_s(file.parent_path());
   } catch (const Error&) {
-    // A user who may not write in the folder goes by the clock.
+    now_s = std::time(nullptr);  // of a user who may not write in the folder
   }
   return Seconds(now_s - found.st_mtim.tv_sec);
 }

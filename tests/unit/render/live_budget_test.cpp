@@ -27,7 +27,7 @@ Frame mosaic(int width, int height) {
 
 class LiveBudget : public ::testing::Test {
  protected:
-  LiveBudget(int width = 1920, int height = 1080, bool validation = false)
+  LiveBudget(int width = 960, int height = 540, bool validation = false)
       : pixels_(std::uint64_t{1} * width * height),
         device_(render::open_device({.validation = validation, .name = "", .as_gpu = true})),
         renderer_(ball_above_floor(width, height), {.max_depth = 1}, set::LightSampling::importance,
