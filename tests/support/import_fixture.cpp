@@ -8,7 +8,7 @@ extern "C" {
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "drivers/av.hpp"
+#include "daemon/core/session/av.hpp"
 
 namespace previz::exchange {
 

@@ -4,9 +4,9 @@
 #include <array>
 #include <optional>
 
+#include "daemon/core/session/av.hpp"
 #include "daemon/core/session/draft.hpp"
 #include "daemon/core/session/nominal_rate.hpp"
-#include "drivers/av.hpp"
 
 extern "C" {
 #include <libavutil/opt.h>

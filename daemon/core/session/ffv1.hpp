@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
+#include "daemon/core/session/av.hpp"
 #include "daemon/core/session/session_toml.hpp"
-#include "drivers/av.hpp"
 
 namespace previz::session {
 

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "drivers/av.hpp"
+#include "daemon/core/session/av.hpp"
 #include "drivers/frame.hpp"
 
 namespace previz::session {

@@ -6,11 +6,11 @@
 #include <optional>
 #include <utility>
 
+#include "daemon/core/session/av.hpp"
 #include "daemon/core/session/crc32.hpp"
 #include "daemon/core/session/ffv1.hpp"
 #include "daemon/core/session/files.hpp"
 #include "daemon/core/session/samples.hpp"
-#include "drivers/av.hpp"
 #include "drivers/box/reading.hpp"
 
 namespace previz::session {

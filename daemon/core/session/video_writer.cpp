@@ -8,11 +8,11 @@ extern "C" {
 #include <libavutil/opt.h>
 }
 
+#include "daemon/core/session/av.hpp"
 #include "daemon/core/session/crc32.hpp"
 #include "daemon/core/session/ffv1.hpp"
 #include "daemon/core/session/files.hpp"
 #include "daemon/core/session/samples.hpp"
-#include "drivers/av.hpp"
 
 namespace previz::session {
 namespace {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "drivers/av.hpp"
+#include "daemon/core/session/av.hpp"
 
 namespace previz::exchange {
 

@@ -10,7 +10,7 @@ extern "C" {
 #include <span>
 #include <string>
 
-#include "drivers/av.hpp"
+#include "daemon/core/session/av.hpp"
 
 namespace previz::exchange {
 

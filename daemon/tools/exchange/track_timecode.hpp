@@ -6,8 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "daemon/core/session/av.hpp"
 #include "daemon/tools/exchange/footage.hpp"
-#include "drivers/av.hpp"
 
 namespace previz::exchange {
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/core/session/av.hpp"
 #include "daemon/core/set/check.hpp"
 #include "daemon/tools/exchange/damaged_packet.hpp"
 #include "daemon/tools/exchange/decoder_words.hpp"
@@ -17,7 +18,6 @@
 #include "daemon/tools/exchange/video_packets.hpp"
 #include "daemon/tools/exchange/video_picture.hpp"
 #include "daemon/tools/exchange/video_tags.hpp"
-#include "drivers/av.hpp"
 #include "drivers/box/reading.hpp"
 
 namespace previz::exchange {

@@ -5,7 +5,7 @@
 #include <deque>
 #include <optional>
 
-#include "drivers/av.hpp"
+#include "daemon/core/session/av.hpp"
 
 namespace previz::exchange {
 

@@ -11,7 +11,7 @@ extern "C" {
 #include <array>
 #include <cmath>
 
-#include "drivers/av.hpp"
+#include "daemon/core/session/av.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::exchange {

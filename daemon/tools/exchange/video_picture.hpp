@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "daemon/core/session/av.hpp"
 #include "daemon/tools/exchange/footage.hpp"
 #include "daemon/tools/exchange/luma_chroma.hpp"
 #include "daemon/tools/exchange/video_color.hpp"
 #include "daemon/tools/exchange/video_tags.hpp"
-#include "drivers/av.hpp"
 
 namespace previz::exchange {
 

@@ -11,10 +11,10 @@ extern "C" {
 #include <cctype>
 #include <cstring>
 
+#include "daemon/core/session/av.hpp"
 #include "daemon/core/set/problems.hpp"
 #include "daemon/tools/exchange/luma_chroma.hpp"
 #include "daemon/tools/exchange/video_color.hpp"
-#include "drivers/av.hpp"
 
 namespace previz::exchange {
 namespace {

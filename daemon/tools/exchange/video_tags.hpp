@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/core/session/av.hpp"
 #include "daemon/tools/exchange/orientation.hpp"
-#include "drivers/av.hpp"
 
 namespace previz::exchange {
 

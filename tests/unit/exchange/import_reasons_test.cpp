@@ -1,5 +1,5 @@
 // Footage that does not fit or cannot be read is refused with the reason and what leads on.
-#include "drivers/av.hpp"
+#include "daemon/core/session/av.hpp"
 #include "tests/support/import_fixture.hpp"
 
 namespace previz::exchange::import_reasons_test {

@@ -377,6 +377,7 @@ TEST_F(FarmTask, TakesOverWhatAnotherDoesNotFinish) {
   const std::jthread end([&] {
     EXPECT_TRUE(test::wait_until("all other frames are there",
                                  [&] { return has_picture(7) && has_picture(3); }));
+    std::this_thread::sleep_for(std::chrono::seconds(2));  // until the task has looked for more
     EXPECT_FALSE(has_picture(4));
     other.reset();
   });

@@ -1,7 +1,7 @@
 // PNG pictures return bit for bit; the review video keeps the capture times.
 #include "daemon/core/output/png.hpp"
 #include "daemon/core/output/video.hpp"
-#include "drivers/av.hpp"
+#include "daemon/core/session/av.hpp"
 #include "drivers/plate.hpp"
 #include "tests/support/temporary_directory.hpp"
 #include "tests/support/test.hpp"
