@@ -23,7 +23,7 @@ previz farm takes/12A_take003 --frames 40 --spp 4096 --neighbours 0 --nodes 8: D
 )",
        true},
       {"HEAVY FRAMES", R"(
-Where there are fewer frames than machines, a frame's samples are divided into ranges, and a task renders one. Whichever finds all sums of a frame merges them into its picture. `--sample-ranges` sets their number: a power of two, at most 16. A range has at least 64 samples. Frames whose number of samples is not fixed (`--error`, `--seconds`, `--adaptive`) and frames that are averaged with their neighbours cannot be divided: give `--neighbours 0`.
+Where there are fewer frames than machines, a frame's samples are divided into ranges, and a task renders one. Whichever finds all sums of a frame merges them into its picture. `--sample-ranges` sets their number: a power of two, at most 16. A range has at least 64 samples; `--chunk` counts ranges then. Frames whose number of samples is not fixed (`--error`, `--seconds`, `--adaptive`) and frames that are averaged with their neighbours cannot be divided: give `--neighbours 0`.
 The same without a job: `previz render TAKE --sample-range 1/2 --out first` on one machine, 2/2 on another, then `previz merge TAKE first second` with the same options. The merged picture is that of one run, to the last bit, if the machines have the same kind of graphics card and driver.
 )"},
       {"MACHINES THAT DIFFER", R"(
@@ -61,7 +61,7 @@ state/0003.json: What the task of that number said last, or the one of a machine
 state/finish.json: The same of the last step.
 log/0003.log, log/finish.log: What the tasks and the last step print under Slurm.
 submitted.txt: Slurm's numbers of what was submitted last.
-render.lock: Who is at work on the job. The last step and a retry are done by one process at a time.
+render.lock, render.leases/: Who is at work on the job. The last step and a retry are done by one process at a time.
 stopped.txt: Why no further task starts; `previz farm retry` removes it.
 missing.json: The frames that the last step found missing, with the reasons; there is none if none is missing.
 )",

@@ -121,7 +121,7 @@ TEST(StillDiskOfARender, AtAnyCallIsWaitedForAndTheRenderGoesOn) {
       RenderDirectory again(set.output, settings, false);
       for (std::uint64_t i = 0; i < frames; ++i) EXPECT_TRUE(again.finished(i)) << i;
       EXPECT_TRUE(again.rejected().empty());
-      EXPECT_EQ(again.claim(frames), Claim::mine);
+      EXPECT_FALSE(again.claim({frames}).empty());
       again.write(test::small_shot(frames), set);
     };
     was_still = run_past_call(call, set.output.directory, go_on, nothing_more);

@@ -53,6 +53,7 @@ class NewFolder {
  public:
   NewFolder(const FarmOptions& options, const JobFolder& folder, const Job& job)
       : folder_(folder), was_there_(std::filesystem::exists(folder.path())) {
+    folder.refuse_links();
     make_folder(options, folder, job);
     // What an earlier job in this folder has left would be taken for this one's.
     std::error_code stays;
@@ -210,9 +211,8 @@ void retry(const JobOptions& options, std::ostream& out) {
   Job job = folder.read_plan();
   job.wishes = merged_wishes(job.wishes, options.wishes);
   check_paths(folder, job, options.any_paths);
-  const JobStatus status = status_of(folder, job);
-  refuse_while_queued(status, folder);
   const JobLock lock(folder, out, options.stop);
+  refuse_while_queued(status_of(folder, job), folder);
   const Proof proof = prove(folder, job, Foreign::forget, out, options.stop);
   folder.forget_states();
   write_missing(folder, job, proof);

@@ -1,6 +1,5 @@
 #include "daemon/tools/farm/finish.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -115,11 +114,7 @@ void prove_take(const JobFolder& folder, const Job& job, std::size_t index, Fore
 void complete_take(const JobFolder& folder, const Job& job, const JobTake& take,
                    std::ostream& out) {
   session::TakeClock clock;
-  if (take.video) {
-    post::RenderOptions options = folder.render_options(job, take);
-    options.frames = take.frames;
-    clock = post::plan_render(options).clock;
-  }
+  if (take.video) clock = post::plan_render(folder.render_options(job, take)).clock;
   // All pictures were looked at a moment ago.
   post::RenderDirectory pictures({take.pictures, take.exr, take.png, take.video}, take.settings,
                                  false, clock, post::no_frames);
@@ -216,7 +211,7 @@ JobLock::JobLock(const JobFolder& folder, std::ostream& out, const std::stop_tok
   for (;; std::this_thread::sleep_for(std::chrono::milliseconds(100))) {
     const post::FolderLocks::Transaction transaction(locks_, stop);
     if (!has_waited_) locks_.join();
-    if (locks_.claim(0)) return;
+    if (!locks_.claim({0}, 1).empty()) return;
     for (const post::FolderUser& other : locks_.others())
       if (!has_waited_ && other.frames.contains(0))
         out << folder.path().string() << ": waits for the last step or retry of " << words_of(other)

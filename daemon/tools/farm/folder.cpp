@@ -166,6 +166,7 @@ post::RenderOptions JobFolder::render_options(const Job& job, const JobTake& tak
   options.exr = take.exr;
   options.png = take.png;
   options.video = take.video;
+  options.frames = take.frames;
   options.directory = take.pictures;
   return options;
 }

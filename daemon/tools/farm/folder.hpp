@@ -71,9 +71,11 @@ class JobFolder {
   // Whatever follows reads and replaces plain files only, and throws previz::Error naming the file
   // where another thing is in its place or it cannot be read or written.
 
-  // Throws JobFault if the folder holds no job, or if one of its own folders is a link, so that
-  // files would be written where it leads.
+  // Throws JobFault if the folder holds no job, and like refuse_links().
   Job read_plan() const;
+  // Throws JobFault if one of its own folders is a link, so that files would be written where it
+  // leads.
+  void refuse_links() const;
   // Returns what a task, or the last step, said last; nothing if it said nothing yet, or half of
   // it.
   std::optional<TaskState> read_state(const std::string& task) const;
@@ -85,8 +87,8 @@ class JobFolder {
   // Returns why no further task starts; empty: they do.
   std::string read_stopped() const;
 
-  // Returns the options by which the plan renders a take, without the frames, into the folder of
-  // its pictures.
+  // Returns the options by which the plan renders the frames of a take, into the folder of its
+  // pictures.
   post::RenderOptions render_options(const Job& job, const JobTake& take) const;
 
   // Returns the name by which the scheduler knows the job's parts: "previz-" and eight hexadecimal
@@ -94,8 +96,6 @@ class JobFolder {
   std::string name() const;
 
  private:
-  void refuse_links() const;
-
   std::filesystem::path path_;  // absolute, without links, so that all names of the folder are one
 };
 

@@ -145,10 +145,14 @@ void refuse_outside_of_folder(const std::string& place) {
 
 // A plan of an earlier previz names a chunk of frames for each task.
 Json of_format_1(Json json) {
-  Reader chunk(json.at("chunks").at(0));
-  post::FrameRange frames;
-  chunk("frames", frames);
-  json["share"] = length_of(frames);
+  std::uint64_t share = 1;
+  for (const Json& chunk : json.at("chunks")) {
+    post::FrameRange frames;
+    Reader reader(chunk);
+    reader("frames", frames);
+    share = std::max(share, length_of(frames));
+  }
+  json["share"] = share;
   json.update(Json(json.at("wishes")));
   return json;
 }

@@ -80,17 +80,15 @@ std::uint64_t submit_one(const std::vector<std::string>& arguments) {
 
 // Cancels by the job's name: an sbatch that gave no answer may have submitted its part, too.
 [[noreturn]] void take_back(const JobFolder& folder, const std::string& why) {
-  const std::string name = "--name=" + folder.name();
   std::string fault;
   try {
-    const ProgramResult result = run_program("scancel", {name});
-    if (!result.is_good()) fault = result.why();
+    cancel_tasks(folder);
   } catch (const Error& error) {
     fault = error.what();
   }
   if (!fault.empty())
-    throw Error(why + "; a part may be in the queue already, and scancel cannot remove it (" +
-                fault + "); run `scancel " + name + "`");
+    throw Error(why + "; a part may be in the queue already, and " + fault +
+                "; run `scancel --name=" + folder.name() + "`");
   std::error_code stays;
   std::filesystem::remove(folder.submitted_file(), stays);
   throw Error(why + "; nothing was submitted");
@@ -120,6 +118,11 @@ std::optional<QueuedTask> task_of(const std::vector<std::string>& fields) {
 }
 
 }  // namespace
+
+void cancel_tasks(const JobFolder& folder) {
+  const ProgramResult result = run_program("scancel", {"--name=" + folder.name()});
+  if (!result.is_good()) throw Error("scancel does not cancel the job: " + result.why());
+}
 
 bool has_slurm() {
   return run_program("sbatch", {"--version"}).is_good();
@@ -177,13 +180,6 @@ std::vector<QueuedTask> queued_tasks(const JobFolder& folder) {
     if (std::optional<QueuedTask> task = task_of(fields_of(line)))
       tasks.push_back(*std::move(task));
   return tasks;
-}
-
-bool cancel_tasks(const JobFolder& folder) {
-  if (queued_tasks(folder).empty()) return false;
-  const ProgramResult result = run_program("scancel", {"--name=" + folder.name()});
-  if (!result.is_good()) throw Error("scancel does not cancel the job: " + result.why());
-  return true;
 }
 
 }  // namespace previz::farm

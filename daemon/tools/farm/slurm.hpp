@@ -39,8 +39,8 @@ bool was_submitted(const JobFolder& folder);
 // Returns what is in the queue or runs under the job's name. Throws previz::Error where Slurm does
 // not answer.
 std::vector<QueuedTask> queued_tasks(const JobFolder& folder);
-// Cancels what queued_tasks() returns; returns false if that is nothing. Throws previz::Error where
-// Slurm does not answer or refuses.
-bool cancel_tasks(const JobFolder& folder);
+// Cancels what is in the queue or runs under the job's name. Throws previz::Error where Slurm does
+// not answer or refuses.
+void cancel_tasks(const JobFolder& folder);
 
 }  // namespace previz::farm

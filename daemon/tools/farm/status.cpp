@@ -49,7 +49,10 @@ void add_users(const JobFolder& folder, const Job& job, JobStatus& status) {
     return nullptr;
   };
   for (const post::FolderUser& user : users_of(folder.path()))
-    if (TaskStatus* task = task_of(user)) task->is_running = true;
+    if (TaskStatus* task = task_of(user))
+      task->is_running = true;
+    else if (user.frames.empty())  // another on that machine has written over its word
+      status.tasks[words_of(user)].is_running = true;
   const auto add_frames = [&](const std::filesystem::path& pictures, const std::string& of) {
     for (const post::FolderUser& user : users_of(pictures))
       if (TaskStatus* task = task_of(user); task && !user.frames.empty())
@@ -115,6 +118,7 @@ bool JobStatus::is_complete() const {
 
 TaskPhase TaskStatus::phase() const {
   if (is_running) return TaskPhase::running;
+  if (queue == "COMPLETING" && state && state->outcome == TaskOutcome::done) return TaskPhase::done;
   const bool is_ending = queue == "RUNNING" && state && state->outcome == TaskOutcome::job;
   if (!queue.empty() && !is_ending)
     return state && !state->message.empty() ? TaskPhase::again : TaskPhase::waiting;

@@ -56,7 +56,7 @@ std::string why_waiting(const std::string& queue, const std::string& reason) {
 void print_queue(const JobStatus& status, std::ostream& out) {
   std::map<std::string, std::size_t> reasons;
   for (const auto& [name, task] : status.tasks)
-    if (!task.queue.empty() && task.queue != "RUNNING")
+    if (!task.queue.empty() && task.queue != "RUNNING" && task.phase() != TaskPhase::done)
       ++reasons[why_waiting(task.queue, task.reason)];
   for (const auto& [reason, count] : reasons)
     out << "waiting in the queue: " << on_one_line(reason) << " (" << count

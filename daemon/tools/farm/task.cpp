@@ -1,7 +1,5 @@
 #include "daemon/tools/farm/task.hpp"
 
-#include <unistd.h>
-
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <ostream>
@@ -54,7 +52,8 @@ class Task {
   void render_take(std::size_t index, Round& round);
   void render_ranges(std::size_t index, Round& round);
   void merge(std::size_t index, Round& round);
-  std::uint64_t render_some(post::RenderOptions options, std::uint64_t most, Round& round);
+  std::uint64_t render_some(const JobTake& take, post::RenderOptions options, std::uint64_t most,
+                            Round& round);
   void wait() const;
   void say(TaskOutcome outcome, const std::string& message);
   int fail(TaskOutcome outcome, const std::string& message);
@@ -71,7 +70,9 @@ class Task {
   std::shared_ptr<render::Device> device_;
   bool has_hardware_rays_ = false;  // what the device was opened for
   std::uint64_t rendered_ = 0;      // of its share
-  bool waits_ = false;              // all that is left is at others
+  // Frames of takes that were claimed here and not made: they are not asked for again.
+  std::set<std::pair<const JobTake*, std::uint64_t>> unreadable_;
+  bool waits_ = false;  // all that is left is at others
 };
 
 // Throws JobFault, or previz::Error where another machine may do it.
@@ -105,13 +106,17 @@ bool Task::is_complete() const {
 }
 
 void Task::render() {
+  // Whoever had a frame may have died after it was asked for, and before it was looked who has it.
+  bool has_looked_again = false;
   while (!is_stopped() && !has_its_share()) {
     Round round;
     for (std::size_t take = 0; take < job_.takes.size(); ++take)
       if (!is_stopped() && !has_its_share()) render_take(take, round);
-    if (round.made == 0 && round.at_others == 0) return;
+    const bool has_nothing = round.made == 0 && round.at_others == 0;
+    if (has_nothing && has_looked_again) return;
+    has_looked_again = has_nothing;
     waits_ = round.made == 0;
-    if (waits_) wait();
+    if (round.at_others > 0 && waits_) wait();
     refuse_if_stopped();
   }
 }
@@ -141,21 +146,25 @@ void Task::render_take(std::size_t index, Round& round) {
   if (job_.sample_ranges > 1) return render_ranges(index, round);
   post::RenderOptions options = folder_.render_options(job_, take);
   options.video = false;
-  rendered_ += render_some(options, rest_of_share(), round);
+  options.is_left_out = [&](std::uint64_t frame) { return unreadable_.contains({&take, frame}); };
+  rendered_ += render_some(take, options, rest_of_share(), round);
 }
 
-// The last step of another machine may have been done since: sums are rendered of those frames only
-// whose pictures are not there yet.
+// Sums are rendered of those frames only whose pictures are not there yet.
 void Task::render_ranges(std::size_t index, Round& round) {
   const JobTake& take = job_.takes[index];
   for (int range = 1; range <= job_.sample_ranges && !has_its_share(); ++range) {
     post::RenderOptions options = folder_.render_options(job_, take);
     options.directory = folder_.sums(index, range);
     options.sample_range = render::SampleRange{range, job_.sample_ranges};
-    const post::Frames pictures = finished(take);
-    if (pictures.size() == length_of(take.frames)) return;
-    options.is_left_out = [&](std::uint64_t frame) { return pictures.contains(frame); };
-    rendered_ += render_some(options, rest_of_share(), round);
+    // What the last step of another machine has finished is known once this process is at work
+    // there, and its sums are not removed any more.
+    post::Frames pictures;
+    options.is_left_out = [&](std::uint64_t frame) {
+      if (frame == take.frames.first) pictures = finished(take);
+      return pictures.contains(frame) || unreadable_.contains({&take, frame});
+    };
+    rendered_ += render_some(take, options, rest_of_share(), round);
   }
   merge(index, round);
 }
@@ -179,11 +188,12 @@ void Task::merge(std::size_t index, Round& round) {
   }
   if (whole.empty() || is_stopped()) return;
   options.is_left_out = [&](std::uint64_t frame) { return !whole.contains(frame); };
-  render_some(options, whole.size(), round);
+  render_some(take, options, whole.size(), round);
 }
 
 // Renders the first `most` frames that are free, and returns how many that were.
-std::uint64_t Task::render_some(post::RenderOptions options, std::uint64_t most, Round& round) {
+std::uint64_t Task::render_some(const JobTake& take, post::RenderOptions options,
+                                std::uint64_t most, Round& round) {
   std::uint64_t made = 0;
   options.share = most;
   options.open_device = device_;
@@ -193,7 +203,9 @@ std::uint64_t Task::render_some(post::RenderOptions options, std::uint64_t most,
   std::ostringstream said_again;
   const post::RenderReport report = post::render_session(options, waits_ ? said_again : out_);
   if (made > 0) out_ << said_again.str() << std::flush;
-  if (!report.failures.empty()) throw Error(report.failures.front());
+  if (!report.failures.empty())
+    throw Error(report.failures.front() + "; `previz farm retry` renders it again");
+  for (const std::uint64_t frame : report.not_made) unreadable_.insert({&take, frame});
   round.made += made;
   round.at_others += report.at_others;
   return made;

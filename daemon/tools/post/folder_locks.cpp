@@ -120,9 +120,7 @@ std::vector<FolderUser> users_of(const std::filesystem::path& folder, LockCall c
   OwnedDescriptor open(::open(file.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   if (!open && (errno == ENOENT || errno == ESTALE)) return {};  // nobody was, or has ended
   if (!open) throw Error(file.string() + ": cannot be opened: " + std::strerror(errno));
-  FolderLocks locks(file, std::move(open), call);
-  locks.look_for_leases();
-  return locks.others();
+  return FolderLocks(file, std::move(open), call).others();
 }
 
 // A machine whose locks are not seen by others may have come here since.
@@ -162,6 +160,22 @@ FolderLocks::Transaction::Transaction(FolderLocks& locks, const std::stop_token&
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
+  try {
+    if (locks_.leases_) locks_.see_others();
+  } catch (...) {
+    locks_.unlock(transaction_byte);
+    throw;
+  }
+}
+
+// What this process has is told by a lease as well, once somebody needs it.
+void FolderLocks::see_others() {
+  if (line_ >= 0 && !leases_->take(first_line_byte + static_cast<std::uint64_t>(line_))) {
+    unlock(first_line_byte + static_cast<std::uint64_t>(line_));
+    join();
+  }
+  at_others_.clear();
+  for (const FolderUser& user : others()) at_others_.insert(user.frames.begin(), user.frames.end());
 }
 
 FolderLocks::Transaction::~Transaction() {
@@ -169,9 +183,9 @@ FolderLocks::Transaction::~Transaction() {
 }
 
 bool FolderLocks::lock(std::uint64_t byte) {
-  if (!lock_in_file(byte)) return false;
-  if (!leases_ || leases_->take(byte)) return true;
-  unlock(byte);
+  if (leases_ && !leases_->take(byte)) return false;
+  if (lock_in_file(byte)) return true;
+  if (leases_) leases_->give_back(byte);
   return false;
 }
 
@@ -194,7 +208,6 @@ void FolderLocks::unlock(std::uint64_t byte) {
 }
 
 bool FolderLocks::is_locked_by_another(std::uint64_t byte) const {
-  if (leases_ && leases_->is_at_another(byte)) return true;
   if (!has_locks_) return false;
   struct flock range = range_of(byte, F_WRLCK);
   look_at(range);
@@ -226,9 +239,11 @@ void FolderLocks::add_locked(std::uint64_t begin, std::uint64_t end,
 std::set<std::uint64_t> FolderLocks::lines_of_others() const {
   std::set<std::uint64_t> lines;
   if (has_locks_) add_locked(first_line_byte, first_line_byte + most_lines, lines);
-  if (!leases_) return lines;
-  for (const std::uint64_t byte : leases_->at_others(first_line_byte, first_line_byte + most_lines))
+  for (const std::uint64_t byte :
+       leased(file_.parent_path() / leases_name, first_line_byte, first_line_byte + most_lines,
+              leases_ ? leases_->behind_s() : 0))
     lines.insert(byte - first_line_byte);
+  if (line_ >= 0) lines.erase(static_cast<std::uint64_t>(line_));
   return lines;
 }
 
@@ -287,12 +302,18 @@ std::vector<FolderUser> FolderLocks::others() const {
   return users;
 }
 
-bool FolderLocks::claim(std::uint64_t frame) {
-  if (frame >= frames_end) throw Error("frame " + std::to_string(frame) + ": is not possible");
-  if (!lock(first_frame_byte + frame)) return false;
-  self_.frames.insert(frame);
-  if (line_ >= 0) write_own_line();
-  return true;
+std::set<std::uint64_t> FolderLocks::claim(const std::set<std::uint64_t>& frames,
+                                           std::uint64_t most) {
+  std::set<std::uint64_t> taken;
+  for (const std::uint64_t frame : frames) {
+    if (frame >= frames_end) throw Error("frame " + std::to_string(frame) + ": is not possible");
+    if (taken.size() < most && !at_others_.contains(frame) &&
+        lock_in_file(first_frame_byte + frame))
+      taken.insert(frame);
+  }
+  self_.frames.insert(taken.begin(), taken.end());
+  if (line_ >= 0 && !taken.empty()) write_own_line();
+  return taken;
 }
 
 void FolderLocks::release(std::uint64_t frame) {
@@ -302,7 +323,8 @@ void FolderLocks::release(std::uint64_t frame) {
 }
 
 bool FolderLocks::is_at_another(std::uint64_t frame) const {
-  return frame < frames_end && is_locked_by_another(first_frame_byte + frame);
+  return at_others_.contains(frame) ||
+         (frame < frames_end && is_locked_by_another(first_frame_byte + frame));
 }
 
 bool FolderLocks::claim_video() {

@@ -2,8 +2,9 @@
 // says which frame is at whose, and lets one at a time change what is common. The locks are those
 // of fcntl(2), F_OFD_SETLK, on bytes of DIR/render.lock; they go with the death of their process.
 // The text in that file is for people and for messages; what holds is the locks. Where these do not
-// reach other machines, the same numbers are taken in DIR/render.leases, too (Leases), by everybody
-// who finds that folder there.
+// reach other machines, what holds is the text: a process has the frames of its line as long as it
+// renews its lease of that line, DIR/render.leases/N (Leases), and a lease stands for the lock of a
+// transaction. Everybody who finds render.leases takes part in it from his next transaction on.
 #pragma once
 
 #include <cstdint>
@@ -80,8 +81,9 @@ class FolderLocks {
   void join();
   // Returns the other processes that are at work here.
   std::vector<FolderUser> others() const;
-  // Takes a frame; returns false if another process has it.
-  bool claim(std::uint64_t frame);
+  // Takes the first of the frames that no other process has, at most `most`, and returns them. Who
+  // claims has joined.
+  std::set<std::uint64_t> claim(const std::set<std::uint64_t>& frames, std::uint64_t most);
   void release(std::uint64_t frame);
   bool is_at_another(std::uint64_t frame) const;
   // Takes the review video, until this object ends; returns false if another process has it.
@@ -91,6 +93,7 @@ class FolderLocks {
   friend std::vector<FolderUser> users_of(const std::filesystem::path& folder, LockCall call);
   FolderLocks(const std::filesystem::path& file, OwnedDescriptor open, LockCall call);
   void look_for_leases();
+  void see_others();
   bool lock(std::uint64_t byte);
   bool lock_in_file(std::uint64_t byte);
   void unlock(std::uint64_t byte);
@@ -108,8 +111,9 @@ class FolderLocks {
   LockCall call_;
   bool has_locks_ = true;
   std::string missing_;
-  std::unique_ptr<Leases> leases_;  // null: nobody has needed them here
-  std::int64_t line_ = -1;          // of this process in the text; -1: none yet
+  std::unique_ptr<Leases> leases_;     // null: nobody has needed them here
+  std::set<std::uint64_t> at_others_;  // frames, by the leases of their processes
+  std::int64_t line_ = -1;             // of this process in the text; -1: none yet
   FolderUser self_;
 };
 

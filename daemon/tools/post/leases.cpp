@@ -4,10 +4,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <charconv>
+#include <chrono>
 #include <condition_variable>
 #include <cstring>
 #include <ctime>
@@ -26,7 +28,7 @@ using Seconds = std::chrono::seconds;
 
 constexpr Seconds between_signs(20);
 // NFS may show a time that is old by a minute (acregmax in nfs(5)), and clocks may differ by a
-// minute (farm::why_not_here()) where a client gives the times. Two of the signs may be late.
+// minute (farm::why_not_here()). Two of the signs may be late.
 constexpr Seconds oldest_sign = Seconds(60) + Seconds(60) + 3 * between_signs;
 // Nobody takes over any more what is so old while it is removed.
 constexpr Seconds left_behind = 10 * oldest_sign;
@@ -49,16 +51,13 @@ std::optional<std::uint64_t> number_of(const std::filesystem::path& file) {
   return number;
 }
 
-std::optional<Seconds> age_of(const std::filesystem::path& file) {
-  struct stat found {};
-  if (::lstat(file.c_str(), &found) != 0) return std::nullopt;
-  std::int64_t now_s = 0;
-  try {
-    now_s = time_of_disk_s(file.parent_path());
-  } catch (const Error&) {
-    now_s = std::time(nullptr);  // of a user who may not write in the folder
-  }
-  return Seconds(now_s - found.st_mtim.tv_sec);
+Seconds age_of(const struct stat& found, std::int64_t behind_s) {
+  return Seconds(std::time(nullptr) + behind_s - found.st_mtim.tv_sec);
+}
+
+// A file of the future is one of a clock that is wrong, and no sign.
+bool is_alive(const struct stat& found, std::int64_t behind_s) {
+  return std::chrono::abs(age_of(found, behind_s)) < oldest_sign;
 }
 
 }  // namespace
@@ -71,11 +70,27 @@ std::int64_t time_of_disk_s(const std::filesystem::path& folder) {
   return made.st_mtim.tv_sec;
 }
 
+std::set<std::uint64_t> leased(const std::filesystem::path& folder, std::uint64_t begin,
+                               std::uint64_t end, std::int64_t behind_s) {
+  std::set<std::uint64_t> numbers;
+  std::error_code gone;
+  for (std::filesystem::directory_iterator entry(folder, gone), none; !gone && entry != none;
+       entry.increment(gone)) {
+    struct stat found {};
+    const auto number = number_of(entry->path());
+    if (number && *number >= begin && *number < end &&
+        ::lstat(entry->path().c_str(), &found) == 0 && is_alive(found, behind_s))
+      numbers.insert(*number);
+  }
+  return numbers;
+}
+
 Leases::Leases(const std::filesystem::path& folder) : folder_(folder), name_(own_name()) {
   std::error_code code;
   std::filesystem::create_directory(folder, code);
   if (std::filesystem::symlink_status(folder).type() != std::filesystem::file_type::directory)
     throw Error(folder.string() + ": is a link, or cannot be created: " + code.message());
+  behind_s_ = time_of_disk_s(folder) - std::time(nullptr);
   signs_ = std::jthread([this](const std::stop_token& stop) {
     std::mutex mutex;
     std::unique_lock lock(mutex);
@@ -92,17 +107,25 @@ Leases::~Leases() {
   std::error_code gone;
   for (std::filesystem::directory_iterator entry(folder_, gone), end; !gone && entry != end;
        entry.increment(gone)) {
-    const auto age = number_of(entry->path()) ? age_of(entry->path()) : std::nullopt;
-    if (age && *age > left_behind) ::unlink(entry->path().c_str());
+    struct stat found {};
+    if (number_of(entry->path()) && ::lstat(entry->path().c_str(), &found) == 0 &&
+        age_of(found, behind_s_) > left_behind)
+      ::unlink(entry->path().c_str());
   }
-  ::rmdir(folder_.c_str());  // where it is empty
+  session::remove_dead_drafts(folder_);  // of whoever died while it looked for the time
+  ::rmdir(folder_.c_str());              // where it is empty
 }
 
-// A sign that cannot be given is given the next time: the disk may be away for a moment.
+// A sign that cannot be given is given the next time: the disk may be away for a moment. What was
+// taken over meanwhile, because this process stood still for minutes, is another's.
 void Leases::renew() {
   const std::lock_guard guard(mutex_);
-  for (const std::uint64_t number : own_)
+  std::erase_if(own_, [&](std::uint64_t number) {
+    const bool is_there = ::access(file(number).c_str(), R_OK) == 0;
+    if (is_there && !is_mine(number)) return true;
     static_cast<void>(::utimensat(AT_FDCWD, file(number).c_str(), nullptr, AT_SYMLINK_NOFOLLOW));
+    return false;
+  });
 }
 
 std::filesystem::path Leases::file(std::uint64_t number) const {
@@ -116,11 +139,12 @@ bool Leases::make(std::uint64_t number) const {
     const OwnedDescriptor made(
         ::open(place.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666));
     if (made && ::write(made.get(), name_.data(), name_.size()) == std::ssize(name_)) return true;
-    if (made) throw Error(place.string() + ": cannot be written: " + std::strerror(errno));
-    if (errno == EEXIST) return false;
+    const int error = errno;
+    if (made) ::unlink(place.c_str());
+    if (!made && error == EEXIST) return false;
     // The folder goes with the last lease in it.
-    if (errno != ENOENT || (::mkdir(folder_.c_str(), 0777) != 0 && errno != EEXIST))
-      throw Error(place.string() + ": cannot be created: " + std::strerror(errno));
+    if (made || error != ENOENT || (::mkdir(folder_.c_str(), 0777) != 0 && errno != EEXIST))
+      throw Error(place.string() + ": cannot be created: " + std::strerror(error));
   }
 }
 
@@ -132,19 +156,30 @@ bool Leases::is_mine(std::uint64_t number) const {
   }
 }
 
-// Nor is a file younger than now by more than that: clocks are not so wrong.
-bool Leases::is_alive(const std::filesystem::path& file) const {
-  const auto age = age_of(file);
-  return age && std::chrono::abs(*age) < oldest_sign;
+// Removes the file of a process that has died; returns false if it lives, or if another one has
+// just removed it and made its own: what was taken away is then that, and is put back.
+bool Leases::remove_dead(std::uint64_t number) const {
+  struct stat dead {
+  }, taken{};
+  if (::lstat(file(number).c_str(), &dead) != 0 || is_alive(dead, behind_s_)) return false;
+  std::string away = "away " + name_;
+  std::ranges::replace(away, ' ', '-');
+  const std::filesystem::path aside = folder_ / away;
+  if (::rename(file(number).c_str(), aside.c_str()) != 0) return false;
+  const bool is_the_same = ::lstat(aside.c_str(), &taken) == 0 && taken.st_ino == dead.st_ino &&
+                           !is_alive(taken, behind_s_);
+  // Where a third one has made it meanwhile, whose it was will see that.
+  std::error_code taken_again;
+  if (!is_the_same) std::filesystem::create_hard_link(aside, file(number), taken_again);
+  ::unlink(aside.c_str());
+  return is_the_same;
 }
 
 bool Leases::take(std::uint64_t number) {
   const std::lock_guard guard(mutex_);
   if (own_.contains(number)) return true;
   if (!make(number)) {
-    if (is_alive(file(number))) return false;
-    ::unlink(file(number).c_str());
-    if (!make(number)) return false;
+    if (!remove_dead(number) || !make(number)) return false;
     std::this_thread::sleep_for(for_another_to_tell);
     if (!is_mine(number)) return false;
   }
@@ -155,25 +190,6 @@ bool Leases::take(std::uint64_t number) {
 void Leases::give_back(std::uint64_t number) {
   const std::lock_guard guard(mutex_);
   if (own_.erase(number) > 0 && is_mine(number)) ::unlink(file(number).c_str());
-}
-
-bool Leases::is_at_another(std::uint64_t number) const {
-  const std::lock_guard guard(mutex_);
-  return !own_.contains(number) && is_alive(file(number));
-}
-
-std::set<std::uint64_t> Leases::at_others(std::uint64_t begin, std::uint64_t end) const {
-  const std::lock_guard guard(mutex_);
-  std::set<std::uint64_t> numbers;
-  std::error_code gone;
-  for (std::filesystem::directory_iterator entry(folder_, gone), none; !gone && entry != none;
-       entry.increment(gone)) {
-    const auto number = number_of(entry->path());
-    if (number && *number >= begin && *number < end && !own_.contains(*number) &&
-        is_alive(entry->path()))
-      numbers.insert(*number);
-  }
-  return numbers;
 }
 
 }  // namespace previz::post

@@ -3,7 +3,6 @@
 // lives.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <mutex>
@@ -26,28 +25,34 @@ class Leases {
   Leases(const Leases&) = delete;
   Leases& operator=(const Leases&) = delete;
 
-  // Takes a number; returns false if another process that is alive has it. What a dead one had is
-  // taken over, three minutes after its last sign of life: that takes two seconds, until whoever
-  // did so at the same moment has told so. Throws previz::Error where no file can be made.
+  // Takes a number; returns false if another process that is alive has it, or had it a moment ago.
+  // What a dead one had is taken over, three minutes after its last sign of life: that takes two
+  // seconds, until whoever did so at the same moment has told so. Throws previz::Error where no
+  // file can be made.
   bool take(std::uint64_t number);
   void give_back(std::uint64_t number);
-  // Whether a process that is alive has taken it, and not through this object.
-  bool is_at_another(std::uint64_t number) const;
-  // Returns those of the numbers from `begin` on, and below `end`.
-  std::set<std::uint64_t> at_others(std::uint64_t begin, std::uint64_t end) const;
+  // Returns how far this machine's clock is behind that of the disk.
+  std::int64_t behind_s() const { return behind_s_; }
 
  private:
   std::filesystem::path file(std::uint64_t number) const;
   bool make(std::uint64_t number) const;
   bool is_mine(std::uint64_t number) const;
-  bool is_alive(const std::filesystem::path& file) const;
+  bool remove_dead(std::uint64_t number) const;
   void renew();
 
   const std::filesystem::path folder_;
   const std::string name_;  // of this object, in its files
-  mutable std::mutex mutex_;
+  std::int64_t behind_s_ = 0;
+  std::mutex mutex_;
   std::set<std::uint64_t> own_;
   std::jthread signs_;  // the last: it uses all others
 };
+
+// Returns the numbers from `begin` on, and below `end`, that processes which are alive have taken,
+// among them those of this process, by a clock that is so many seconds behind that of the disk.
+// Makes no file.
+std::set<std::uint64_t> leased(const std::filesystem::path& folder, std::uint64_t begin,
+                               std::uint64_t end, std::int64_t behind_s);
 
 }  // namespace previz::post

@@ -393,6 +393,8 @@ RenderReport render_session(const RenderOptions& options, std::ostream& out) {
     render_all(options, take, own, directory, metrics, sums ? &*sums : nullptr, report, out);
 
   const auto at_others = directory.at_others(to_do);
+  for (const std::uint64_t frame : own)
+    if (options.share && !directory.finished(frame)) report.not_made.insert(frame);
   for (std::uint64_t frame = range.first; frame <= range.last; ++frame)
     if (const FinishedFrame* record = directory.finished(frame)) report.frames.push_back(*record);
   report.interrupted = options.stop.stop_requested();

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <iosfwd>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct RenderReport {
   std::vector<FinishedFrame> frames;  // every finished frame of the range, in order
   std::size_t found_finished = 0;     // number that an earlier run had finished
   std::size_t at_others = 0;          // number that other processes are rendering; not in `frames`
+  std::set<std::uint64_t> not_made;  // that this process took, and could not read or was stopped at
   bool interrupted = false;
   double seconds = 0;           // wall clock, without opening the session, scene and device
   std::filesystem::path video;  // empty: none was made

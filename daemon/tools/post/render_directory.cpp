@@ -202,23 +202,15 @@ const FinishedFrame* RenderDirectory::finished(std::uint64_t frame) const {
   return is_there ? &found->second : nullptr;
 }
 
-Claim RenderDirectory::claim(std::uint64_t frame) {
-  const std::lock_guard guard(mutex_);
-  const FolderLocks::Transaction transaction(*locks_);
-  read_lines();
-  if (finished(frame)) return Claim::finished;
-  return locks_->claim(frame) ? Claim::mine : Claim::at_another;
-}
-
 std::set<std::uint64_t> RenderDirectory::claim(const std::set<std::uint64_t>& frames,
                                                std::uint64_t most) {
   const std::lock_guard guard(mutex_);
   const FolderLocks::Transaction transaction(*locks_);
   read_lines();
-  std::set<std::uint64_t> taken;
+  std::set<std::uint64_t> unfinished;
   for (const std::uint64_t frame : frames)
-    if (taken.size() < most && !finished(frame) && locks_->claim(frame)) taken.insert(frame);
-  return taken;
+    if (!finished(frame)) unfinished.insert(frame);
+  return locks_->claim(unfinished, most);
 }
 
 void RenderDirectory::release(std::uint64_t frame) {

@@ -26,9 +26,6 @@
 
 namespace previz::post {
 
-// What came of asking for a frame.
-enum class Claim { mine, finished, at_another };
-
 // claim(), release() and write() are for several threads at once.
 class RenderDirectory {
  public:
@@ -67,8 +64,6 @@ class RenderDirectory {
   // returns them; their lines and files stay.
   std::vector<FinishedFrame> reject(const std::function<bool(const FinishedFrame&)>& is_such);
 
-  // Takes a frame, so that no other process renders it.
-  Claim claim(std::uint64_t frame);
   // Takes those of the frames that are neither finished nor at another process, the first of them
   // and at most `most`, and returns them. No other process takes any of them meanwhile.
   std::set<std::uint64_t> claim(const std::set<std::uint64_t>& frames,

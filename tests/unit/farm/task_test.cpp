@@ -129,6 +129,31 @@ TEST_F(FarmTask, MergesSampleRangesToThePicturesOfOneRun) {
   EXPECT_THAT(out_.str(), Not(HasSubstr("samples in")));
 }
 
+// In pictures and in sample ranges, by numbers and until nothing is left.
+TEST_F(FarmTask, RendersTheFramesThatWereAskedFor) {
+  for (const int ranges : {1, 2}) {
+    divide_samples(ranges);
+    options_.render.frames = post::FrameRange{4, 5};
+    options_.render.directory = directory_ / ("out" + std::to_string(ranges));
+    options_.job = directory_ / ("job" + std::to_string(ranges));
+    options_.division.chunk = 1;
+    submit();
+    TaskOptions task;
+    task.job = *options_.job;
+    for (const std::optional<std::uint64_t> number : {std::optional<std::uint64_t>(0), {}}) {
+      task.number = number;
+      EXPECT_EQ(run_task(task, machine_, out_), task_status::done) << out_.str();
+    }
+    JobOptions job;
+    job.job = *options_.job;
+    EXPECT_EQ(farm::finish(job, out_), task_status::done) << out_.str();
+    const std::filesystem::path pictures = *options_.render.directory;
+    EXPECT_TRUE(std::filesystem::exists(pictures / "0004.exr"));
+    EXPECT_TRUE(std::filesystem::exists(pictures / "0005.exr"));
+    EXPECT_FALSE(std::filesystem::exists(pictures / "0000.exr"));
+  }
+}
+
 TEST_F(FarmTask, OfFramesThatCannotBeDividedIsRefusedBeforeTheNight) {
   options_.division.sample_ranges = 4;
   EXPECT_THAT(test::error_of([&] { submit(); }), HasSubstr("--neighbours 0"));
@@ -329,7 +354,7 @@ class OtherProcess {
   OtherProcess(const std::filesystem::path& pictures, std::uint64_t frame) : locks_(pictures) {
     const post::FolderLocks::Transaction transaction(locks_);
     locks_.join();
-    EXPECT_TRUE(locks_.claim(frame));
+    EXPECT_FALSE(locks_.claim({frame}, 1).empty());
   }
 
  private:

@@ -36,12 +36,10 @@ TEST_F(LeasesTest, GoToOneAndAreGivenBack) {
     EXPECT_TRUE(one.take(7));
     EXPECT_TRUE(one.take(7)) << "it has it";
     EXPECT_FALSE(two.take(7));
-    EXPECT_TRUE(two.is_at_another(7));
-    EXPECT_FALSE(one.is_at_another(7));
     EXPECT_TRUE(one.take(9));
-    EXPECT_THAT(two.at_others(0, 9), ElementsAre(7));
+    EXPECT_THAT(leased(folder_, 0, 9, 0), ElementsAre(7));
     two.give_back(7);
-    EXPECT_TRUE(two.is_at_another(7)) << "it was not its own";
+    EXPECT_FALSE(two.take(7)) << "it was not its own";
     one.give_back(7);
     EXPECT_TRUE(two.take(7));
   }
@@ -55,8 +53,21 @@ TEST_F(LeasesTest, OfADeadProcessAreTakenOver) {
   grow_old(7, std::chrono::seconds(120));
   EXPECT_FALSE(one.take(7));
   grow_old(7, std::chrono::seconds(120));
-  EXPECT_FALSE(one.is_at_another(7));
+  EXPECT_TRUE(leased(folder_, 0, 9, 0).empty());
   EXPECT_TRUE(one.take(7));
+  EXPECT_FALSE(Leases(folder_).take(7));
+}
+
+// What is put aside to be removed may be another's by then.
+TEST_F(LeasesTest, ThatAreTakenOverLeaveNothingBehind) {
+  session::write_content(lease(7), "lost 7 1");
+  grow_old(7, std::chrono::seconds(600));
+  {
+    Leases one(folder_);
+    EXPECT_TRUE(one.take(7));
+    EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder_), {}), 1);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder_));
 }
 
 // Two that see at the same moment that it has died.
@@ -87,27 +98,56 @@ TEST_F(LeasesTest, AreNotMadeThroughALink) {
   EXPECT_THAT(test::error_of([&] { Leases leases(folder_); }), HasSubstr("is a link"));
 }
 
-// One machine has locks and the other has not: each respects what the other has.
+void join(FolderLocks& locks) {
+  const FolderLocks::Transaction transaction(locks);
+  locks.join();
+}
+bool claim(FolderLocks& locks, std::uint64_t frame) {
+  const FolderLocks::Transaction transaction(locks);
+  return !locks.claim({frame}, 1).empty();
+}
+std::vector<FolderUser> others(FolderLocks& locks) {
+  const FolderLocks::Transaction transaction(locks);
+  return locks.others();
+}
+
+// One machine has locks and the other, which comes later, has not: each respects what the other
+// has, once the first has seen that it came.
 TEST(FolderLocksOfTwoMachines, KnowEachOtherWhereOneHasNoLocks) {
   const test::TemporaryDirectory directory;
-  FolderLocks with(directory.path()), without(directory.path(), no_locks);
+  FolderLocks with(directory.path());
+  join(with);
+  EXPECT_TRUE(claim(with, 3));
+  FolderLocks without(directory.path(), no_locks);
   EXPECT_EQ(with.missing(), "");
   EXPECT_THAT(without.missing(), AllOf(HasSubstr("the file system has no locks"),
                                        HasSubstr("replaced after three minutes")));
-  for (FolderLocks* locks : {&without, &with}) {
-    const FolderLocks::Transaction transaction(*locks);
-    locks->join();
-    EXPECT_TRUE(locks->claim(locks == &with ? 3 : 4));
-  }
-  for (FolderLocks* locks : {&with, &without}) {
-    const FolderLocks::Transaction transaction(*locks);
-    const std::uint64_t other = locks == &with ? 4 : 3;
-    EXPECT_TRUE(locks->is_at_another(other));
-    EXPECT_FALSE(locks->claim(other));
-    ASSERT_EQ(locks->others().size(), 1u);
-    EXPECT_THAT(locks->others()[0].frames, ElementsAre(other));
-  }
+  EXPECT_EQ(others(with).size(), 0u);  // it has a lease from now on
+  join(without);
+  EXPECT_TRUE(claim(without, 4));
+  EXPECT_FALSE(claim(without, 3));
+  EXPECT_FALSE(claim(with, 4));
+  ASSERT_EQ(others(with).size(), 1u);
+  EXPECT_THAT(others(with)[0].frames, ElementsAre(4));
+  ASSERT_EQ(others(without).size(), 1u);
+  EXPECT_THAT(others(without)[0].frames, ElementsAre(3));
   EXPECT_EQ(users_of(directory.path(), no_locks).size(), 2u);
+}
+
+// All that a dead process had is free at once.
+TEST(FolderLocksOfTwoMachines, HaveWhatADeadOneLeft) {
+  const test::TemporaryDirectory directory;
+  session::write_content(directory / FolderLocks::file_name,
+                         R"({"host":"lost","pid":7,"since":"today","frames":[2,3]})");
+  const std::filesystem::path lease = directory / "render.leases" / std::to_string(1ull << 62);
+  session::write_content(lease, "lost 7 1");
+  FolderLocks locks(directory.path(), no_locks);
+  join(locks);
+  EXPECT_FALSE(claim(locks, 2));
+  std::filesystem::last_write_time(
+      lease, std::filesystem::last_write_time(lease) - std::chrono::minutes(4));
+  EXPECT_TRUE(claim(locks, 2));
+  EXPECT_TRUE(claim(locks, 3));
 }
 
 TEST(FolderLocksOfTwoMachines, ExcludeEachOtherWhereNeitherHasLocks) {

@@ -241,7 +241,7 @@ TEST_F(RenderDirectoryTest, TwoShareTheFramesAndLoseNoLine) {
   std::array<std::set<std::uint64_t>, 2> written;
   const auto work = [&](RenderDirectory& directory, std::set<std::uint64_t>& own) {
     for (std::uint64_t frame = 0; frame < count; ++frame) {
-      if (directory.claim(frame) != Claim::mine) continue;
+      if (directory.claim({frame}).empty()) continue;
       own.insert(frame);
       directory.write(sample_shot(frame), set_);
     }
@@ -260,12 +260,10 @@ TEST_F(RenderDirectoryTest, TwoShareTheFramesAndLoseNoLine) {
 
 TEST_F(RenderDirectoryTest, WhatAnotherHasIsNamedWithWho) {
   RenderDirectory first = open();
-  EXPECT_EQ(first.claim(7), Claim::mine);
-  EXPECT_EQ(first.claim(12), Claim::mine);
+  EXPECT_EQ(first.claim({7, 12}).size(), 2u);
   RenderDirectory second = open();
   EXPECT_THAT(second.notes(), ElementsAre(HasSubstr("also at work here: previzd")));
-  EXPECT_EQ(second.claim(7), Claim::at_another);
-  EXPECT_EQ(second.claim(8), Claim::mine);
+  EXPECT_THAT(second.claim({7, 8}), ElementsAre(8));
   const auto held = second.at_others({7, 8, 9, 12});
   ASSERT_EQ(held.size(), 1u);
   EXPECT_EQ(held.begin()->second, (std::vector<std::uint64_t>{7, 12}));
@@ -275,8 +273,7 @@ TEST_F(RenderDirectoryTest, WhatAnotherHasIsNamedWithWho) {
                                               " on host " + host.data() + ", since 20"));
   first.write(sample_shot(7), set_);
   first.release(12);
-  EXPECT_EQ(second.claim(7), Claim::finished);
-  EXPECT_EQ(second.claim(12), Claim::mine);
+  EXPECT_THAT(second.claim({7, 12}), ElementsAre(12));
 }
 
 TEST_F(RenderDirectoryTest, ARunOfFramesIsTakenAsFarAsItIsFree) {
@@ -295,21 +292,21 @@ TEST_F(RenderDirectoryTest, FramesOfAKilledProcessAreFreeAgain) {
   directory.write(sample_shot(0), set_);
   test::ChildProcess child([&](int tells) {
     RenderDirectory other = open();
-    const Claim claim = other.claim(3);
+    const bool is_claimed = other.claim({3}).contains(3);
     const session::Draft draft(directory_ / "out/0003.exr");
     std::ofstream(directory_ / "out/frames.jsonl", std::ios::app) << R"({"frame":3,"ti)";
-    test::tell(tells, claim);
+    test::tell(tells, is_claimed);
     for (;;) ::pause();
   });
-  Claim claim = Claim::finished;
-  ASSERT_TRUE(child.is_told(claim));
-  EXPECT_EQ(claim, Claim::mine);
-  EXPECT_EQ(directory.claim(3), Claim::at_another);
+  bool is_claimed = false;
+  ASSERT_TRUE(child.is_told(is_claimed));
+  EXPECT_TRUE(is_claimed);
+  EXPECT_TRUE(directory.claim({3}).empty());
   EXPECT_EQ(directory.at_others({3}).size(), 1u);
   child.kill();
 
   EXPECT_TRUE(directory.at_others({3}).empty());
-  EXPECT_EQ(directory.claim(3), Claim::mine);
+  EXPECT_THAT(directory.claim({3}), ElementsAre(3));
   directory.write(sample_shot(3), set_);  // its line must not run into the half one
   const RenderDirectory again = open();
   EXPECT_NE(again.finished(0), nullptr);
@@ -387,7 +384,7 @@ TEST(FolderLocks, LinesThatNobodyHoldsAreNotLookedAt) {
     const FolderLocks::Transaction transaction(*locks);
     locks->join();
   }
-  EXPECT_TRUE(one.claim(5));
+  EXPECT_EQ(one.claim({5}, 1).size(), 1u);
   const std::vector<FolderUser> others = three.others();
   ASSERT_EQ(others.size(), 2u);
   EXPECT_EQ(others[0].pid, ::getpid());
