@@ -321,13 +321,15 @@ FORWARD(fcntl64)
 END
   timeout 30 "$previz" farm "${quick[@]}" --chunk 2 --job "$job" --out "$pictures" --openjd "$folder/job.yaml"
   mkdir "$pictures/render.leases"
-  echo 'lost 7 1' >"$pictures/render.leases/3"
-  touch --date='120 seconds ago' "$pictures/render.leases/3"
+  echo '{"host": "lost", "pid": 7, "since": "today", "frames": [2]}' >"$pictures/render.lock"
+  local lease=$pictures/render.leases/$((1 << 62))  # of the first line
+  echo 'lost 7 1' >"$lease"
+  touch --date='120 seconds ago' "$lease"
   LD_PRELOAD=$folder/no_locks.so on_three_machines
   expect "the bits are those of one run" same_render "$out/reference/quick" "$pictures"
   expect "each frame is rendered once" \
     [ "$(cat "$folder"/machine?.txt | grep '^frame .*samples in' | sort | uniq --repeated --check-chars=8 | wc --lines)" == 0 ]
-  expect "machines wait for the lost one" grep --quiet 'frame 2 is being rendered by another process' "$folder"/machine?.txt
+  expect "machines wait for the lost one" grep --quiet 'frame 2 is being rendered by previzd 7 on host lost' "$folder"/machine?.txt
 }
 
 # Starts the loop on three machines at once, and expects all to end well.

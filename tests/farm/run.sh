@@ -121,13 +121,14 @@ job_says() { { timeout 30 "$previz" farm status "$job" || true; } 2>&1 | grep --
 # The number of the task, in the array that renders, which runs on a node.
 task_on() { squeue --noheader --array --states=RUNNING --nodelist="node$1" --jobs="$render" --format=%K; }
 
-# Whether the task on a node has finished a picture and not yet its last one: has_begun K FRAMES_A_TASK.
+# Whether the task on a node has rendered a frame and not yet written its last one: has_begun K FRAMES_A_TASK. Frames that
+# are averaged with their neighbours are written after these.
 has_begun() {
-  local task finished
+  local task log
   task=$(task_on "$1")
   [[ -n $task ]] || return 1
-  finished=$(grep --count '^frame .*samples in' "$job/log/$(printf %04d "$task").log")
-  ((finished >= 1 && finished < $2))
+  log=$job/log/$(printf %04d "$task").log
+  grep --quiet '^frame .*: rendered (' "$log" && (($(grep --count '^frame .*samples in' "$log") < $2))
 }
 
 # The controller learns at once that a node is lost, as from an administrator; by itself it takes 15 s.
