@@ -33,6 +33,8 @@ constexpr Seconds oldest_sign = Seconds(60) + Seconds(60) + 3 * between_signs;
 // Nobody takes over any more what is so old while it is removed.
 constexpr Seconds left_behind = 10 * oldest_sign;
 constexpr Seconds for_another_to_tell(2);
+// So many machines share no folder; what is beyond in one from elsewhere counts for nothing.
+constexpr std::size_t most_leases = 10'000;
 constexpr session::FileKind lease_kind{"a lease", 4096};
 
 std::string own_name() {
@@ -73,9 +75,10 @@ std::int64_t time_of_disk_s(const std::filesystem::path& folder) {
 std::set<std::uint64_t> leased(const std::filesystem::path& folder, std::uint64_t begin,
                                std::uint64_t end, std::int64_t behind_s) {
   std::set<std::uint64_t> numbers;
+  std::size_t looked_at = 0;
   std::error_code gone;
-  for (std::filesystem::directory_iterator entry(folder, gone), none; !gone && entry != none;
-       entry.increment(gone)) {
+  for (std::filesystem::directory_iterator entry(folder, gone), none;
+       !gone && entry != none && ++looked_at < most_leases; entry.increment(gone)) {
     struct stat found {};
     const auto number = number_of(entry->path());
     if (number && *number >= begin && *number < end &&

@@ -92,6 +92,13 @@ TEST_F(LeasesTest, ThatWereLeftBehindAreRemovedAtTheEnd) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "notes.txt"));
 }
 
+// In a folder from elsewhere.
+TEST_F(LeasesTest, BeyondAllMachinesAreNotLookedAt) {
+  std::filesystem::create_directory(folder_);
+  for (int i = 0; i < 12'000; ++i) std::ofstream(lease(static_cast<std::uint64_t>(i))).close();
+  EXPECT_LT(leased(folder_, 0, 1'000'000, 0).size(), 10'000u);
+}
+
 TEST_F(LeasesTest, AreNotMadeThroughALink) {
   std::filesystem::create_directory(directory_ / "elsewhere");
   std::filesystem::create_directory_symlink(directory_ / "elsewhere", folder_);
