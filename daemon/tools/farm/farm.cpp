@@ -59,7 +59,6 @@ class NewFolder {
     std::error_code stays;
     folder.forget_states();
     std::filesystem::remove(folder.submitted_file(), stays);
-    std::filesystem::remove_all(folder.place("sums"), stays);
   }
   NewFolder(const NewFolder&) = delete;
   NewFolder& operator=(const NewFolder&) = delete;

@@ -1,6 +1,7 @@
 #include "daemon/tools/farm/finish.hpp"
 
 #include <chrono>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <ostream>
@@ -205,7 +206,8 @@ void print_missing(const JobFolder& folder, const Job& job, const Proof& proof, 
         << " missing; `previz farm retry` with this folder renders them" << std::endl;
 }
 
-// The lock of a frame, of which a job's own folder has none.
+// Takes the lock of frame 0, which means nothing else in a job's own folder. It is asked for again
+// and again, since a lock that fcntl(2) waits for could not be given up on a stop.
 JobLock::JobLock(const JobFolder& folder, std::ostream& out, const std::stop_token& stop)
     : locks_(folder.path()) {
   for (;; std::this_thread::sleep_for(std::chrono::milliseconds(100))) {

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <iosfwd>
-#include <map>
 #include <stop_token>
 #include <string>
 #include <vector>

@@ -144,11 +144,11 @@ void JobFolder::write_state(const std::string& task, const TaskState& state) con
 }
 
 void JobFolder::forget_states() const {
-  std::error_code stays, gone;
-  for (std::filesystem::directory_iterator entry(path_ / "state", gone), end; !gone && entry != end;
-       entry.increment(gone))
-    if (entry->path().extension() == ".json") std::filesystem::remove(entry->path(), stays);
-  for (const std::filesystem::path& file : {stopped_file(), missing_file()})
+  std::error_code stays;
+  for (const auto& [task, state] : read_states())
+    std::filesystem::remove(path_ / "state" / (task + ".json"), stays);
+  for (const std::filesystem::path& file :
+       {path_ / "state" / (std::string(finish_name) + ".json"), stopped_file(), missing_file()})
     std::filesystem::remove(file, stays);
 }
 

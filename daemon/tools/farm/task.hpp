@@ -14,8 +14,8 @@ namespace previz::farm {
 
 struct TaskOptions {
   std::filesystem::path job;
-  // Of the task, which then ends with its share (Job::share); absent: it renders until no frame is
-  // left, and waits for those that others have.
+  // The task's number. A task that has one ends with its share (Job::share); one without renders
+  // until no frame is left, and waits for those that others have.
   std::optional<std::uint64_t> number;
   // The pictures may lie where the plan says, wherever that is (check_paths()).
   bool any_paths = false;

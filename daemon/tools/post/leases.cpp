@@ -171,7 +171,7 @@ bool Leases::remove_dead(std::uint64_t number) const {
   if (::rename(file(number).c_str(), aside.c_str()) != 0) return false;
   const bool is_the_same = ::lstat(aside.c_str(), &taken) == 0 && taken.st_ino == dead.st_ino &&
                            !is_alive(taken, behind_s_);
-  // Where a third one has made it meanwhile, whose it was will see that.
+  // If a third process has made the file meanwhile, the one whose file this was will see that.
   std::error_code taken_again;
   if (!is_the_same) std::filesystem::create_hard_link(aside, file(number), taken_again);
   ::unlink(aside.c_str());

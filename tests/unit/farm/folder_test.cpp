@@ -1,4 +1,4 @@
-// What stands in a job's folder, and who does its last step.
+// Tests what a job's folder keeps of its tasks, and that one process at a time does its last step.
 #include "daemon/tools/farm/folder.hpp"
 
 #include "daemon/tools/farm/finish.hpp"

@@ -66,10 +66,11 @@ TEST_F(FarmSubmission, ThatIsRefusedLeavesNoFolder) {
 
 // A folder that was there before holds what is not the job's.
 TEST_F(FarmSubmission, ThatIsRefusedLeavesAFolderThatWasThere) {
-  session::write_content(folder_.path() / "notes.txt", "mine");
+  const std::array mine{"notes.txt", "state/notes.json", "sums/0000/1/notes.txt"};
+  for (const char* file : mine) session::write_content(folder_.path() / file, "mine");
   stand_in("sbatch", "[ \"$1\" = --version ]");
   EXPECT_THAT(refusal(), HasSubstr("nothing was submitted"));
-  EXPECT_TRUE(std::filesystem::exists(folder_.path() / "notes.txt"));
+  for (const char* file : mine) EXPECT_TRUE(std::filesystem::exists(folder_.path() / file)) << file;
   EXPECT_FALSE(std::filesystem::exists(folder_.plan()));
 }
 

@@ -129,7 +129,8 @@ TEST_F(FarmTask, MergesSampleRangesToThePicturesOfOneRun) {
   EXPECT_THAT(out_.str(), Not(HasSubstr("samples in")));
 }
 
-// In pictures and in sample ranges, by numbers and until nothing is left.
+// The frames are rendered as pictures and in sample ranges, by a task with a number and by one that
+// goes on until nothing is left.
 TEST_F(FarmTask, RendersTheFramesThatWereAskedFor) {
   for (const int ranges : {1, 2}) {
     divide_samples(ranges);
@@ -475,7 +476,7 @@ TEST_F(FarmTask, OfAnotherKindOfDeviceMayBeTakenLater) {
   EXPECT_EQ(farm::finish(both, out_), task_status::done) << out_.str();
 }
 
-// Before the night, and not after it.
+// The job is refused before the night, and not after it.
 TEST_F(FarmTask, OfAnotherKindOfDeviceIsRefusedWhereItWasRenderedBefore) {
   post::RenderOptions before = options_.render;
   before.session = directory_ / "session";

@@ -58,7 +58,6 @@ TEST_F(LeasesTest, OfADeadProcessAreTakenOver) {
   EXPECT_FALSE(Leases(folder_).take(7));
 }
 
-// What is put aside to be removed may be another's by then.
 TEST_F(LeasesTest, ThatAreTakenOverLeaveNothingBehind) {
   session::write_content(lease(7), "lost 7 1");
   grow_old(7, std::chrono::seconds(600));
@@ -92,7 +91,7 @@ TEST_F(LeasesTest, ThatWereLeftBehindAreRemovedAtTheEnd) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "notes.txt"));
 }
 
-// In a folder from elsewhere.
+// A folder from elsewhere may hold any number of files.
 TEST_F(LeasesTest, BeyondAllMachinesAreNotLookedAt) {
   std::filesystem::create_directory(folder_);
   for (int i = 0; i < 12'000; ++i) std::ofstream(lease(static_cast<std::uint64_t>(i))).close();
@@ -141,7 +140,7 @@ TEST(FolderLocksOfTwoMachines, KnowEachOtherWhereOneHasNoLocks) {
   EXPECT_EQ(users_of(directory.path(), no_locks).size(), 2u);
 }
 
-// All that a dead process had is free at once.
+// The frames of a dead process are free at once, whatever their number.
 TEST(FolderLocksOfTwoMachines, HaveWhatADeadOneLeft) {
   const test::TemporaryDirectory directory;
   session::write_content(directory / FolderLocks::file_name,

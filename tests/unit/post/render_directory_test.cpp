@@ -105,7 +105,7 @@ TEST_F(RenderDirectoryTest, ALineSaysWhichDeviceMadeTheFrame) {
   EXPECT_EQ(again.finished(1)->made_on, MadeOn{});
 }
 
-// Their lines stay, until they are forgotten, and so do their files.
+// The lines of rejected frames stay until they are forgotten, and their files stay for good.
 TEST_F(RenderDirectoryTest, KeepsWhatItCountsAsNotFinished) {
   {
     RenderDirectory directory = open();

@@ -3,12 +3,12 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "daemon/core/tracking/photometry.hpp"
 #include "daemon/tools/calibrate/lens/board_finder.hpp"
 #include "daemon/tools/calibrate/lens/marker_dictionary.hpp"
 #include "daemon/tools/calibrate/lens/observer.hpp"
 #include "daemon/tools/calibrate/lens/views.hpp"
 #include "tests/support/test.hpp"
+#include "tests/unit/calibrate/lens/drawn_board.hpp"
 
 namespace previz::calibrate::charuco_test {
 
@@ -59,24 +59,6 @@ cv::Matx33d pixel_from_drawing(const cv::Mat1b& drawing, const cv::Vec3d& turn,
   return cv::Matx33d(focal_px, 0, 319.5, 0, focal_px, 239.5, 0, 0, 1) * pose * centred;
 }
 
-// 4x4 samples per pixel, the sRGB curve, noise of 1.5 of 255.
-Frame photograph(const cv::Mat1b& drawing, const cv::Matx33d& map, cv::RNG& random) {
-  const cv::Matx33d finer(4, 0, 1.5, 0, 4, 1.5, 0, 0, 1);
-  cv::Mat1b fine, picture;
-  cv::warpPerspective(drawing, fine, finer * map, {4 * width, 4 * height}, cv::INTER_LINEAR,
-                      cv::BORDER_CONSTANT, 200);
-  cv::resize(fine, picture, {width, height}, 0, 0, cv::INTER_AREA);
-  cv::GaussianBlur(picture, picture, {}, 0.7);
-  cv::Mat1b curve(1, 256);
-  for (int i = 0; i < 256; ++i)
-    curve(i) = std::uint8_t(std::lround(255 * tracking::srgb_encode(i / 255.0)));
-  cv::LUT(picture, curve, picture);
-  cv::Mat noisy(height, width, CV_16S);
-  random.fill(noisy, cv::RNG::NORMAL, 0, 1.5);
-  cv::add(picture, noisy, picture, {}, CV_8U);
-  return test::gray_frame(picture.cols, picture.rows, {picture.datastart, picture.dataend});
-}
-
 class CharucoForms : public testing::TestWithParam<Print> {};
 
 // A wrong id is off by a square or more, some 50 px; 0.2 % is the promised bound, which the noise
@@ -94,7 +76,8 @@ TEST_P(CharucoForms, GiveTheLens) {
     const cv::Vec3d turn(any(0.6), any(0.6), any(0.4));
     const cv::Matx33d map =
         pixel_from_drawing(drawing, turn, {any(0.06), any(0.05), random.uniform(1.3, 1.5)});
-    const BoardCorners corners = finder->find(photograph(drawing, map, random));
+    const BoardCorners corners =
+        finder->find(test::photograph(drawing, map, {width, height}, random));
     View view{std::to_string(i), {}, corners.pixels};
     for (std::size_t j = 0; j < corners.ids.size(); ++j) {
       const int id = corners.ids[j], across = print.columns - 1;

@@ -3,13 +3,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "daemon/core/tracking/photometry.hpp"
 #include "daemon/tools/calibrate/calibrate.hpp"
 #include "daemon/tools/calibrate/lens/board_finder.hpp"
 #include "daemon/tools/calibrate/lens/observer.hpp"
 #include "daemon/tools/calibrate/lens/views.hpp"
 #include "tests/support/test.hpp"
-#include "tests/support/tracking_synthetic.hpp"
+#include "tests/unit/calibrate/lens/drawn_board.hpp"
 
 namespace previz::calibrate::kalibr_test {
 
@@ -79,29 +78,6 @@ glm::dvec2 pixel_of(const glm::dvec3& point, const Held& held) {
   return {at[0] / at[2], at[1] / at[2]};
 }
 
-Frame frame_of(const cv::Mat1b& picture) {
-  return test::gray_frame(picture.cols, picture.rows, {picture.datastart, picture.dataend});
-}
-
-// Returns the board as a camera with the sRGB curve sees it: 4x4 samples per pixel, the light
-// slightly blurred, noise of 1.5 of 255.
-Frame photograph(const cv::Mat1b& drawing, const Held& held, cv::RNG& random) {
-  const cv::Matx33d finer(4, 0, 1.5, 0, 4, 1.5, 0, 0, 1);
-  cv::Mat1b fine, picture;
-  cv::warpPerspective(drawing, fine, finer * pixel_from_drawing(held), {4 * width, 4 * height},
-                      cv::INTER_LINEAR, cv::BORDER_CONSTANT, 200);
-  cv::resize(fine, picture, {width, height}, 0, 0, cv::INTER_AREA);
-  cv::GaussianBlur(picture, picture, {}, 0.7);
-  cv::Mat1b curve(1, 256);
-  for (int i = 0; i < 256; ++i)
-    curve(i) = std::uint8_t(std::lround(255 * tracking::srgb_encode(i / 255.0)));
-  cv::LUT(picture, curve, picture);
-  cv::Mat noisy(height, width, CV_16S);
-  random.fill(noisy, cv::RNG::NORMAL, 0, 1.5);
-  cv::add(picture, noisy, picture, {}, CV_8U);
-  return frame_of(picture);
-}
-
 Held any_pose(cv::RNG& random) {
   const auto any = [&](double reach) { return random.uniform(-reach, reach); };
   Held held;
@@ -159,7 +135,8 @@ TEST_P(KalibrsAprilgrid, GivesTheLens) {
   const int views = border == 2 && has_squares ? 14 : 4;  // edges are fitted slowly
   for (int i = 0; i < views; ++i) {
     const Held held = any_pose(random);
-    look(*finder, photograph(drawing, held, random), held, seen);
+    look(*finder, test::photograph(drawing, pixel_from_drawing(held), {width, height}, random),
+         held, seen);
   }
   EXPECT_EQ(finder->form(), std::string("the tags have a black border of ") +
                                 (border == 2 ? "two cells" : "one cell") + ", " +
@@ -196,7 +173,7 @@ Frame kept_picture(int i) {
   const auto file = kept / ("0" + std::to_string(i) + ".png");
   const cv::Mat1b picture = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
   EXPECT_EQ(picture.size(), cv::Size(width, height)) << file;
-  return frame_of(picture);
+  return test::frame_of(picture);
 }
 
 // The pictures' values are linear in light, which a folder of pictures does not say: they are read
