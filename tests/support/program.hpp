@@ -66,7 +66,8 @@ inline Ended run_program(const std::vector<std::string>& words, const ProgramLim
                                  : ::open(limits.output.c_str(), O_WRONLY | O_CREAT, 0600),
            STDOUT_FILENO);
     ::dup2(::fileno(said.get()), STDERR_FILENO);
-    const rlimit memory{limits.memory, limits.memory}, none{0, 0};
+    [[maybe_unused]] const rlimit memory{limits.memory, limits.memory};
+    const rlimit none{0, 0};
 #ifndef __SANITIZE_ADDRESS__
     ::setrlimit(RLIMIT_AS, &memory);
 #endif
