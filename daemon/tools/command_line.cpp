@@ -37,6 +37,13 @@ void add_render_options(CLI::App& command, post::RenderOptions& options, const s
                   "stands alone (default: quality.neighbours)")
       ->check(CLI::Range(0, 4));
   command
+      .add_option("--memory", options.memory,
+                  "Memory of the computer that may be taken, as 8GB; what needs more works in "
+                  "scratch files (default: quality.memory_mb)")
+      ->transform(CLI::AsSizeValue(true));
+  command.add_option("--scratch", options.scratch,
+                     "Folder for scratch files, on a local disk (default: $TMPDIR, or /var/tmp)");
+  command
       .add_option(
           "--error", options.error,
           "Add samples until the error is this fraction of the picture's brightness (default: "

@@ -10,6 +10,7 @@
 #include <functional>
 #include <iostream>
 
+#include "daemon/core/output/memory.hpp"
 #include "daemon/core/output/take_folders.hpp"
 #include "daemon/core/program/program.hpp"
 #include "daemon/core/render/device/gpu.hpp"
@@ -62,6 +63,7 @@ int do_render_takes(const post::RenderOptions& options, post::WhichTakes which) 
 int do_render_take(const post::RenderOptions& options) {
   const post::RenderReport report = post::render_session(options, std::cout);
   std::cout << report.directory.string() << ": " << set::plural(report.frames.size(), "frame")
+            << ", in at most " << output::peak_memory_bytes() / 1'000'000 << " MB of memory"
             << (report.interrupted ? "; stopped; run the same command to continue" : "")
             << std::endl;
   if (report.failures.empty()) return 0;

@@ -61,6 +61,7 @@ void add_pictures(const std::optional<fs::path>& out, const fs::path& take,
 
 void add_render(const post::RenderOptions& options, bool of_many, Places& places) {
   add_pictures(options.directory, options.session, options.set_file, options.any_paths, places);
+  places.add_folder(options.scratch);
   if (!of_many) return;
   places.add_folders_in(options.session);
   if (options.directory) places.add_folders_in(*options.directory);

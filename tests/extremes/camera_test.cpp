@@ -39,12 +39,12 @@ TEST(ExtremeCamera, EveryCodeComesBackThroughTheComposite) {
       const Response response(curve, bits);
       for (const double exposure : {1e-6, 0.85, 1e6}) {
         const render::PlateRadiance radiance = render::plate_radiance(plate, response, exposure);
-        EXPECT_EQ(radiance.value[0], 0);
-        EXPECT_DOUBLE_EQ(radiance.value.back(), 1 / exposure);
+        EXPECT_EQ(radiance.channel(0, 0).radiance, 0);
+        EXPECT_DOUBLE_EQ(radiance.channel(255, 2).radiance, 1 / exposure);
         std::vector<gpu::GpuPixel> untouched(256), covered(256);
         for (std::size_t i = 0; i < 256; ++i) {
           untouched[i].square_high.w = covered[i].square_high.w = 1;
-          const double value = radiance.value[3 * i];
+          const double value = radiance.channel(i, 0).radiance;
           const auto high = static_cast<float>(value);
           const auto low = static_cast<float>(value - static_cast<double>(high));
           covered[i].mixed_high = gpu::vec4(high, high, high, 1);

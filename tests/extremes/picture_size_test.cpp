@@ -16,14 +16,6 @@ std::string refusal(int width, int height, const render::PictureMemory& memory) 
   return words_of([&] { render::refuse_too_large(width, height, memory); });
 }
 
-std::string refusal(int width, int height, int neighbours, const render::PictureMemory& memory,
-                    std::uint64_t free_bytes, std::uint64_t take_frames = 1000) {
-  return words_of([&] {
-    render::refuse_too_many_neighbours(width, height, {neighbours, take_frames}, memory,
-                                       free_bytes);
-  });
-}
-
 // A white floor and a virtual box on it, in a white environment: whatever the size, the real floor
 // shows 1, the box is there, and where it changes nothing the plate comes back.
 void expect_shown(int width, int height) {
@@ -79,43 +71,81 @@ TEST(PictureSize, Of8192x4320FitsOrIsRefused) {
   const std::string no_memory = refusal(8192, 4320, {.bytes = 4 * gib, .pixels = pixels});
   EXPECT_THAT(no_memory, HasSubstr("8192x4320 takes 7.31 GB"));
   EXPECT_THAT(no_memory, HasSubstr("but there is only 4.29 GB"));
-  // Made into layers in the same memory: 140 bytes more.
+  // Made into layers in the same memory: 80 bytes more. In scratch files: neither these nor the
+  // sums, which are 176.
   const std::string shared =
       refusal(8192, 4320, {.bytes = 8 * gib, .pixels = pixels, .read_back = true});
-  EXPECT_THAT(shared, HasSubstr("takes 12.3 GB"));
+  EXPECT_THAT(shared, HasSubstr("takes 10.1 GB"));
+  EXPECT_EQ(refusal(8192, 4320,
+                    {.bytes = 2 * gib, .pixels = pixels, .read_back = true, .in_scratch = true}),
+            "");
   const std::string no_pixels = refusal(8192, 4320, {.bytes = 64 * gib, .pixels = 1u << 16});
   EXPECT_THAT(no_pixels, HasSubstr("65536 pixels"));
 }
 
-// A megapixel that is averaged with two frames on each side takes 5 kept frames of 182 bytes a
-// pixel and 5 layers of 80: 1.31 GB. A card has the picture in 193 bytes, 168 of history, and a
-// band of 230: 0.591 GB. Without a card these, and 140 more, lie in the same memory: 2.04 GB.
-TEST(PictureSize, ThatIsAveragedFitsOrIsRefused) {
-  constexpr std::uint64_t megabyte = 1'000'000;
-  const auto card = [](std::uint64_t megabytes) {
-    return render::PictureMemory{.bytes = megabytes * megabyte, .pixels = 1u << 27};
+render::TakeOfPictures megapixels(int each_side, std::uint64_t take_frames = 1000, int parts = 1) {
+  return {1000, 1000, each_side, take_frames, parts};
+}
+
+// A megapixel that is averaged with two frames on each side takes 5 kept frames of 176 bytes a
+// pixel and 3 layers of 80, and its sums in 16 parts 5 times 176. Without a card there are the
+// sums, too, and 168 bytes of history.
+TEST(PictureSize, OfATakeIsCountedByWhatCanLieInFiles) {
+  constexpr std::uint64_t pixels = 1'000'000;
+  const render::PictureMemory card, shared{.read_back = true};
+  EXPECT_EQ(render::take_memory(megapixels(2), card).banded, pixels * (5 * 176 + 3 * 80));
+  EXPECT_EQ(render::take_memory(megapixels(2, 3), card).banded, pixels * (3 * 176 + 3 * 80));
+  EXPECT_EQ(render::take_memory(megapixels(0), card).banded, pixels * 3 * 80);
+  EXPECT_EQ(render::take_memory(megapixels(0, 1, 16), card).banded, pixels * (80 + 5 * 176));
+  EXPECT_EQ(render::take_memory(megapixels(2), shared).banded,
+            pixels * (5 * 176 + 3 * 80 + 176 + 168));
+}
+
+// With 400 MB for the program, and what has to be in memory: 90 bytes a pixel of frames, 17 of
+// plate and rays, and 230 of a band.
+TEST(PictureSize, ThatIsMoreThanAskedForLiesInFilesOrIsRefused) {
+  const render::PictureMemory shared{.read_back = true};
+  const auto plan = [&](std::optional<std::uint64_t> asked, std::uint64_t free_bytes) {
+    return render::plan_memory(megapixels(2), shared, asked, free_bytes);
   };
-  EXPECT_EQ(refusal(1000, 1000, 2, card(610), 1320 * megabyte), "");
-  EXPECT_EQ(refusal(1000, 1000, 2, card(610), 1300 * megabyte),
-            "quality.neighbours = 2: to average 5 frames of 1000x1000 takes 1.31 GB of the "
-            "computer's memory, and 1.3 GB are free; make the picture smaller (--scale), or "
-            "average fewer (--neighbours 1 fits)");
-  EXPECT_THAT(refusal(1000, 1000, 4, card(610), 300 * megabyte),
-              HasSubstr("average fewer (--neighbours 0, every frame stands alone)"));
-  EXPECT_EQ(refusal(1000, 1000, 1, card(580), 8 * gib),
+  const render::TakeMemory needed = render::take_memory(megapixels(2), shared);
+  EXPECT_NEAR(static_cast<double>(needed.rest), 737e6, 1e6);
+  EXPECT_FALSE(plan(needed.whole(), 0).in_scratch);
+  EXPECT_FALSE(plan({}, 2 * needed.whole()).in_scratch);
+  const render::MemoryPlan less = plan(1'200'000'000, 64 * gib);
+  EXPECT_TRUE(less.in_scratch);
+  EXPECT_EQ(less.resident, 1'200'000'000 - needed.rest);
+  EXPECT_EQ(plan(needed.whole() - 1, 0).resident, 512'000'000u);
+  EXPECT_TRUE(plan({}, 2'000'000'000).in_scratch);  // of which nine tenths may be taken
+  EXPECT_EQ(words_of([&] { plan(800'000'000, 64 * gib); }),
+            "pictures of 1000x1000 take at least 0.865 GB of the computer's memory, and 0.8 GB are "
+            "allowed; make the pictures smaller (--scale), or allow more (--memory)");
+  EXPECT_THAT(words_of([&] { plan({}, 900'000'000); }), HasSubstr("and 0.81 GB are free; make"));
+}
+
+// Nobody asked: what is more than 4 GB lies in files, however much is free.
+TEST(PictureSize, Of3840x2160LiesInFilesUnlessMoreIsAskedFor) {
+  const render::TakeOfPictures take{3840, 2160, 2, 1000, 1};
+  const render::PictureMemory shared{.read_back = true};
+  EXPECT_TRUE(render::plan_memory(take, shared, {}, 64 * gib).in_scratch);
+  EXPECT_FALSE(render::plan_memory(take, shared, 16 * gib, 64 * gib).in_scratch);
+}
+
+// A card has the picture in 193 bytes a pixel, 168 of history, and a band of 230: 0.591 GB.
+TEST(PictureSize, WhoseHistoryACardHasNoRoomForIsRefused) {
+  const auto refused = [](int each_side, std::uint64_t megabytes) {
+    return words_of([&] {
+      render::refuse_too_large(megapixels(each_side),
+                               {.bytes = megabytes * 1'000'000, .pixels = 1u << 27});
+    });
+  };
+  EXPECT_EQ(refused(1, 610), "");
+  EXPECT_EQ(refused(0, 580), "");
+  EXPECT_EQ(refused(1, 580),
             "quality.neighbours = 1: to average a picture of 1000x1000 takes 0.591 GB of the "
-            "graphics card's memory, and there is 0.58 GB; make the picture smaller (--scale), or "
+            "graphics card's memory, and there is 0.58 GB; make the pictures smaller (--scale), or "
             "let every frame stand alone (--neighbours 0)");
-  render::PictureMemory shared = card(8000);
-  shared.read_back = true;
-  EXPECT_EQ(refusal(1000, 1000, 2, shared, 2060 * megabyte), "");
-  EXPECT_THAT(refusal(1000, 1000, 2, shared, 2020 * megabyte),
-              HasSubstr("takes 2.04 GB of the computer's memory, and 2.02 GB are free"));
-  EXPECT_THAT(refusal(1000, 1000, 2, card(100), 8 * gib), HasSubstr("takes 0.423 GB of memory"));
-  // A take of three frames keeps no more than those, and as many layers: 0.786 GB.
-  EXPECT_EQ(refusal(1000, 1000, 2, card(610), 790 * megabyte, 3), "");
-  EXPECT_THAT(refusal(1000, 1000, 2, card(610), 780 * megabyte, 3),
-              HasSubstr("to average 3 frames of 1000x1000 takes 0.786 GB"));
+  EXPECT_THAT(refused(2, 100), HasSubstr("takes 0.423 GB of memory"));
 }
 
 // More than any Vulkan device can address: refused at once, though a set file may ask for it.
@@ -125,17 +155,6 @@ TEST(PictureSize, OfMoreThanTheDeviceHoldsIsRefusedByTheRenderer) {
     EXPECT_THAT(words_of([&] { render::Renderer(shared_device(), {}, camera); }),
                 HasSubstr(std::to_string(width) + "x"));
   }
-}
-
-// 16 parts are summed in a tree of five levels, each with 176 bytes a pixel.
-TEST(PictureSize, WhosePartsHaveNoRoomIsRefused) {
-  EXPECT_EQ(render::part_bytes(3840, 2160, 16), 5ull * 176 * 3840 * 2160);
-  EXPECT_EQ(render::part_bytes(3840, 2160, 1), 0u);
-  const std::string refusal =
-      test::error_of([] { render::refuse_too_many_parts(3840, 2160, 16, 4'000'000'000); });
-  EXPECT_THAT(refusal, HasSubstr("takes 7.3 GB of the computer's memory"));
-  EXPECT_THAT(refusal, HasSubstr("4 GB are free; make the picture smaller (--scale)"));
-  render::refuse_too_many_parts(3840, 2160, 16, 8'000'000'000);
 }
 
 }  // namespace previz::test::picture_size_test

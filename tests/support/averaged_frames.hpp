@@ -42,7 +42,7 @@ inline Plate shown_frame(SetRenderer& renderer, int samples, bool accumulates,
 // A frame of many samples, and what objects cover of its pixels.
 struct Truth {
   Plate picture;
-  std::vector<float> mask;
+  render::Sheet<float> mask;
 };
 
 inline Truth truth_of(SetRenderer& renderer, const glm::dmat4& world_from_camera, int samples) {

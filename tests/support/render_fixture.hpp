@@ -116,8 +116,7 @@ inline std::vector<Pixel> pixels_of(int width, int height) {
 }
 
 // What a sensor sees of a layer whose codes of 16 bits are linear and end at `white`.
-template <class Radiance>
-Plate linear_plate(int width, int height, const std::vector<Radiance>& layer, double white) {
+Plate linear_plate(int width, int height, const auto& layer, double white) {
   Plate plate{width, height, 16, {}};
   for (const glm::dvec3 radiance : layer)
     for (int c = 0; c < 3; ++c)
@@ -135,7 +134,7 @@ inline void expect_near(const glm::dvec3& found, const glm::dvec3& expected, dou
 }
 
 // Mean of a layer over the picture, per channel, in double precision.
-inline glm::dvec3 mean(const std::vector<glm::vec3>& layer) {
+inline glm::dvec3 mean(std::span<const glm::vec3> layer) {
   glm::dvec3 sum(0);
   for (const glm::vec3& value : layer) sum += glm::dvec3(value);
   return sum / static_cast<double>(layer.size());

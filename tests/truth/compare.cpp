@@ -192,13 +192,13 @@ Measures compare_with(const TruthFrame& truth, const EstimatedFrame& wanted,
       return clipped(truth.real[i] + of.diff[i], white) - clipped(truth.real[i], white);
     };
   };
-  const auto clip = [&](const std::vector<glm::vec3>& picture) -> PixelValue {
-    return [&](std::size_t i) { return clipped(picture[i], white); };
+  const auto clip = [&](std::span<const glm::vec3> picture) -> PixelValue {
+    return [picture, white](std::size_t i) { return clipped(picture[i], white); };
   };
   const PixelValue true_diff = [&](std::size_t i) {
     return clipped(truth.mixed[i], white) - clipped(truth.real[i], white);
   };
-  const std::vector<glm::vec3> ideal = ideal_composite(truth);
+  const render::Sheet<glm::vec3> ideal = ideal_composite(truth);
 
   BlockSums diff_sums, virtual_sums, edge_sums, real_sums;
   for (int by = 0; by < truth.height / block_px; ++by) {
@@ -279,9 +279,9 @@ Chance chance_between(const TruthFrame& truth, const EstimatedFrame& a, const Es
   return out;
 }
 
-std::vector<glm::vec3> ideal_composite(const TruthFrame& truth) {
+render::Sheet<glm::vec3> ideal_composite(const TruthFrame& truth) {
   const double white = 1 / truth.exposure;
-  std::vector<glm::vec3> out(truth.mixed.size());
+  render::Sheet<glm::vec3> out(truth.mixed.size());
   for (std::size_t i = 0; i < out.size(); ++i) {
     const glm::dvec3 mixed = clipped(truth.mixed[i], white);
     const glm::dvec3 uncovered =
@@ -292,7 +292,7 @@ std::vector<glm::vec3> ideal_composite(const TruthFrame& truth) {
   return out;
 }
 
-Plate displayed(const std::vector<glm::vec3>& radiance, int width, int height, double exposure,
+Plate displayed(std::span<const glm::vec3> radiance, int width, int height, double exposure,
                 const ResponseCurve& response) {
   const lighting::Response curve(response, 8);
   Plate plate;
@@ -320,7 +320,7 @@ EstimatedFrame composited(const TruthFrame& truth, EstimatedFrame estimate) {
   return estimate;
 }
 
-EstimatedFrame as_composited(const std::vector<glm::vec3>& plate, EstimatedFrame estimate) {
+EstimatedFrame as_composited(std::span<const glm::vec3> plate, EstimatedFrame estimate) {
   estimate.is_as_shown = !plate.empty();
   for (std::size_t i = 0; i < estimate.composite.size(); ++i) {
     if (estimate.mask[i] == 0)

@@ -3,9 +3,11 @@
 
 #include <glm/vec3.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "daemon/core/render/picture/scratch.hpp"
 #include "drivers/calibration.hpp"
 #include "drivers/frame.hpp"
 #include "drivers/plate.hpp"
@@ -17,18 +19,18 @@ struct TruthFrame {
   int width = 0, height = 0;
   double exposure = 1;  // absolute; the sensor's white is 1 / exposure
   ResponseCurve response;
-  std::vector<glm::vec3> plate;  // Lc, from the observer frame's 8-bit samples
-  std::vector<glm::vec3> real;   // Lr
-  std::vector<glm::vec3> mixed;  // Lm
-  std::vector<float> mask;       // M
+  render::Sheet<glm::vec3> plate;  // Lc, from the observer frame's 8-bit samples
+  render::Sheet<glm::vec3> real;   // Lr
+  render::Sheet<glm::vec3> mixed;  // Lm
+  render::Sheet<float> mask;       // M
   // The truth's own noise as its set.json states it, absent where it does not:
   std::optional<double> diff_rmse;           // of a pixel of mixed - real, radiance
   std::optional<double> mixed_rmse_of_mean;  // of a pixel of mixed (clipped), over the picture mean
 };
 
 struct EstimatedFrame {
-  std::vector<glm::vec3> composite, mixed, real, diff;
-  std::vector<float> mask;
+  render::Sheet<glm::vec3> composite, mixed, real, diff;
+  render::Sheet<float> mask;
   Plate picture;             // 8 bit
   bool is_as_shown = false;  // the composite is judged, and not the difference that it was made of
 };
@@ -51,9 +53,9 @@ inline constexpr double identical_psnr = 120;
 Measures compare(const TruthFrame& truth, const EstimatedFrame& estimate);
 
 // M Lm + (1 - M)(Lc + D), everything clipped at the sensor's white.
-std::vector<glm::vec3> ideal_composite(const TruthFrame& truth);
+render::Sheet<glm::vec3> ideal_composite(const TruthFrame& truth);
 // A picture as the display would show it, 8 bit.
-Plate displayed(const std::vector<glm::vec3>& radiance, int width, int height, double exposure,
+Plate displayed(std::span<const glm::vec3> radiance, int width, int height, double exposure,
                 const ResponseCurve& response);
 
 // The estimate with its composite over the truth's plate, M Lm + (1 - M)(Lc + D) with its own M,
@@ -63,7 +65,7 @@ EstimatedFrame composited(const TruthFrame& truth, EstimatedFrame estimate);
 // The estimate with what its composite over a plate (empty: black) shows in place of diff, where
 // its mask is 0, and of mixed, where it is 1: a composite from which noise was taken is not made of
 // them. Clipping then applies to what is shown.
-EstimatedFrame as_composited(const std::vector<glm::vec3>& plate, EstimatedFrame estimate);
+EstimatedFrame as_composited(std::span<const glm::vec3> plate, EstimatedFrame estimate);
 
 double psnr(const Plate& a, const Plate& b);
 // Wang et al. 2004: 11x11 Gaussian of sigma 1.5, K1 = 0.01, K2 = 0.03, windows wholly inside the

@@ -15,7 +15,7 @@ TruthFrame constructed() {
   t.height = 24;
   t.exposure = 1.25;  // white at 0.8
   t.response.kind = ResponseCurve::Kind::srgb;
-  t.plate = t.real = std::vector<glm::vec3>(32 * 24, glm::vec3(0.2F));
+  t.plate = t.real = render::Sheet<glm::vec3>(32 * 24, glm::vec3(0.2F));
   for (int i = 0; i < 32 * 24; ++i) {
     const bool covered = i % 32 >= 20;
     t.mixed.emplace_back(covered ? 0.4F : 0.1F);

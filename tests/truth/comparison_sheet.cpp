@@ -22,7 +22,7 @@ cv::Mat panel(const char* caption, const Plate& plate) {
 }  // namespace
 
 Plate comparison_sheet(const TruthFrame& truth, const EstimatedFrame& estimate) {
-  const auto shown = [&](const std::vector<glm::vec3>& radiance) {
+  const auto shown = [&](std::span<const glm::vec3> radiance) {
     return displayed(radiance, truth.width, truth.height, truth.exposure, truth.response);
   };
   const Plate ideal = shown(ideal_composite(truth));

@@ -35,9 +35,9 @@ Part around_objects(const TruthFrame& truth) {
   return {left, top, right - left, bottom - top};
 }
 
-template <typename T>
-std::vector<T> cut(const std::vector<T>& picture, int width, const Part& part, int channels = 1) {
-  std::vector<T> out;
+template <typename Picture>
+Picture cut(const Picture& picture, int width, const Part& part, int channels = 1) {
+  Picture out;
   for (int y = part.top; y < part.top + part.height; ++y) {
     const auto row = picture.begin() + static_cast<std::ptrdiff_t>(y) * width * channels;
     out.insert(out.end(), row + part.left * channels, row + (part.left + part.width) * channels);

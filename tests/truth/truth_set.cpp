@@ -426,7 +426,7 @@ TruthFrame load_truth_frame(const TruthSet& set, int frame) {
       throw Error(file.string() + ": is not " + std::to_string(out.width) + "x" +
                   std::to_string(out.height));
     }
-    return picture.radiance;
+    return render::Sheet<glm::vec3>(picture.radiance.begin(), picture.radiance.end());
   };
   out.real = read("real");
   out.mixed = read("mixed");

@@ -15,7 +15,7 @@ struct Worlds {
   truth::Scrambles mixed, real;
 };
 
-inline std::vector<glm::dvec3> widen(const std::vector<glm::vec3>& layer) {
+inline std::vector<glm::dvec3> widen(std::span<const glm::vec3> layer) {
   return {layer.begin(), layer.end()};
 }
 

@@ -20,14 +20,14 @@ std::filesystem::path file_of(const TruthSet& set, int frame, const char* what) 
   return set.directory / "truth" / (frame_name(frame) + "_" + what + ".exr");
 }
 
-std::vector<glm::vec3> read(const TruthSet& set, int frame, const char* what) {
+render::Sheet<glm::vec3> read(const TruthSet& set, int frame, const char* what) {
   const auto file = file_of(set, frame, what);
   std::vector<std::string> notes;
   const lighting::LinearPicture picture = lighting::read_exr_picture(file, notes);
   const PinholeIntrinsics& lens = set.observer.intrinsics;
   if (picture.width != lens.width || picture.height != lens.height)
     throw Error(file.string() + ": is not of the observer's size");
-  return picture.radiance;
+  return {picture.radiance.begin(), picture.radiance.end()};
 }
 
 double brightness(const glm::vec3& radiance) {
@@ -37,7 +37,7 @@ double brightness(const glm::vec3& radiance) {
 // The tags of a picture, each with a number from 1 on; 0 is no tag.
 class Labels {
  public:
-  Labels(const std::vector<glm::vec3>& paper, int width, int height)
+  Labels(std::span<const glm::vec3> paper, int width, int height)
       : width_(width), height_(height), labels_(paper.size()) {
     for (std::size_t i = 0; i < paper.size(); ++i)
       if (paper[i].x > 0.5f && labels_[i] == 0) fill(paper, i, ++count_);
@@ -67,7 +67,7 @@ class Labels {
   }
 
  private:
-  void fill(const std::vector<glm::vec3>& paper, std::size_t from, int label) {
+  void fill(std::span<const glm::vec3> paper, std::size_t from, int label) {
     std::vector<std::size_t> open{from};
     labels_[from] = label;
     while (!open.empty()) {
@@ -103,7 +103,7 @@ bool has_untagged(const TruthSet& set, int frame) {
 TruthFrame load_untagged_frame(const TruthSet& set, int frame) {
   TruthFrame truth = load_truth_frame(set, frame);
   truth.mixed = read(set, frame, "untagged_mixed");
-  const std::vector<glm::vec3> paper = read(set, frame, "paper_mask");
+  const auto paper = read(set, frame, "paper_mask");
   for (std::size_t i = 0; i < paper.size(); ++i)
     truth.mask[i] = std::max(truth.mask[i], paper[i].x);
   return truth;
@@ -121,10 +121,10 @@ std::vector<std::string> violations(const UntaggedMeasures& measures) {
 }
 
 UntaggedMeasures compare_untagged(const TruthSet& set, int frame,
-                                  const std::vector<glm::vec3>& composite) {
+                                  std::span<const glm::vec3> composite) {
   const TruthFrame tagged = load_truth_frame(set, frame);
-  const std::vector<glm::vec3> truth = read(set, frame, "untagged_mixed");
-  const std::vector<glm::vec3> paper = read(set, frame, "paper_mask");
+  const auto truth = read(set, frame, "untagged_mixed");
+  const auto paper = read(set, frame, "paper_mask");
   const Labels labels(paper, tagged.width, tagged.height);
   std::vector<Band> inside(std::size_t(labels.count()) + 1), outside = inside;
   UntaggedMeasures measures;

@@ -29,6 +29,6 @@ struct UntaggedMeasures {
 std::vector<std::string> violations(const UntaggedMeasures& measures);
 
 UntaggedMeasures compare_untagged(const TruthSet& set, int frame,
-                                  const std::vector<glm::vec3>& composite);
+                                  std::span<const glm::vec3> composite);
 
 }  // namespace previz::truth

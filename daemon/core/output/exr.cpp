@@ -30,11 +30,11 @@ namespace {
 // Layers of three channels and of one channel, with their names in the file.
 struct ColorLayer {
   std::array<const char*, 3> channels;
-  std::vector<glm::vec3> render::Layers::*values;
+  render::Sheet<glm::vec3> render::Layers::*values;
 };
 struct ScalarLayer {
   const char* channel;
-  std::vector<float> render::Layers::*values;
+  render::Sheet<float> render::Layers::*values;
 };
 
 constexpr std::array color_layers{
@@ -167,13 +167,15 @@ ExrMetadata exr_metadata(const render::Layers& layers, const Frame& frame,
 session::Draft exr_draft(const std::filesystem::path& path, const render::Layers& layers,
                          const ExrMetadata& metadata) {
   require_whole(path, layers);
-  render::Layers written = layers;
-  for (std::size_t i = 0; i < written.diff.size(); ++i) written.diff[i] *= 1.0f - written.mask[i];
-  Imf::FrameBuffer channels = frame_buffer(written, "");
-  std::vector<float> opaque(static_cast<std::size_t>(written.width), 1.0f);  // a row for all
+  render::Sheet<glm::vec3> diff = layers.diff;
+  for (std::size_t i = 0; i < diff.size(); ++i) diff[i] *= 1.0f - layers.mask[i];
+  Imf::FrameBuffer channels = frame_buffer(layers, "");
+  for (const auto& [name, channel] : {std::pair("diff.R", 0), {"diff.G", 1}, {"diff.B", 2}})
+    channels.insert(name, exr_slice(&diff[0][channel], 3, layers.width));
+  std::vector<float> opaque(static_cast<std::size_t>(layers.width), 1.0f);  // a row for all
   channels.insert("A",
                   Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(opaque.data()), sizeof(float), 0));
-  return exr_draft(path, header(written, metadata), channels);
+  return exr_draft(path, header(layers, metadata), channels);
 }
 
 void write_exr(const std::filesystem::path& path, const render::Layers& layers,

@@ -1,5 +1,6 @@
 #include "daemon/core/output/memory.hpp"
 
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -26,6 +27,12 @@ std::optional<std::uint64_t> free_memory_bytes() {
     if (std::sscanf(line.c_str(), "MemAvailable: %" SCNu64 " kB", &kib) == 1) return kib * 1024;
   }
   return std::nullopt;
+}
+
+std::uint64_t peak_memory_bytes() {
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);
+  return 1024 * static_cast<std::uint64_t>(usage.ru_maxrss);
 }
 
 std::uint64_t queue_bytes(std::optional<double> wished_mb, std::uint64_t memory) {

@@ -20,13 +20,13 @@ std::vector<Shot> NeighbourStage::operator()(Shot shot) {
   const std::uint64_t index = shot.index;
   // Where shots before this one are missing, some may have all their neighbours already.
   if (index > 0) show_up_to(index - 1, shown);
-  forget_before(waiting_.empty() ? index : waiting_.front().shot.index);
-  KeptShot kept;
+  forget_before(waiting_.empty() ? index : waiting_.front().index);
+  render::KeptFramePtr kept;
   if (!is_cancelled_) kept = keep(shot);
-  const bool is_rendered = kept.frame || !shot.untouched.empty();
+  const bool is_rendered = kept || !shot.untouched.empty();
   is_cancelled_ = is_cancelled_ || !is_rendered;
-  if (kept.frame) kept_.push_back({index, std::move(kept.frame)});
-  if (!shot.only_neighbour) waiting_.push_back({std::move(shot), std::move(kept.layers)});
+  if (kept) kept_.push_back({index, std::move(kept)});
+  if (!shot.only_neighbour) waiting_.push_back(std::move(shot));
   show_up_to(index, shown);
   return shown;
 }
@@ -42,19 +42,19 @@ std::vector<Shot> NeighbourStage::end(bool is_stopped) {
 // Shows those that wait for no shot after this one.
 void NeighbourStage::show_up_to(std::uint64_t last_rendered, std::vector<Shot>& shown) {
   while (!waiting_.empty() &&
-         (is_cancelled_ || last_rendered >= waiting_.front().shot.index + neighbours_)) {
-    Waiting next = std::move(waiting_.front());
+         (is_cancelled_ || last_rendered >= waiting_.front().index + neighbours_)) {
+    Shot next = std::move(waiting_.front());
     waiting_.pop_front();
     if (is_cancelled_)
-      next.shot.whole = false;
-    else if (next.shot.untouched.empty())
+      next.whole = false;
+    else if (next.untouched.empty())
       show(next);
-    shown.push_back(std::move(next.shot));
+    shown.push_back(std::move(next));
   }
 }
 
-void NeighbourStage::show(Waiting& waiting) {
-  const std::uint64_t index = waiting.shot.index;
+void NeighbourStage::show(Shot& shot) {
+  const std::uint64_t index = shot.index;
   const auto near = [&](std::uint64_t limit) {
     return std::ranges::lower_bound(kept_, limit, {}, &Kept::index);
   };
@@ -64,7 +64,7 @@ void NeighbourStage::show(Waiting& waiting) {
   for (const int place :
        render::order_of_neighbours(static_cast<int>(own - first), static_cast<int>(last - own) - 1))
     chain.push_back((own + place)->frame);
-  render_.show_among(waiting.shot, chain, std::move(waiting.layers));
+  render_.show_among(shot, chain);
 }
 
 // Lets go of what is no neighbour of the shot with this index, nor of a later one.
@@ -72,7 +72,7 @@ void NeighbourStage::forget_before(std::uint64_t index) {
   while (!kept_.empty() && kept_.front().index + neighbours_ < index) kept_.pop_front();
 }
 
-KeptShot NeighbourStage::keep(Shot& shot) {
+render::KeptFramePtr NeighbourStage::keep(Shot& shot) {
   try {
     return render_.keep(shot);
   } catch (const std::bad_alloc&) {

@@ -12,8 +12,7 @@
 namespace previz::pipeline {
 
 // A sliding window over the shots, of which each is rendered once: at most 2 * neighbours + 1 of
-// them are kept (Renderer::keep() says how large they are), and the layers of those that wait for
-// the neighbours after them. A shot's picture depends on the shots around it alone, those whose
+// them are kept (Renderer::keep() says how large they are). A shot's picture depends on the shots around it alone, those whose
 // index differs by no more than `neighbours`. One that passes through untouched, or that is
 // missing, is nobody's neighbour, and what is left keeps its order.
 class NeighbourStage {
@@ -35,21 +34,17 @@ class NeighbourStage {
     std::uint64_t index = 0;
     render::KeptFramePtr frame;
   };
-  struct Waiting {
-    Shot shot;
-    std::shared_ptr<render::Layers> layers;
-  };
 
-  KeptShot keep(Shot& shot);
+  render::KeptFramePtr keep(Shot& shot);
   void show_up_to(std::uint64_t last_rendered, std::vector<Shot>& shown);
-  void show(Waiting& waiting);
+  void show(Shot& shot);
   void forget_before(std::uint64_t index);
 
   RenderStage& render_;
   const std::uint64_t neighbours_;
   bool is_cancelled_ = false;
-  std::deque<Kept> kept_;        // increasing indices
-  std::deque<Waiting> waiting_;  // likewise; to be shown
+  std::deque<Kept> kept_;     // increasing indices
+  std::deque<Shot> waiting_;  // likewise; to be shown
 };
 
 }  // namespace previz::pipeline

@@ -14,25 +14,14 @@
 namespace previz::pipeline {
 namespace {
 
-// Returns the layers of a plate alone, with no virtual object in front and no geometry behind:
-// everything but the composite is 0.
-render::Layers plate_layers(const Plate& plate, double exposure,
-                            const lighting::Response& response) {
+// Fills the layers with a plate alone, with no virtual object in front and no geometry behind:
+// everything but the composite stays 0.
+render::Layers with_plate(render::Layers layers, const Plate& plate, double exposure,
+                          const lighting::Response& response) {
   const std::vector<double>& signal = response.inverse();
-  render::Layers layers;
-  layers.width = plate.width;
-  layers.height = plate.height;
-  const std::size_t pixels = std::size_t(plate.width) * std::size_t(plate.height);
-  for (auto* layer : {&layers.mixed, &layers.real, &layers.diff, &layers.normal, &layers.variance})
-    layer->resize(pixels);
-  layers.mask.resize(pixels);
-  layers.depth.resize(pixels);
-  layers.composite.reserve(pixels);
-  const auto radiance = [&](std::size_t sample) {
-    return static_cast<float>(signal[plate.samples[sample]] / exposure);
-  };
-  for (std::size_t i = 0; i < pixels; ++i)
-    layers.composite.emplace_back(radiance(3 * i), radiance(3 * i + 1), radiance(3 * i + 2));
+  for (std::size_t i = 0; i < plate.samples.size(); ++i)
+    layers.composite[i / 3][static_cast<glm::length_t>(i % 3)] =
+        static_cast<float>(signal[plate.samples[i]] / exposure);
   return layers;
 }
 
@@ -148,27 +137,23 @@ void RenderStage::take_sums(Shot& shot) {
   shot.whole = true;
 }
 
-KeptShot RenderStage::keep(Shot& shot) {
+render::KeptFramePtr RenderStage::keep(Shot& shot) {
   const auto start = std::chrono::steady_clock::now();
   if (!begin(shot, false) || !sample(shot)) return {};
-  KeptShot kept;
-  kept.frame = renderer_->keep();
-  if (options_.layers && !shot.only_neighbour)
-    kept.layers = std::make_shared<render::Layers>(renderer_->layers());
+  render::KeptFramePtr kept = renderer_->keep();
   shot.counters = renderer_->counters();
   shot.render_s = seconds_from(start);
   return kept;
 }
 
-void RenderStage::show_among(Shot& shot, const std::vector<render::KeptFramePtr>& chain,
-                             std::shared_ptr<render::Layers> layers) {
+void RenderStage::show_among(Shot& shot, const std::vector<render::KeptFramePtr>& chain) {
   const auto start = std::chrono::steady_clock::now();
-  if (layers) error_ = render::estimate_error(*layers).picture;
+  const auto layers = options_.layers ? std::make_shared<render::Layers>() : nullptr;
   stands_elsewhere_ = true;
   shot.picture = std::make_shared<const Plate>(
       renderer_->show_among(chain, set_.quality.denoise, layers.get()));
   if (layers) shot.counters.below_zero = render::below_zero(*layers);
-  shot.layers = std::move(layers);
+  shot.layers = layers;
   shot.whole = true;
   shot.render_s += seconds_from(start);
 }
@@ -314,8 +299,8 @@ PlatePtr RenderStage::sized(Shot& shot) const {
 
 void RenderStage::pass_through(Shot& shot, PlatePtr plate, std::string reason) const {
   if (options_.layers)
-    shot.layers =
-        std::make_shared<const render::Layers>(plate_layers(*plate, exposure_of(shot), *response_));
+    shot.layers = std::make_shared<const render::Layers>(with_plate(
+        renderer_->no_layers(plate->width, plate->height), *plate, exposure_of(shot), *response_));
   shot.untouched = std::move(reason);
   shot.picture = std::move(plate);
   shot.whole = true;

@@ -50,12 +50,6 @@ struct RenderStageOptions {
   std::function<std::optional<render::SampleSums>(const Shot&)> sums = {};
 };
 
-// A rendered shot as it is kept to be shown together with its neighbours.
-struct KeptShot {
-  render::KeptFramePtr frame;              // null: untouched or cancelled
-  std::shared_ptr<render::Layers> layers;  // of the shot's samples; null: none are wanted
-};
-
 // A shot that is being rendered.
 struct ShotUnderWay {
   Shot shot;
@@ -87,13 +81,11 @@ class RenderStage {
 
   // keep() and show_among() do the same in two parts, for shots of a take that are averaged with
   // their neighbours. keep() is begin() and the samples; a shot that it finishes (it is untouched)
-  // or that was cancelled (it is not whole) has no frame. show_among() makes the shot's picture
-  // from the chain of kept frames (Renderer::show_among), the last of which is its own, and the
-  // layers that were kept with that. Their composite, mask and variance become those of the
-  // picture.
-  KeptShot keep(Shot& shot);
-  void show_among(Shot& shot, const std::vector<render::KeptFramePtr>& chain,
-                  std::shared_ptr<render::Layers> layers);
+  // or that was cancelled (it is not whole) has no frame: null. show_among() makes the shot's
+  // picture, and its layers, from the chain of kept frames (Renderer::show_among), the last of which
+  // is its own.
+  render::KeptFramePtr keep(Shot& shot);
+  void show_among(Shot& shot, const std::vector<render::KeptFramePtr>& chain);
 
   // begin(), add_samples() and finish() do the same in parts, for a frame that gets samples until
   // somebody interrupts (P7). begin() returns false if the plate passes through untouched; the shot

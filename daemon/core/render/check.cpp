@@ -10,6 +10,7 @@
 #include "daemon/core/render/device/graphics_cards.hpp"
 #include "daemon/core/render/passes/photon_schedule.hpp"
 #include "daemon/core/render/picture/picture_memory.hpp"
+#include "daemon/core/render/picture/sample_sums.hpp"
 #include "daemon/core/render/world/feature.hpp"
 #include "daemon/core/set/check.hpp"
 #include "shaders/lib/render_shared.h"
@@ -44,15 +45,19 @@ void print_picture_memory(const set::Quality& quality, const PinholeIntrinsics& 
   std::uint64_t bytes = picture_bytes(intrinsics.width, intrinsics.height, false);
   if (averaged_live || averaged_offline)
     bytes += history_bytes(intrinsics.width, intrinsics.height);
-  out << words("  picture in the GPU's memory: about ",
-               std::ceil(static_cast<double>(bytes) / mebibyte), " MiB\n");
-  if (averaged_offline)
-    out << words("  frames that are averaged offline in the computer's memory: about ",
-                 std::ceil(static_cast<double>(kept_bytes(
-                               intrinsics.width, intrinsics.height,
-                               {quality.neighbours, std::numeric_limits<std::uint64_t>::max()})) /
-                           mebibyte),
-                 " MiB\n");
+  const auto mebibytes = [](std::uint64_t count) {
+    return std::ceil(static_cast<double>(count) / mebibyte);
+  };
+  out << words("  picture in the GPU's memory: about ", mebibytes(bytes), " MiB\n");
+  const TakeMemory offline = take_memory({.width = intrinsics.width,
+                                          .height = intrinsics.height,
+                                          .each_side = averaged_offline ? quality.neighbours : 0,
+                                          .take_frames = std::numeric_limits<std::uint64_t>::max(),
+                                          .parts = part_count(quality.samples)},
+                                         {});
+  out << words("  offline, in the computer's memory: about ", mebibytes(offline.whole()),
+               " MiB, or ", mebibytes(offline.rest), " MiB and scratch files of ",
+               mebibytes(offline.banded), " MiB\n");
 }
 
 void print_costs(const set::Set& set, std::uint32_t needed, const scene::Size& size,

@@ -417,7 +417,7 @@ Layers Renderer::layers() const {
   Impl& r = *impl_;
   const PinholeIntrinsics& lens = r.calibration.intrinsics;
   const PlateRadiance plate = r.plate_radiance();
-  Layers layers = make_layers(lens.width, lens.height, r.sampled());
+  Layers layers = make_layers(lens.width, lens.height, r.sampled(), r.device->scratch());
   layers.white = 1 / r.frame.exposure;
   for (const Wavefront::Sums& tile : r.wavefront->sums()) {
     const std::size_t first = static_cast<std::size_t>(tile.first_row) * lens.width;
@@ -427,6 +427,10 @@ Layers Renderer::layers() const {
     });
   }
   return layers;
+}
+
+Layers Renderer::no_layers(int width, int height) const {
+  return make_layers(width, height, 0, impl_->device->scratch());
 }
 
 const Plate& Renderer::plate() const {
@@ -513,6 +517,7 @@ Plate Renderer::show_among(const std::vector<KeptFramePtr>& frames, bool denoise
   r.history->start_over();
   if (frames.size() == 1) {
     r.put_back(*frames.front());
+    if (layers) *layers = this->layers();
     return show(denoise, layers);
   }
   const auto add = [&](const KeptFrame& kept) {
@@ -530,6 +535,7 @@ Plate Renderer::show_among(const std::vector<KeptFramePtr>& frames, bool denoise
     r.presenter->add_to_history(what, *r.denoiser);
   }
   const ToPresent what = add(*frames.back());
+  if (layers) *layers = this->layers();
   const bool fills = denoise && layers;
   const PlateRadiance plate = fills ? r.plate_radiance() : PlateRadiance{};
   Plate picture = r.presenter->present(what, *r.denoiser, [&](const Denoiser::Band& band) {

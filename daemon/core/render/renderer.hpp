@@ -115,6 +115,8 @@ class Renderer {
   void separate_parts();
   // Returns the layers of the samples so far.
   Layers layers() const;
+  // Returns layers of this size that are all 0, where those of a frame would lie.
+  Layers no_layers(int width, int height) const;
   // Returns the current frame's plate at the size of its layers; valid until the next begin().
   const Plate& plate() const;
   // Returns the composite of the samples so far through exposure and response, as the display shows
@@ -147,8 +149,8 @@ class Renderer {
   // need seeds of their own, and should not be begun with FrameInput::accumulates, whose random
   // numbers depend on the frames before.
   //
-  // With `denoise`, `layers` may be those of the last frame's samples; composite, variance and mask
-  // in them then become those of the picture.
+  // `layers`, if it is not null, becomes that of the last frame's samples; with `denoise`,
+  // composite, variance and mask in it are those of the picture.
   //
   // It ends what was accumulated, and the current frame: the next call is begin(). Instances,
   // lamps, sources and shapes are left as in the last frame; the environment stays as it was set.

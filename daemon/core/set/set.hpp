@@ -238,10 +238,11 @@ struct Quality {
   bool denoise = true;     // denoises the composite, guided by its own variance
   bool accumulate = true;  // live: averages with the frames before, where they show the same
   int neighbours = 2;      // offline, denoised: averages with so many frames on each side, 0..4
-  double error = 0;        // refines to this rms error over the picture's rms; 0: samples decide
-  double seconds = 0;      // time limit of a frame; 0: samples decide
-  double scale = 1.0;      // times the observer's resolution, preview only
-  double fps = 0;          // preview: kept by fewer samples, then pixels; 0: the others decide
+  std::optional<double> memory_mb;  // that a render may take; absent: by free memory
+  double error = 0;    // refines to this rms error over the picture's rms; 0: samples decide
+  double seconds = 0;  // time limit of a frame; 0: samples decide
+  double scale = 1.0;  // times the observer's resolution, preview only
+  double fps = 0;      // preview: kept by fewer samples, then pixels; 0: the others decide
   std::vector<PreviewStep> steps;  // how fps is held, best first; empty: scale, then ever smaller
   bool cpu_instead = false;        // live: the CPU draws while the GPU that was there is gone
   bool hardware_rays = true;       // traced by a graphics card's own units, where it has such

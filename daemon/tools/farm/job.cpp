@@ -98,6 +98,7 @@ void visit_render(Visitor visit, Options& render) {
   visit("adaptive", render.adaptive);
   visit("denoise", render.denoise);
   visit("neighbours", render.neighbours, 0, 4);
+  visit("memory", render.memory);
   visit("seconds", render.seconds, 0, 86'400);
   visit("seed", render.seed);
   visit("estimator", render.estimator);

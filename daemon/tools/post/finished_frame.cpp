@@ -66,6 +66,7 @@ std::string to_json(const FinishedFrame& frame) {
   if (!frame.reason.empty()) json["reason"] = frame.reason;
   json["samples"] = frame.samples;
   json["render_s"] = frame.render_s;
+  if (frame.peak_memory_bytes > 0) json["peak_memory_bytes"] = frame.peak_memory_bytes;
   if (frame.error > 0) json["error"] = frame.error;
   if (frame.pose) {
     json["world_from_camera"] = rows(frame.pose->world_from_camera);
@@ -108,6 +109,7 @@ FinishedFrame from_json(const std::string& line) {
   frame.reason = json.value("reason", "");
   frame.samples = number_at<std::int64_t>(json, "samples");
   frame.render_s = number_at<double>(json, "render_s");
+  frame.peak_memory_bytes = number_or(json, "peak_memory_bytes", std::uint64_t{0});
   frame.error = number_or(json, "error", 0.0);
   if (json.contains("world_from_camera")) {
     frame.pose.emplace();

@@ -47,6 +47,8 @@ struct FinishedFrame {
   std::string reason;  // untouched: why the plate passed through as it is
   std::int64_t samples = 0;
   double render_s = 0;
+  // The most that the process had in memory until then; 0 in a line of a previzd that wrote none.
+  std::uint64_t peak_memory_bytes = 0;
   double error = 0;  // estimated if quality.error or .seconds is set
   std::optional<tracking::Pose> pose;
   std::vector<std::uint64_t> light_frames;  // sequence numbers; empty: not from the light camera

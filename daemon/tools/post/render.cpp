@@ -1,16 +1,20 @@
 #include "daemon/tools/post/render.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <iterator>
 #include <ostream>
 #include <set>
 #include <utility>
 
 #include "daemon/core/check/light_judgement.hpp"
+#include "daemon/core/output/memory.hpp"
 #include "daemon/core/output/progress.hpp"
 #include "daemon/core/output/recorder.hpp"
 #include "daemon/core/pipeline/neighbour_stage.hpp"
@@ -58,6 +62,10 @@ std::string percent_words(double share) {
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "%.2g %%", 100 * share);
   return text.data();
+}
+
+std::string gigabytes(std::uint64_t bytes) {
+  return fmt::format("{:.2g}GB", static_cast<double>(bytes) / 1e9);
 }
 
 std::string done_text(const Shot& shot) {
@@ -240,24 +248,50 @@ std::set<std::uint64_t> render_frames(const Job& job, const std::set<std::uint64
   return frames.left();
 }
 
-// Throws previz::Error if the memory that the neighbours take is not there, or that the parts of
-// the samples' sums do.
-void check_memory(const RenderOptions& options, const pipeline::Take& take,
-                  const render::Device& device) {
-  const int neighbours = neighbours_of(take.set.quality);
-  const int parts = pipeline::has_fixed_samples(take.set.quality)
-                        ? render::part_count(take.set.quality.samples)
-                        : 1;
-  if (neighbours == 0 && parts == 1) return;
+render::TakeOfPictures pictures_of(const RenderOptions& options, const pipeline::Take& take) {
+  const set::Quality& quality = take.set.quality;
   const PinholeIntrinsics picture = pipeline::scaled(take.observer, options.scale).intrinsics;
+  return {.width = picture.width,
+          .height = picture.height,
+          .each_side = neighbours_of(quality),
+          .take_frames = take.observer_stream->records().size(),
+          .parts = pipeline::has_fixed_samples(quality) ? render::part_count(quality.samples) : 1};
+}
+
+std::filesystem::path scratch_folder(const RenderOptions& options) {
+  if (!options.scratch.empty()) return options.scratch;
+  const char* const own = std::getenv("TMPDIR");
+  return own && *own != 0 ? own : "/var/tmp";
+}
+
+// Lets the device work in scratch files where the pictures need more memory than they may take.
+// Throws previz::Error if that does not suffice, or the files cannot be there.
+void keep_to_memory(const RenderOptions& options, const pipeline::Take& take,
+                    render::Device& device, std::ostream& out) {
+  const render::TakeOfPictures pictures = pictures_of(options, take);
+  const render::PictureMemory memory = render::memory_of(device);
   const std::uint64_t free_bytes =
       options.free_memory ? *options.free_memory
                           : output::free_memory_bytes().value_or(output::memory_bytes());
-  render::refuse_too_many_parts(picture.width, picture.height, parts, free_bytes);
-  if (neighbours == 0) return;
-  render::refuse_too_many_neighbours(picture.width, picture.height,
-                                     {neighbours, take.observer_stream->records().size()},
-                                     render::memory_of(device), free_bytes);
+  std::optional<std::uint64_t> asked = options.memory;
+  if (!asked && take.set.quality.memory_mb)
+    asked = static_cast<std::uint64_t>(1e6 * *take.set.quality.memory_mb);
+  const render::MemoryPlan plan = render::plan_memory(pictures, memory, asked, free_bytes);
+  if (plan.in_scratch) {
+    const std::filesystem::path folder = scratch_folder(options);
+    const std::uint64_t needed = render::take_memory(pictures, memory).banded;
+    const auto scratch = std::make_shared<render::Scratch>(folder, plan.resident);
+    if (const std::uint64_t room = render::Scratch::room(folder); needed > room)
+      throw Error(folder.string() + ": the scratch files of these pictures take " +
+                  gigabytes(needed) + ", and there is room for " + gigabytes(room) +
+                  "; name another folder (--scratch), allow more memory (--memory " +
+                  gigabytes(render::take_memory(pictures, memory).whole()) +
+                  ") or make the pictures smaller (--scale)");
+    render::use_scratch(device, scratch);
+    out << take.session.info.name << ": works in scratch files of up to " << gigabytes(needed)
+        << " in " << folder.string() << std::endl;
+  }
+  render::refuse_too_large(pictures, render::memory_of(device));
 }
 
 // Returns how many frames are rendered only as neighbours of others.
@@ -291,7 +325,7 @@ void render_all(const RenderOptions& options, const pipeline::Take& take,
       options.open_device ? options.open_device
                           : render::open_device(render::options_for(
                                 options.device, take.set.quality.hardware_rays));
-  check_memory(options, take, *device);
+  keep_to_memory(options, take, *device, out);
   if (!options.set_file)
     out << take.session.info.name << ": uses the set recorded with it; --set FILE uses another"
         << std::endl;

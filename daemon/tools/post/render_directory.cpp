@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "daemon/core/output/exr.hpp"
+#include "daemon/core/output/memory.hpp"
 #include "daemon/core/output/png.hpp"
 #include "daemon/core/output/sums_exr.hpp"
 #include "daemon/core/output/video.hpp"
@@ -262,6 +263,7 @@ void RenderDirectory::write(const pipeline::Shot& shot, const set::Set& set,
   write_files(shot, set);
   FinishedFrame record = finished_frame(shot);
   record.made_on = made_on;
+  record.peak_memory_bytes = output::peak_memory_bytes();
   for (const char* extension : extensions(record.status)) {
     const std::filesystem::path written = file(shot.index, extension);
     record.files[written.filename().string()] = mark_of(written);

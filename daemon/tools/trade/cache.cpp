@@ -170,7 +170,7 @@ std::string reference_bytes(const std::string& key, const KeptReference& referen
 }
 
 template <class Value>
-void take(std::string_view& bytes, std::vector<Value>& values, std::size_t count) {
+void take(std::string_view& bytes, render::Sheet<Value>& values, std::size_t count) {
   if (bytes.size() < count * sizeof(Value)) throw Error("it ends early");
   values.resize(count);
   std::memcpy(static_cast<void*>(values.data()), bytes.data(), count * sizeof(Value));

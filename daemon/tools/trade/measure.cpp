@@ -91,13 +91,15 @@ CommonDifference common_difference(std::span<const TradePicture> alike,
 
 }  // namespace
 
-TradePicture trade_picture(const render::Layers& layers, const std::vector<double>& camera,
+TradePicture trade_picture(const render::Layers& layers, const render::PlateRadiance& camera,
                            double white) {
-  TradePicture picture{layers.width, layers.height, {}, {}, layers.mask};
+  TradePicture picture{
+      layers.width, layers.height, {}, {}, {layers.mask.begin(), layers.mask.end()}};
   picture.shown.reserve(layers.composite.size());
   picture.added.reserve(layers.composite.size());
   for (std::size_t i = 0; i < layers.composite.size(); ++i) {
-    const glm::dvec3 seen(camera[3 * i], camera[3 * i + 1], camera[3 * i + 2]);
+    const glm::dvec3 seen(camera.channel(i, 0).radiance, camera.channel(i, 1).radiance,
+                          camera.channel(i, 2).radiance);
     const glm::dvec3 shown = glm::clamp(glm::dvec3(layers.composite[i]), 0.0, white);
     picture.shown.emplace_back(shown);
     // An untouched pixel adds exactly nothing, whatever rounding did to the camera's value.

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/core/render/picture/composite.hpp"
 #include "daemon/core/render/picture/layers.hpp"
 
 namespace previz::trade {
@@ -22,9 +23,9 @@ struct TradePicture {
   std::vector<float> mask;       // mean(M)
 };
 
-// Makes a TradePicture of layers. `camera` is the plate's radiance, interleaved RGB; `white` is the
+// Makes a TradePicture of layers. `camera` is the plate's radiance; `white` is the
 // radiance at which the sensor clips.
-TradePicture trade_picture(const render::Layers& layers, const std::vector<double>& camera,
+TradePicture trade_picture(const render::Layers& layers, const render::PlateRadiance& camera,
                            double white);
 
 // Relative errors: the rms of the error over the rms of the quantity itself, over pixels and

@@ -29,7 +29,7 @@ MethodRenderer::MethodRenderer(const std::shared_ptr<render::Device>& device,
       denoise_(settings.denoise),
       plate_(frame.plate(sweep_scale * settings.scale)),
       whole_(frame.plate(sweep_scale)),
-      camera_(render::plate_radiance(*whole_, frame.response(), exposure_).value),
+      camera_(render::plate_radiance(*whole_, frame.response(), exposure_)),
       renderer_(device, settings.estimation,
                 method_calibration(frame, settings, sweep_scale * settings.scale)) {
   for (const double signal : frame.response().inverse())

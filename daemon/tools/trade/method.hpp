@@ -45,9 +45,9 @@ class MethodRenderer {
   const double exposure_;
   const glm::dmat4 world_from_camera_;
   const bool adaptive_, denoise_;
-  const PlatePtr plate_, whole_;      // at the size of the rendering, and of the sweep
-  const std::vector<double> camera_;  // the whole plate's radiance, interleaved RGB
-  std::vector<float> radiance_of_;    // samples
+  const PlatePtr plate_, whole_;        // at the size of the rendering, and of the sweep
+  const render::PlateRadiance camera_;  // of the whole plate
+  std::vector<float> radiance_of_;      // samples
   render::Renderer renderer_;
   render::Layers layers_;
 };

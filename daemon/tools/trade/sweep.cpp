@@ -164,8 +164,7 @@ void Sweep::worked(const std::string& step, double work) {
 
 TradePicture Sweep::picture_of(const render::Layers& layers) const {
   const PlatePtr plate = frame_.plate(options_.scale);
-  return trade_picture(layers,
-                       render::plate_radiance(*plate, frame_.response(), frame_.exposure()).value,
+  return trade_picture(layers, render::plate_radiance(*plate, frame_.response(), frame_.exposure()),
                        1 / frame_.exposure());
 }
 

@@ -43,7 +43,9 @@ class RenderNeighbours : public testing::Test {
       for (const auto& [file, mark] : frame.files) sums[file] = mark.sha256;
     return sums;
   }
-  std::string content_of(const char* file) const { return session::content_of(directory_ / file); }
+  std::string content_of(const std::string& file) const {
+    return session::content_of(directory_ / file);
+  }
 
   test::TemporaryDirectory directory_;
   std::string out_;  // of the first run
@@ -143,15 +145,13 @@ TEST_F(RenderNeighbours, WithoutNeighboursAFrameStandsAlone) {
 // Otherwise a long render would end in the middle, for want of memory.
 TEST_F(RenderNeighbours, WhatDoesNotFitIntoMemoryIsRefusedBeforeAnyFrameIsRendered) {
   RenderOptions options;
-  options.free_memory = 1'500'000;  // 48x36 pixels with two on each side take 3.5 MB
+  options.memory = 300'000'000;
   EXPECT_THAT(test::error_of([&] { render("out", options); }),
-              HasSubstr("quality.neighbours = 2: to average 5 frames of 48x36"));
+              HasSubstr("pictures of 48x36 take at least 0.403 GB"));
   EXPECT_EQ(content_of("out/frames.jsonl"), "");
-  options.neighbours = 0;
-  EXPECT_EQ(render("alone", options).frames.size(), std::size_t{small_take_frames});
-  options.neighbours = 2;
-  options.free_memory = 5'000'000;
-  EXPECT_EQ(render("out", options).frames.size(), std::size_t{small_take_frames});
+  options.memory.reset();
+  options.free_memory = 300'000'000;
+  EXPECT_THAT(test::error_of([&] { render("out", options); }), HasSubstr("0.27 GB are free"));
 }
 
 TEST_F(RenderNeighbours, TheSetMayAskForUpToFour) {

@@ -62,7 +62,8 @@ TEST(SampleRangeCheck, SaysWhyAFrameCannotBeDivided) {
 }
 
 output::RangeSums extreme_sums(bool has_photons) {
-  output::RangeSums sums{70'000, {2, 4}, {3, 2, 64, {std::vector<gpu::GpuPixel>(6), {}}}};
+  output::RangeSums sums{70'000, {2, 4}, {3, 2, 64, {}}};
+  sums.sums.sums.pixels.resize(6);
   if (has_photons) sums.sums.sums.caustics.resize(6);
   const float values[] = {0, -0.0f, 1e-45f, 1e30f, -1e-38f, 1.0f / 3};
   std::size_t next = 0;
@@ -103,7 +104,8 @@ TEST(SumsExr, ComesBackWithTheSameBits) {
 TEST(SumsExr, IsRefusedWhereItCannotHoldItsPixels) {
   const test::TemporaryDirectory directory;
   const std::filesystem::path file = directory / "0.sums.exr";
-  output::RangeSums black{0, {1, 2}, {400, 300, 64, {std::vector<gpu::GpuPixel>(400 * 300), {}}}};
+  output::RangeSums black{0, {1, 2}, {400, 300, 64, {}}};
+  black.sums.sums.pixels.resize(400 * 300);
   output::write_sums_exr(file, black);
   EXPECT_EQ(output::read_sums_exr(file).sums.width, 400);
   output::write_sums_exr(file, extreme_sums(false));

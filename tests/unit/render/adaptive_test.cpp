@@ -21,7 +21,11 @@ double rms_difference(const render::Layers& a, const render::Layers& b) {
 }
 
 set::Quality quality(int samples, double error, double seconds = 0) {
-  return {.samples = samples, .error = error, .seconds = seconds, .steps = {}};
+  set::Quality result;
+  result.samples = samples;
+  result.error = error;
+  result.seconds = seconds;
+  return result;
 }
 
 double sum_of(const render::Layers& layers) {

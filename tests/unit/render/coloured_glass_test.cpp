@@ -33,7 +33,7 @@ View slab(const scene::Material& material) {
 // that much of the way is not counted; the strongest channel takes 3.2 / m.
 constexpr double one_way = 5.5e-7 + 3.2 * 4e-6;
 
-void expect_all(const std::vector<glm::vec3>& layer, const glm::dvec3& expected, double share) {
+void expect_all(std::span<const glm::vec3> layer, const glm::dvec3& expected, double share) {
   for (const glm::vec3& pixel : layer)
     for (int c = 0; c < 3; ++c) ASSERT_NEAR(pixel[c], expected[c], share * expected[c]) << c;
 }

@@ -23,9 +23,10 @@ TEST(Composite, OfCodesThatNoCameraHasTakesTheLast) {
   Plate plate = random_plate(1, 1, 8);
   plate.samples = {255, 256, 65535};
   const render::PlateRadiance radiance = render::plate_radiance(plate, response, 1);
-  EXPECT_EQ(radiance.value[1], radiance.value[0]);
-  EXPECT_EQ(radiance.value[2], radiance.value[0]);
-  EXPECT_EQ(radiance.clipped[2], radiance.clipped[0]);
+  for (const int channel : {1, 2}) {
+    EXPECT_EQ(radiance.channel(0, channel).radiance, radiance.channel(0, 0).radiance);
+    EXPECT_EQ(radiance.channel(0, channel).clipped, radiance.channel(0, 0).clipped);
+  }
 }
 
 TEST(Composite, WithoutAVirtualObjectThePlateComesBackBitForBit) {
@@ -61,9 +62,10 @@ TEST(Composite, SamplesDoNotDependOnHowTheyAreAskedFor) {
   EXPECT_EQ(whole.variance, parts.variance);
 }
 
-// A plate of one pixel.
-render::PlateRadiance seen_as(double radiance, double error = 0, std::size_t pixels = 1) {
-  return {std::vector<double>(3 * pixels, radiance), std::vector<double>(3 * pixels, error), {}};
+// A plate of one code.
+render::PlateRadiance seen_as(double radiance, double error = 0) {
+  static const std::vector<std::uint16_t> codes(3 * 1000);
+  return {{{radiance, error, 0}}, codes};
 }
 
 // A virtual object of radiance 0.5 covers the white half of a black-and-white pixel: the composite
@@ -128,7 +130,7 @@ TEST(Composite, IsNeverBelowZeroAndSaysWhereItWouldBe) {
     pixel->square_high.w = 1;
   }
   const std::vector<gpu::GpuPixel> pixels{lit, in_shadow, lit, in_shadow};
-  const render::Layers layers = layers_of(pixels, 1, seen_as(0.2, 0, pixels.size()));
+  const render::Layers layers = layers_of(pixels, 1, seen_as(0.2));
   EXPECT_EQ(render::below_zero(layers), 2u);
 }
 

@@ -362,10 +362,10 @@ TEST(Deforming, TheDifferenceFollows) {
     return renderer.rendered(1).mask;
   };
   const scene::Deformation& limb = view.scene.deformations[0];
-  const std::vector<float> upright = covered(bent_limb(limb, 0));
+  const auto upright = covered(bent_limb(limb, 0));
   scene::Shape away = bent_limb(limb, 0);
   for (glm::dmat4& joint : away.joints) joint = at({0, 3, 0}) * joint;  // behind the wall
-  const std::vector<float> gone = covered(away);
+  const auto gone = covered(away);
   EXPECT_GT(std::ranges::count(upright, 1.0f), std::ranges::count(gone, 1.0f) + 20);
   EXPECT_EQ(covered(bent_limb(limb, 0)), upright);
 }

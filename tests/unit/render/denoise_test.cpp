@@ -40,9 +40,15 @@ render::Layers denoised(render::Layers layers, const render::PlateRadiance& came
   return layers;
 }
 
-render::PlateRadiance plate_of(const std::vector<double>& radiance) {
-  return {radiance, std::vector<double>(radiance.size()), {}};
-}
+// A plate every sample of which has a code of its own.
+struct PlateOf : render::PlateRadiance {
+  explicit PlateOf(const std::vector<double>& radiance) : own(radiance.size()) {
+    std::iota(own.begin(), own.end(), std::uint16_t{0});
+    codes = own;
+    for (const double value : radiance) of_code.push_back({value, 0, 0});
+  }
+  std::vector<std::uint16_t> own;
+};
 
 struct Spread {
   double mean = 0, variance = 0, foretold = 0;
@@ -295,7 +301,7 @@ TEST_P(DenoiseRules, KeepThePlatesTexture) {
   }
   render::Layers clean = raw;
   render::Denoiser denoiser(*shared_device());
-  denoise(denoiser, clean, plate_of(camera), {GetParam(), 0});
+  denoise(denoiser, clean, PlateOf(camera), {GetParam(), 0});
   double square = 0;
   for (const auto& [x, y, i] : all_pixels) {
     const float plate = camera_at(x, y);
@@ -326,7 +332,7 @@ TEST(Denoise, LeavesARealSurfaceBesideAVirtualOneBitForBit) {
     raw.diff[i] = glm::vec3(0);
     raw.variance[i] = glm::vec3(0);
   }
-  const render::Layers clean = denoised(raw, plate_of(camera));
+  const render::Layers clean = denoised(raw, PlateOf(camera));
   for (const auto& [x, y, i] : all_pixels) {
     if (x < width / 3) continue;
     EXPECT_EQ(clean.composite[i], raw.composite[i]) << x << ", " << y;
@@ -350,7 +356,7 @@ TEST(Denoise, MixesAnEdgeOfItsSidesByItsOwnShare) {
     raw.diff[i] = glm::vec3(behind) + (x > edge ? noise(x, y) : glm::vec3(0));
   }
   const std::vector<double> camera(3 * raw.composite.size(), 0.5);
-  const render::Layers clean = denoised(raw, plate_of(camera));
+  const render::Layers clean = denoised(raw, PlateOf(camera));
   double before = 0, after = 0, bias = 0;
   for (int y = 0; y < height; ++y) {
     const auto i = static_cast<std::size_t>(y) * width + edge;
@@ -392,7 +398,7 @@ TEST(Denoise, LeavesAContactShadowWhereItIs) {
       raw.variance[i] = glm::vec3((n * shadow * shadow / samples - mean * mean) / (samples - 1));
     }
     const std::vector<double> camera(3 * raw.composite.size(), 0.5);
-    const render::Layers clean = denoised(raw, plate_of(camera));
+    const render::Layers clean = denoised(raw, PlateOf(camera));
     for (const auto& [x, y, i] : all_pixels) {
       if (x < foot + 4) continue;
       drawn += raw.diff[i].r;
@@ -413,7 +419,7 @@ TEST(Denoise, LeavesTheRimOfAnEdge) {
     raw.diff[i] = glm::vec3(0);
   }
   const render::Layers clean =
-      denoised(raw, plate_of(std::vector<double>(3 * raw.composite.size(), 0.5)));
+      denoised(raw, PlateOf(std::vector<double>(3 * raw.composite.size(), 0.5)));
   for (int y = 0; y < height; ++y) {
     const auto i = static_cast<std::size_t>(y) * width + edge;
     // Noise explains 5 * 1e-6 of 5 * 0.3^2, which is how far it moves by 0.3.

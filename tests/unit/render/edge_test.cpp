@@ -24,7 +24,7 @@ Picture converge(const View& view, const Plate& plate, set::Estimator estimator,
         {std::make_shared<const Plate>(plate), 1 / white, view.world_from_camera, seed + i});
     renderer.render(32);
     expect_clean(renderer.counters());
-    const std::vector<glm::vec3> layer = pick(renderer.layers());
+    const auto layer = pick(renderer.layers());
     for (std::size_t p = 0; p < layer.size(); ++p) values[p].emplace_back(layer[p]);
   }
   for (const std::vector<glm::dvec3>& of_pixel : values) {

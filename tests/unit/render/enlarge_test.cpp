@@ -115,7 +115,7 @@ TEST_P(Enlarged, IsThatOfTheLayersInDoublePrecision) {
   const auto signal_of = [&](std::uint16_t sample) {
     return static_cast<float>(response_.inverse()[sample]);
   };
-  const std::vector<glm::vec3> expected =
+  const auto expected =
       render::enlarged(render::additions_of(layers, renderer_.plate(), signal_of, 0.5),
                        renderer_.plate(), whole_, signal_of);
   const Plate shown = renderer_.show(false);

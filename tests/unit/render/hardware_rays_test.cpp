@@ -53,7 +53,7 @@ class HardwareRays : public testing::Test {
 
 // The random numbers of a path are the same. It goes another way only where rounding decides what
 // it meets, at the edges of triangles, which few do.
-void expect_same(const std::vector<glm::vec3>& found, const std::vector<glm::vec3>& expected) {
+void expect_same(std::span<const glm::vec3> found, std::span<const glm::vec3> expected) {
   ASSERT_EQ(found.size(), expected.size());
   const glm::dvec3 average = mean(expected);
   std::size_t other = 0;

@@ -102,7 +102,7 @@ TEST(HiddenTags, AreHiddenByAButtonWithoutATreeOrAPipeline) {
   const std::uint32_t needed = renderer.needed();
   const std::uint64_t trees = renderer.counters().built_trees;
   renderer.move(stage.hidden, stage.view.scene.lights);
-  const std::vector<glm::vec3> hidden = renderer.rendered_clean(4).mixed;
+  const auto hidden = renderer.rendered_clean(4).mixed;
   EXPECT_EQ(renderer.needed(), needed);
   EXPECT_EQ(renderer.counters().built_trees, trees);
   View as_made = stage.view;

@@ -15,7 +15,7 @@ View square(const Material& material) {
   return view;
 }
 
-std::vector<glm::vec3> picture(const View& view) {
+render::Sheet<glm::vec3> picture(const View& view) {
   return render_clean(view, 4, up_to_depth(2)).layers.mixed;
 }
 

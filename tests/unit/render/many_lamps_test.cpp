@@ -69,7 +69,7 @@ struct Noise {
   double accuracy = 0;         // relative standard error of the deviation
 };
 
-using Layer = std::vector<glm::vec3> render::Layers::*;
+using Layer = render::Sheet<glm::vec3> render::Layers::*;
 
 // Statistics of single samples, over the pixels, which see one point, and over seeds. The error of
 // the mean is that of independent pixels, an over-estimate.
@@ -376,10 +376,10 @@ TEST(ManyLamps, AreSeenAsEachByItself) {
       view.scene.lights.push_back(lamps[i]);
     return render_clean(view, 4, up_to_depth(0)).layers.mixed;
   };
-  const std::vector<glm::vec3> all = seen(0, lamps.size());
+  const auto all = seen(0, lamps.size());
   std::vector<glm::vec3> sum(all.size(), glm::vec3(0));
   for (std::size_t first = 0; first < lamps.size(); first += 4) {
-    const std::vector<glm::vec3> four = seen(first, 4);
+    const auto four = seen(first, 4);
     for (std::size_t i = 0; i < sum.size(); ++i) sum[i] += four[i];
   }
   double brightest = 0;

@@ -128,7 +128,7 @@ TEST_P(FrameAmongNeighbours, IsBetterDenoisedThanAlone) {
 }
 
 // Returns whether the 5x5 pixels around show the same world at all of their samples.
-bool is_far_from_outlines(const std::vector<float>& mask, int x, int y) {
+bool is_far_from_outlines(std::span<const float> mask, int x, int y) {
   for (int v = y - 2; v <= y + 2; ++v)
     for (int u = x - 2; u <= x + 2; ++u)
       if (const float there = mask[static_cast<std::size_t>(v * width + u)];

@@ -17,7 +17,7 @@ void write(const fs::path& file, const std::string& text) {
 class PipelineCacheTest : public ::testing::Test {
  protected:
   // Draws a picture on a device that is opened for it.
-  std::vector<glm::vec3> picture() {
+  render::Sheet<glm::vec3> picture() {
     render::DeviceOptions options;
     options.validation = true;
     options.cache = folder_ / "cache";
@@ -25,7 +25,7 @@ class PipelineCacheTest : public ::testing::Test {
     View view = empty_view({0, -0.8, 1}, {0, 0, 0}, pinhole(16, 12, 0.8), glm::vec3(0.2f));
     add(view.scene, rectangle_mesh({2, 2}), diffuse(glm::vec3(0.5f)));
     SetRenderer renderer(view, {}, set::LightSampling::importance, device);
-    std::vector<glm::vec3> mixed = renderer.rendered(1).mixed;
+    auto mixed = renderer.rendered(1).mixed;
     EXPECT_EQ(render::validation_messages(*device), 0u);
     return mixed;
   }
@@ -50,7 +50,7 @@ class PipelineCacheTest : public ::testing::Test {
 };
 
 TEST_F(PipelineCacheTest, IsWrittenOnceForADevice) {
-  const std::vector<glm::vec3> first = picture();
+  const auto first = picture();
   EXPECT_THAT(file().filename().string(), StartsWith("pipelines-"));
   EXPECT_GT(fs::file_size(file()), 64u);
   EXPECT_EQ(picture(), first);
@@ -59,7 +59,7 @@ TEST_F(PipelineCacheTest, IsWrittenOnceForADevice) {
 }
 
 TEST_F(PipelineCacheTest, IsLeftOutAndReplacedWhereItIsDamaged) {
-  const std::vector<glm::vec3> first = picture();
+  const auto first = picture();
   const std::string whole = test::content_of(file());
   std::string damaged = whole;
   damaged[damaged.size() / 2] ^= 0x20;

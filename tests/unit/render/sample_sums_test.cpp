@@ -15,7 +15,7 @@ using render::PixelSums, render::SampleRange, render::SampleSpan, render::Sample
 
 // True if the memory of both has the same bytes: NaN, -0 and all.
 template <class T>
-bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
+bool same_bits(const render::Sheet<T>& a, const render::Sheet<T>& b) {
   return std::ranges::equal(std::as_bytes(std::span(a)), std::as_bytes(std::span(b)));
 }
 bool same_bits(const PixelSums& a, const PixelSums& b) {
@@ -63,7 +63,9 @@ SampleSums random_sums(std::uint32_t seed) {
     const float magnitude = std::pow(10.0f, static_cast<float>(random() % 60) - 30);
     return (random() % 2 == 0 ? magnitude : -magnitude) * static_cast<float>(random() % 1000);
   };
-  SampleSums sums{8, 4, 64, {std::vector<gpu::GpuPixel>(32), std::vector<glm::vec4>(32)}};
+  SampleSums sums{8, 4, 64, {}};
+  sums.sums.pixels.resize(32);
+  sums.sums.caustics.resize(32);
   for (std::size_t i = 0; i < 32; ++i) {
     gpu::GpuPixel& pixel = sums.sums.pixels[i];
     for (auto [high, low] : {std::pair{&pixel.mixed_high, &pixel.mixed_low},
@@ -127,7 +129,8 @@ struct TwoFloats {
 
 TwoFloats merged(TwoFloats a, TwoFloats b) {
   const auto sums = [](TwoFloats value) {
-    SampleSums one{1, 1, 64, {std::vector<gpu::GpuPixel>(1), {}}};
+    SampleSums one{1, 1, 64, {}};
+    one.sums.pixels.resize(1);
     one.sums.pixels[0].diff_high.x = value.high;
     one.sums.pixels[0].diff_low.x = value.low;
     return one;

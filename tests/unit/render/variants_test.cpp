@@ -35,7 +35,7 @@ struct Stage {
 };
 
 struct Picture {
-  std::vector<glm::vec3> mixed;
+  render::Sheet<glm::vec3> mixed;
   render::Counters counters;
 };
 

@@ -94,7 +94,8 @@ TEST(TradeMeasure, ShownIsClippedWhereTheSensorClips) {
   layers.height = 1;
   layers.composite = {glm::vec3(5.0f), glm::vec3(0.3f)};
   layers.mask = {1.0f, 0.0f};
-  const TradePicture picture = trade_picture(layers, {0.5, 0.5, 0.5, 0.3, 0.3, 0.3}, 2.0);
+  constexpr std::array<std::uint16_t, 6> codes{0, 0, 0, 1, 1, 1};
+  const TradePicture picture = trade_picture(layers, {{{0.5, 0, 0}, {0.3, 0, 0}}, codes}, 2.0);
   EXPECT_EQ(picture.shown[0], glm::vec3(2.0f));
   EXPECT_EQ(picture.added[0], glm::vec3(1.5f));
   EXPECT_EQ(picture.added[1], glm::vec3(0.0f));  // 0.3 is no float, and yet nothing was added

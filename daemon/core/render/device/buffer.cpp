@@ -39,33 +39,70 @@ std::uint64_t next_id() {
   return ++last;
 }
 
+// What a buffer is made of.
+struct Kind {
+  vk::BufferUsageFlags usage;
+  vk::MemoryPropertyFlags wanted, preferred;
+  bool in_scratch = false;
+};
+
+constexpr auto host_allocation = vk::ExternalMemoryHandleTypeFlagBits::eHostAllocationEXT;
+
+// Gives the buffer memory that lies in a file.
+void bind_scratch(Device& device, Buffer::Parts& parts, const vk::MemoryRequirements& needed) {
+  const vk::DeviceSize page = Scratch::alignment();
+  parts.host = Sheet<std::byte>((needed.size + page - 1) / page * page,
+                                SheetAllocator<std::byte>(device.scratch()));
+  const auto types = device.vk()
+                         .getMemoryHostPointerPropertiesEXT(host_allocation, parts.host.data())
+                         .memoryTypeBits;
+  const auto type = device.memory().type(types & needed.memoryTypeBits, {}, {});
+  const vk::ImportMemoryHostPointerInfoEXT import(host_allocation, parts.host.data());
+  parts.memory =
+      vk::raii::DeviceMemory(device.vk(), vk::MemoryAllocateInfo(parts.host.size(), type, &import));
+}
+
+void* bind_own(Device& device, Buffer::Parts& parts, const vk::MemoryRequirements& needed,
+               const Kind& kind) {
+  std::uint32_t types = needed.memoryTypeBits;
+  vk::MemoryPropertyFlags wanted = kind.wanted;
+  const bool is_own = static_cast<bool>(wanted & vk::MemoryPropertyFlagBits::eDeviceLocal);
+  if (is_own && (types & device.memory().mapped_types()) != 0) {
+    types &= device.memory().mapped_types();
+    wanted |= vk::MemoryPropertyFlagBits::eHostVisible;
+  }
+  const auto type = device.memory().type(types, wanted, kind.preferred);
+  const vk::MemoryAllocateFlagsInfo with_address(vk::MemoryAllocateFlagBits::eDeviceAddress);
+  vk::MemoryAllocateInfo allocate(needed.size, type);
+  if (kind.usage & vk::BufferUsageFlagBits::eShaderDeviceAddress) allocate.pNext = &with_address;
+  parts.memory = vk::raii::DeviceMemory(device.vk(), allocate);
+  return wanted & vk::MemoryPropertyFlagBits::eHostVisible
+             ? parts.memory.mapMemory(0, VK_WHOLE_SIZE)
+             : nullptr;
+}
+
 Buffer create_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
-                     vk::BufferUsageFlags usage, vk::MemoryPropertyFlags wanted,
-                     vk::MemoryPropertyFlags preferred) {
+                     const Kind& kind) {
   using Usage = vk::BufferUsageFlagBits;
   device.submissions().finish();  // what is no longer needed is freed first
   Buffer result;
   result.size = std::max<vk::DeviceSize>((size + 15) / 16 * 16, 16);
   result.parts = {new Buffer::Parts, Retire<Buffer::Parts>{&device}};
-  usage |= Usage::eTransferSrc | Usage::eTransferDst;
+  const vk::ExternalMemoryBufferCreateInfo imported(host_allocation);
+  vk::BufferCreateInfo info({}, result.size,
+                            kind.usage | Usage::eTransferSrc | Usage::eTransferDst);
+  if (kind.in_scratch) info.pNext = &imported;
   try {
     Buffer::Parts& parts = *result.parts;
-    parts.buffer = vk::raii::Buffer(device.vk(), {{}, result.size, usage});
-    const auto requirements = parts.buffer.getMemoryRequirements();
-    std::uint32_t types = requirements.memoryTypeBits;
-    const bool is_own = static_cast<bool>(wanted & vk::MemoryPropertyFlagBits::eDeviceLocal);
-    if (is_own && (types & device.memory().mapped_types()) != 0) {
-      types &= device.memory().mapped_types();
-      wanted |= vk::MemoryPropertyFlagBits::eHostVisible;
+    parts.buffer = vk::raii::Buffer(device.vk(), info);
+    const vk::MemoryRequirements needed = parts.buffer.getMemoryRequirements();
+    if (kind.in_scratch) {
+      bind_scratch(device, parts, needed);
+      result.mapped = parts.host.data();
+    } else {
+      result.mapped = bind_own(device, parts, needed, kind);
     }
-    const auto type = device.memory().type(types, wanted, preferred);
-    const vk::MemoryAllocateFlagsInfo with_address(vk::MemoryAllocateFlagBits::eDeviceAddress);
-    vk::MemoryAllocateInfo allocate(requirements.size, type);
-    if (usage & vk::BufferUsageFlagBits::eShaderDeviceAddress) allocate.pNext = &with_address;
-    parts.memory = vk::raii::DeviceMemory(device.vk(), allocate);
     parts.buffer.bindMemory(*parts.memory, 0);
-    if (wanted & vk::MemoryPropertyFlagBits::eHostVisible)
-      result.mapped = parts.memory.mapMemory(0, VK_WHOLE_SIZE);
   } catch (const vk::DeviceLostError&) {
     throw;
   } catch (const vk::SystemError& error) {
@@ -84,23 +121,24 @@ using Memory = vk::MemoryPropertyFlagBits;
 
 // Where the host works in the device's memory, or can write it, it is mapped.
 Buffer create_device_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
-                            vk::BufferUsageFlags usage) {
+                            vk::BufferUsageFlags usage, bool is_of_picture = false) {
   using Usage = vk::BufferUsageFlagBits;
   device.memory().count_buffer();
   if (device.traces_in_hardware())
     usage |= Usage::eShaderDeviceAddress | Usage::eAccelerationStructureBuildInputReadOnlyKHR;
   const vk::MemoryPropertyFlags host = Memory::eHostVisible | Memory::eHostCoherent;
-  return device.shares_host_memory()
-             ? create_buffer(device, purpose, size, usage, host, Memory::eDeviceLocal)
-             : create_buffer(device, purpose, size, usage, Memory::eDeviceLocal, {});
+  if (!device.shares_host_memory())
+    return create_buffer(device, purpose, size, {usage, Memory::eDeviceLocal, {}});
+  const bool in_scratch = is_of_picture && device.scratch() && device.imports_host_memory();
+  return create_buffer(device, purpose, size, {usage, host, Memory::eDeviceLocal, in_scratch});
 }
 
 Buffer create_staging_buffer(Device& device, vk::DeviceSize size,
                              vk::MemoryPropertyFlags preferred) {
   constexpr Purpose purpose{"copies to and from the graphics card",
                             "close other programs, or make the picture smaller"};
-  return create_buffer(device, purpose, size, {}, Memory::eHostVisible | Memory::eHostCoherent,
-                       preferred);
+  return create_buffer(device, purpose, size,
+                       {{}, Memory::eHostVisible | Memory::eHostCoherent, preferred});
 }
 
 vk::DeviceSize texel_bytes_of(vk::Format format) {
@@ -152,9 +190,36 @@ void record_copy_down(Device& device, const Buffer& from, const Buffer& to, vk::
 
 }  // namespace
 
-Buffer create_storage_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size) {
+namespace {
+
+Buffer storage_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
+                      bool is_of_picture) {
   check_buffer(device, purpose, {size, 0, true});
-  return create_device_buffer(device, purpose, size, vk::BufferUsageFlagBits::eStorageBuffer);
+  return create_device_buffer(device, purpose, size, vk::BufferUsageFlagBits::eStorageBuffer,
+                              is_of_picture);
+}
+
+Buffer texel_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size, vk::Format format,
+                    bool is_storage, bool is_of_picture) {
+  using Usage = vk::BufferUsageFlagBits;
+  if (device.reads_storage()) return storage_buffer(device, purpose, size, is_of_picture);
+  check_buffer(device, purpose, {size, size / texel_bytes_of(format), is_storage});
+  Buffer result = create_device_buffer(
+      device, purpose, size, Usage::eUniformTexelBuffer | Usage::eStorageBuffer, is_of_picture);
+  result.parts->view =
+      vk::raii::BufferView(device.vk(), {{}, result.buffer, format, 0, VK_WHOLE_SIZE});
+  result.view = *result.parts->view;
+  return result;
+}
+
+}  // namespace
+
+Buffer create_storage_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size) {
+  return storage_buffer(device, purpose, size, false);
+}
+
+Buffer create_picture_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size) {
+  return storage_buffer(device, purpose, size, true);
 }
 
 Buffer create_indirect_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size) {
@@ -165,15 +230,12 @@ Buffer create_indirect_buffer(Device& device, const Purpose& purpose, vk::Device
 
 Buffer create_texel_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
                            vk::Format format, bool is_storage) {
-  using Usage = vk::BufferUsageFlagBits;
-  if (device.reads_storage()) return create_storage_buffer(device, purpose, size);
-  check_buffer(device, purpose, {size, size / texel_bytes_of(format), is_storage});
-  Buffer result = create_device_buffer(device, purpose, size,
-                                       Usage::eUniformTexelBuffer | Usage::eStorageBuffer);
-  result.parts->view =
-      vk::raii::BufferView(device.vk(), {{}, result.buffer, format, 0, VK_WHOLE_SIZE});
-  result.view = *result.parts->view;
-  return result;
+  return texel_buffer(device, purpose, size, format, is_storage, false);
+}
+
+Buffer create_picture_texels(Device& device, const Purpose& purpose, vk::DeviceSize size,
+                             vk::Format format) {
+  return texel_buffer(device, purpose, size, format, true, true);
 }
 
 Buffer create_structure_memory(Device& device, const Purpose& purpose, vk::DeviceSize size) {

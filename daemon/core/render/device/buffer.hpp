@@ -23,6 +23,7 @@ namespace previz::render {
 struct Buffer {
   // In the order in which they are made.
   struct Parts {
+    Sheet<std::byte> host;  // the memory that was imported; empty: it is the device's own
     vk::raii::Buffer buffer{nullptr};
     vk::raii::DeviceMemory memory{nullptr};
     vk::raii::BufferView view{nullptr};
@@ -47,6 +48,12 @@ Buffer create_indirect_buffer(Device& device, const Purpose& purpose, vk::Device
 // allow less.
 Buffer create_texel_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
                            vk::Format format, bool is_storage = false);
+
+// Create the same, for what has elements for every pixel of a picture and is worked on in bands: it
+// may lie in a file (Device::use_scratch()).
+Buffer create_picture_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size);
+Buffer create_picture_texels(Device& device, const Purpose& purpose, vk::DeviceSize size,
+                             vk::Format format);
 
 // Creates memory for acceleration structures (daemon/core/render/world/ray_structures.hpp), or in
 // which one is built. Where rays are traced in hardware, these can be built from all buffers of the

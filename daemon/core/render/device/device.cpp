@@ -340,6 +340,9 @@ void Device::create_device() {
   std::vector<const char*> extensions;
   card_ = shares_host_memory() ? std::nullopt : card_of(physical_);
   if (card_) extensions.push_back(VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME);
+  imports_host_memory_ =
+      shares_host_memory() && has_extension(physical_, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
+  if (imports_host_memory_) extensions.push_back(VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME);
   vk::PhysicalDeviceShaderSubgroupUniformControlFlowFeaturesKHR uniform(VK_TRUE);
   lanes_meet_ = has_uniform_subgroups(physical_);
   if (lanes_meet_) {
@@ -426,6 +429,9 @@ DeviceFacts facts_of(const Device& device) {
           .traces_in_hardware = device.traces_in_hardware(),
           .missing_drivers = device.missing_drivers()};
 }
+void use_scratch(Device& device, std::shared_ptr<Scratch> scratch) {
+  device.use_scratch(std::move(scratch));
+}
 void keep_programs(Device& device) {
   device.keep_programs();
 }
@@ -435,7 +441,8 @@ PictureMemory memory_of(const Device& device) {
   return {
       .bytes = device.memory().bytes(),
       .pixels = device.reads_storage() ? allows.storage_bytes / whole_pixel_bytes : allows.texels,
-      .read_back = device.shares_host_memory()};
+      .read_back = device.shares_host_memory(),
+      .in_scratch = device.scratch() && device.imports_host_memory()};
 }
 
 DeviceTimes take_times(Device& device) {

@@ -17,6 +17,7 @@
 #include "daemon/core/render/device/gpu.hpp"
 #include "daemon/core/render/device/programs.hpp"
 #include "daemon/core/render/device/submissions.hpp"
+#include "daemon/core/render/picture/scratch.hpp"
 #include "drivers/card_picture.hpp"
 
 namespace previz::render {
@@ -67,6 +68,12 @@ class Device {
   bool reads_storage() const {
     return !shares_host_memory() || limits_.maxTexelBufferElements < enough_texels;
   }
+  // From now on buffers as large as a picture lie in files (create_picture_buffer()), if the host
+  // works in the device's memory and its driver can take memory that is there. Null: no longer.
+  void use_scratch(std::shared_ptr<Scratch> scratch) { scratch_ = std::move(scratch); }
+  // What they lie in; null: nowhere but in the device's memory.
+  const std::shared_ptr<Scratch>& scratch() const { return scratch_; }
+  bool imports_host_memory() const { return imports_host_memory_; }
   // Returns whether rays are traced by the device's own units, through RayStructures.
   bool traces_in_hardware() const { return scratch_alignment_ > 0; }
   // Returns the alignment, in bytes, of the memory in which a structure is built.
@@ -136,6 +143,8 @@ class Device {
   vk::DeviceSize scratch_alignment_ = 0;  // 0: rays are not traced in hardware
   bool is_cpu_ = false;
   bool lanes_meet_ = false;
+  bool imports_host_memory_ = false;
+  std::shared_ptr<Scratch> scratch_;
   bool has_labels_ = false;
   bool had_gpu_ = false;  // since it was first opened
   bool missing_is_said_ = false;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/core/render/picture/picture_memory.hpp"
+#include "daemon/core/render/picture/scratch.hpp"
 #include "drivers/error.hpp"
 
 namespace previz::render {
@@ -106,6 +107,9 @@ bool is_open(const Device& device);  // false after a reopen_device() that threw
 bool is_gpu(const Device& device);   // and open
 std::string device_name(const Device& device);
 PictureMemory memory_of(const Device& device);
+// From now on what is as large as a picture lies in files, as far as the computer's memory would
+// hold it: all of a frame that is rendered by a CPU device, and the frames that are kept.
+void use_scratch(Device& device, std::shared_ptr<Scratch> scratch);
 // Keeps what has been compiled since the last call, if anything was, for the next start
 // (DeviceOptions::cache). Writes in a thread of its own.
 void keep_programs(Device& device);

@@ -101,7 +101,7 @@ void History::reserve(Frame& frame) {
                              static_cast<std::size_t>(frame.view.lens.height);
   const Purpose purpose = for_average(frame.view.lens);
   const auto grow = [&](Buffer& buffer, std::size_t bytes) {
-    if (buffer.size < bytes) buffer = create_storage_buffer(device_, purpose, bytes);
+    if (buffer.size < bytes) buffer = create_picture_buffer(device_, purpose, bytes);
   };
   constexpr std::size_t point_bytes = 2 * sizeof(gpu::vec4);
   grow(frame.points, std::max<std::size_t>(points, 1) * point_bytes);
@@ -111,12 +111,12 @@ void History::reserve(Frame& frame) {
   if (pixels <= frame.pixels) return;
   frame.pixels = 0;  // stays 0 if an allocation below throws
   for (Buffer* buffer : {&frame.places, &frame.lights})
-    *buffer = create_texel_buffer(device_, purpose, pixels * sizeof(gpu::vec4),
-                                  vk::Format::eR32G32B32A32Sfloat, true);
+    *buffer = create_picture_texels(device_, purpose, pixels * sizeof(gpu::vec4),
+                                    vk::Format::eR32G32B32A32Sfloat);
   for (Buffer* buffer :
        {&frame.things, &frame.spreads, &frame.albedos, &frame.others, &frame.caustics})
-    *buffer = create_texel_buffer(device_, purpose, pixels * sizeof(gpu::uvec2),
-                                  vk::Format::eR32G32Uint, true);
+    *buffer = create_picture_texels(device_, purpose, pixels * sizeof(gpu::uvec2),
+                                    vk::Format::eR32G32Uint);
   frame.pixels = pixels;
 }
 

@@ -128,7 +128,7 @@ void Wavefront::create_tiles() {
   divide(fewest);
   pixels_.clear();  // frees the old memory before the new is allocated
   for (const Tile& tile : tiles_)
-    pixels_.push_back(create_storage_buffer(device_, for_paths(), bytes_of(tile)));
+    pixels_.push_back(create_picture_buffer(device_, for_paths(), bytes_of(tile)));
 }
 
 void Wavefront::create_paths() {
@@ -201,7 +201,7 @@ void Wavefront::create_caustics(bool has_photons) {
   for (std::size_t i = 0; i < pixels_.size(); ++i) {
     const vk::DeviceSize pixels = has_photons ? pixels_[i].size / sizeof(gpu::GpuPixel) : 1;
     if (caustics_[i].size < pixels * sizeof(gpu::vec4))
-      caustics_[i] = create_storage_buffer(device_, purpose, pixels * sizeof(gpu::vec4));
+      caustics_[i] = create_picture_buffer(device_, purpose, pixels * sizeof(gpu::vec4));
   }
 }
 
@@ -409,7 +409,7 @@ std::vector<Wavefront::Sums> Wavefront::sums() const {
 PixelSums Wavefront::keep() const {
   const auto width = static_cast<std::size_t>(width_);
   const std::vector<Sums> tiles = sums();
-  PixelSums kept;
+  PixelSums kept(device_.scratch());
   kept.pixels.resize(width * static_cast<std::size_t>(height_));
   if (tiles.front().caustics) kept.caustics.resize(kept.pixels.size());
   for (const Sums& tile : tiles) {

@@ -111,38 +111,26 @@ PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& respo
                              double exposure) {
   const std::vector<double>& inverse = response.inverse();
   const lighting::Clipping clipping = response.clipping();
-  PlateRadiance of_code;
+  PlateRadiance result{{}, plate.samples};
   for (std::size_t code = 0; code < inverse.size(); ++code) {
     const std::size_t low = code > 0 ? code - 1 : 0;
     const std::size_t high = std::min(code + 1, inverse.size() - 1);
     const double step = (inverse[high] - inverse[low]) / static_cast<double>(high - low) / exposure;
-    of_code.value.push_back(inverse[code] / exposure);
-    of_code.variance.push_back(step * step / 12);
-    of_code.clipped.push_back(clipping.share(static_cast<std::uint16_t>(code)));
+    result.of_code.push_back({inverse[code] / exposure, step * step / 12,
+                              clipping.share(static_cast<std::uint16_t>(code))});
   }
-  PlateRadiance result{std::vector<double>(plate.samples.size()),
-                       std::vector<double>(plate.samples.size()),
-                       std::vector<float>(plate.samples.size())};
-  each_pixel(plate.samples.size() / 3, [&](std::size_t pixel) {
-    for (std::size_t i = 3 * pixel; i < 3 * pixel + 3; ++i) {
-      // A device makes a smaller preview's plate; one that fails may bring any code.
-      const std::size_t code = std::min<std::size_t>(plate.samples[i], inverse.size() - 1);
-      result.value[i] = of_code.value[code];
-      result.variance[i] = of_code.variance[code];
-      result.clipped[i] = of_code.clipped[code];
-    }
-  });
   return result;
 }
 
 MeasuredChannel PlateRadiance::channel(std::size_t pixel, int channel) const {
-  if (value.empty()) return {};
-  const std::size_t i = 3 * pixel + static_cast<std::size_t>(channel);
-  return {value[i], variance[i], clipped.empty() ? 0.0 : static_cast<double>(clipped[i])};
+  if (codes.empty()) return {};
+  const std::size_t code = codes[3 * pixel + static_cast<std::size_t>(channel)];
+  return of_code[std::min(code, of_code.size() - 1)];
 }
 
-Layers make_layers(int width, int height, std::int64_t samples) {
-  Layers layers;
+Layers make_layers(int width, int height, std::int64_t samples,
+                   const std::shared_ptr<Scratch>& scratch) {
+  Layers layers(scratch);
   layers.width = width;
   layers.height = height;
   layers.samples = samples;

@@ -22,14 +22,16 @@ struct MeasuredChannel {
   double clipped = 0;   // 0 to 1: how far the code means "at least this much" (lighting::Clipping)
 };
 
-// The plate as linear radiance, interleaved RGB.
+// The plate as linear radiance: what each of its codes stands for.
 struct PlateRadiance {
-  std::vector<double> value, variance;
-  std::vector<float> clipped;  // empty: nothing is
+  std::vector<MeasuredChannel> of_code;
+  std::span<const std::uint16_t> codes;  // the plate's samples, interleaved RGB
 
-  // Returns zeros if there is no plate.
+  // Returns zeros if there is no plate. A device makes a smaller preview's plate; one that fails
+  // may bring any code, and one that no camera has counts as the largest.
   MeasuredChannel channel(std::size_t pixel, int channel) const;
 };
+// The result looks into the plate, which must outlive it.
 PlateRadiance plate_radiance(const Plate& plate, const lighting::Response& response,
                              double exposure);
 
@@ -69,7 +71,8 @@ double gain_of(const CompositeRule& rule, const MeasuredChannel& camera, const E
 
 // Returns all-zero layers of this size. `samples` is the largest number of samples that a pixel
 // has.
-Layers make_layers(int width, int height, std::int64_t samples);
+Layers make_layers(int width, int height, std::int64_t samples,
+                   const std::shared_ptr<Scratch>& scratch = {});
 
 // Fills in all layers of the pixels from index `first` on, row-major, from the pixels' sums and the
 // plate of the whole picture (empty: black). With the additive rule the composite equals mean(Lm) +

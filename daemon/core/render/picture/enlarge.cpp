@@ -96,7 +96,7 @@ double likeness(double off) {
 
 Additions additions_of(const Layers& layers, const Plate& plate,
                        const std::function<float(std::uint16_t)>& light_of, double scale) {
-  Additions additions{layers.width, layers.height, std::vector<glm::vec3>(layers.mask.size()),
+  Additions additions{layers.width, layers.height, Sheet<glm::vec3>(layers.mask.size()),
                       layers.mask};
   each_pixel(layers.mask.size(), [&](std::size_t i) {
     for (int c = 0; c < 3; ++c) {
@@ -108,15 +108,15 @@ Additions additions_of(const Layers& layers, const Plate& plate,
   return additions;
 }
 
-std::vector<glm::vec3> enlarged(const Additions& additions, const Plate& small, const Plate& whole,
-                                const std::function<float(std::uint16_t)>& light_of) {
+Sheet<glm::vec3> enlarged(const Additions& additions, const Plate& small, const Plate& whole,
+                          const std::function<float(std::uint16_t)>& light_of) {
   assert(additions.width == small.width && additions.height == small.height);
   const double sharpness = static_cast<double>(whole.width) / small.width;
   const glm::dvec2 step(static_cast<double>(small.width) / whole.width,
                         static_cast<double>(small.height) / whole.height);
   std::vector<Sides> sides(additions.mask.size());
   each_pixel(sides.size(), [&](std::size_t i) { sides[i] = sides_of(additions, i); });
-  std::vector<glm::vec3> result(whole.samples.size() / 3);
+  Sheet<glm::vec3> result(whole.samples.size() / 3);
   each_pixel(result.size(), [&](std::size_t i) {
     const glm::dvec3 plate(light_of(whole.samples[3 * i]), light_of(whole.samples[3 * i + 1]),
                            light_of(whole.samples[3 * i + 2]));

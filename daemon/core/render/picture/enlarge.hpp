@@ -4,7 +4,6 @@
 
 #include <functional>
 #include <glm/vec3.hpp>
-#include <vector>
 
 #include "daemon/core/render/picture/layers.hpp"
 #include "drivers/plate.hpp"
@@ -14,8 +13,8 @@ namespace previz::render {
 // What a rendering adds to its small plate, row-major.
 struct Additions {
   int width = 0, height = 0;
-  std::vector<glm::vec3> light;  // composite - (1 - mask) * plate, in any linear unit
-  std::vector<float> mask;       // the share of the pixel that something virtual covers
+  Sheet<glm::vec3> light;  // composite - (1 - mask) * plate, in any linear unit
+  Sheet<float> mask;       // the share of the pixel that something virtual covers
 };
 
 // Returns what the layers add to the plate that they were made with, in radiance times `scale`, the
@@ -25,7 +24,7 @@ Additions additions_of(const Layers& layers, const Plate& plate,
 
 // Returns the composite at the size of the whole picture, in the unit of the additions: the plate
 // where no small pixel around adds anything. `small` is the plate that they are for.
-std::vector<glm::vec3> enlarged(const Additions& additions, const Plate& small, const Plate& whole,
-                                const std::function<float(std::uint16_t)>& light_of);
+Sheet<glm::vec3> enlarged(const Additions& additions, const Plate& small, const Plate& whole,
+                          const std::function<float(std::uint16_t)>& light_of);
 
 }  // namespace previz::render

@@ -4,25 +4,37 @@
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <limits>
-#include <vector>
+
+#include "daemon/core/render/picture/scratch.hpp"
 
 namespace previz::render {
 
 // All arrays are row-major, width * height; radiance is linear Rec. 709 in the set's units.
 struct Layers {
+  Layers() = default;
+  explicit Layers(const std::shared_ptr<Scratch>& scratch)
+      : composite(scratch),
+        mixed(scratch),
+        real(scratch),
+        diff(scratch),
+        normal(scratch),
+        variance(scratch),
+        mask(scratch),
+        depth(scratch) {}
+
   int width = 0;
   int height = 0;
   bool denoised = false;     // the composite was denoised; `variance` estimates the noise left
   std::int64_t samples = 0;  // per pixel; the largest number, where it differs
   double white = std::numeric_limits<double>::infinity();  // radiance at which the sensor clips
-  std::vector<glm::vec3> composite;  // by the set's rule: daemon/core/render/picture/composite.hpp
-  std::vector<glm::vec3> mixed;      // mean(Lm)
-  std::vector<glm::vec3> real;       // mean(Lr); Lc where only the difference was traced
-  std::vector<glm::vec3> diff;       // mean(Lm - Lr), accumulated as a difference
-  std::vector<glm::vec3> normal;     // mean world normal of the mixed world's first hit
-  std::vector<glm::vec3> variance;   // of the composite
-  std::vector<float> mask;           // mean(M), 0..1
-  std::vector<float> depth;          // metres along the optical axis, mean over hits; 0: no hit
+  Sheet<glm::vec3> composite;  // by the set's rule: daemon/core/render/picture/composite.hpp
+  Sheet<glm::vec3> mixed;      // mean(Lm)
+  Sheet<glm::vec3> real;       // mean(Lr); Lc where only the difference was traced
+  Sheet<glm::vec3> diff;       // mean(Lm - Lr), accumulated as a difference
+  Sheet<glm::vec3> normal;     // mean world normal of the mixed world's first hit
+  Sheet<glm::vec3> variance;   // of the composite
+  Sheet<float> mask;           // mean(M), 0..1
+  Sheet<float> depth;          // metres along the optical axis, mean over hits; 0: no hit
 };
 
 // Events counted on the GPU, never silently discarded. The tests demand zero drops.

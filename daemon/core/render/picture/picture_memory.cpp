@@ -14,12 +14,7 @@ namespace previz::render {
 namespace {
 
 // A pixel of Layers has six members of three floats and two of one.
-constexpr std::uint64_t bare_layer_bytes = (6 * 3 + 2) * sizeof(float);
-
-// While layers are made, the plate's radiance and its variance
-// (daemon/core/render/picture/composite.hpp) are there as well, three doubles each, and what of it
-// is clipped, three floats.
-constexpr std::uint64_t layer_bytes = bare_layer_bytes + 2 * 3 * sizeof(double) + 3 * sizeof(float);
+constexpr std::uint64_t layer_bytes = (6 * 3 + 2) * sizeof(float);
 
 // A pixel's sums, and those of the light of photons.
 constexpr std::uint64_t sum_bytes = sizeof(gpu::GpuPixel) + 4 * sizeof(float);
@@ -57,14 +52,30 @@ std::string gigabytes(std::uint64_t bytes) {
   return text;
 }
 
+// The rays of the whole picture, its plate and a band.
+std::uint64_t always_on_device(int width, int height) {
+  const std::uint64_t pixels = pixels_of(width, height);
+  return pixels * (plate_bytes + camera_bytes) + rays_of(width, height) * sizeof(glm::vec2) +
+         std::min<std::uint64_t>(pixels, most_band_pixels) * band_bytes;
+}
+
+// A render without its pictures: program, driver, scene and paths, as the demo's.
+constexpr std::uint64_t program_bytes = 400'000'000;
+// Scratch files work with so much of them in memory, and no better with more than the second: what
+// is there beyond it is in the kernel's cache.
+constexpr std::uint64_t least_resident = 128'000'000, most_resident = 512'000'000;
+
+constexpr const char* smaller = "; make the pictures smaller (--scale)";
+
+std::uint64_t frames_of(const TakeOfPictures& take) {
+  return std::min(2 * static_cast<std::uint64_t>(take.each_side) + 1, take.take_frames);
+}
+
 }  // namespace
 
 std::uint64_t picture_bytes(int width, int height, bool read_back) {
-  const std::uint64_t pixels = pixels_of(width, height);
-  const std::uint64_t device = pixels * (sum_bytes + plate_bytes + camera_bytes) +
-                               rays_of(width, height) * sizeof(glm::vec2) +
-                               std::min<std::uint64_t>(pixels, most_band_pixels) * band_bytes;
-  return read_back ? device + pixels * layer_bytes : device;
+  return always_on_device(width, height) +
+         pixels_of(width, height) * (sum_bytes + (read_back ? layer_bytes : 0));
 }
 
 void refuse_too_large(int width, int height, const PictureMemory& memory) {
@@ -73,7 +84,8 @@ void refuse_too_large(int width, int height, const PictureMemory& memory) {
   if (rays_of(width, height) > memory.pixels)
     throw Error(picture + " exceeds the " + std::to_string(memory.pixels) +
                 " pixels that the Vulkan device can address; make it smaller");
-  const std::uint64_t bytes = picture_bytes(width, height, memory.read_back);
+  const std::uint64_t bytes = memory.in_scratch ? always_on_device(width, height)
+                                                : picture_bytes(width, height, memory.read_back);
   if (bytes > memory.bytes)
     throw Error(picture + " takes " + gigabytes(bytes) + " of memory, but there is only " +
                 gigabytes(memory.bytes) + "; make it smaller");
@@ -83,59 +95,51 @@ std::uint64_t history_bytes(int width, int height) {
   return pixels_of(width, height) * (156 + 12);  // 12 for points that deform
 }
 
-std::uint64_t Averaging::frames() const {
-  return std::min(2 * static_cast<std::uint64_t>(each_side) + 1, take_frames);
+TakeMemory take_memory(const TakeOfPictures& take, const PictureMemory& device) {
+  const std::uint64_t pixels = pixels_of(take.width, take.height), frames = frames_of(take);
+  // Layers are made, wait, and are written.
+  constexpr std::uint64_t at_once = 3;
+  const std::uint64_t layers = std::min(at_once, take.take_frames);
+  const auto levels = static_cast<std::uint64_t>(std::bit_width(static_cast<unsigned>(take.parts)));
+  std::uint64_t banded = pixels * layers * layer_bytes;
+  if (take.each_side > 0) banded += pixels * frames * sum_bytes;
+  if (take.parts > 1) banded += pixels * levels * sum_bytes;
+  // Frames are decoded ahead, kept, and shown, as the camera's bytes and as codes.
+  std::uint64_t rest =
+      program_bytes + pixels * (frames + layers + 2) * (plate_bytes + camera_bytes);
+  if (device.read_back) {
+    banded += pixels * sum_bytes;
+    if (take.each_side > 0) banded += history_bytes(take.width, take.height);
+    rest += always_on_device(take.width, take.height);
+  }
+  return {banded, rest};
 }
 
-std::uint64_t kept_bytes(int width, int height, const Averaging& averaging) {
-  // One that is finished waits for the one that is being written (daemon/tools/post/render.cpp).
-  constexpr std::uint64_t finished = 2;
-  const std::uint64_t waiting = std::min(
-      static_cast<std::uint64_t>(averaging.each_side) + 1 + finished, averaging.take_frames);
-  return pixels_of(width, height) *
-         (averaging.frames() * (sum_bytes + plate_bytes) + waiting * bare_layer_bytes);
-}
-
-std::uint64_t part_bytes(int width, int height, int parts) {
-  if (parts < 2) return 0;
-  return pixels_of(width, height) * sum_bytes *
-         static_cast<std::uint64_t>(std::bit_width(static_cast<unsigned>(parts)));
-}
-
-void refuse_too_many_parts(int width, int height, int parts, std::uint64_t free_bytes) {
-  const std::uint64_t needed = part_bytes(width, height, parts);
-  if (needed <= free_bytes) return;
-  throw Error("a picture of " + size_words(width, height) + " with so many samples takes " +
-              gigabytes(needed) + " of the computer's memory for the parts of their sum, and " +
-              gigabytes(free_bytes) +
-              " are free; make the picture smaller (--scale), or give fewer samples (--spp)");
-}
-
-void refuse_too_many_neighbours(int width, int height, const Averaging& averaging,
-                                const PictureMemory& memory, std::uint64_t free_bytes) {
-  refuse_too_large(width, height, memory);
-  const int neighbours = averaging.each_side;
-  const std::string key = "quality.neighbours = " + std::to_string(neighbours) + ": ";
+void refuse_too_large(const TakeOfPictures& take, const PictureMemory& device) {
+  refuse_too_large(take.width, take.height, device);
   const std::uint64_t averaged =
-      picture_bytes(width, height, memory.read_back) + history_bytes(width, height);
-  if (!memory.read_back && averaged > memory.bytes)
-    throw Error(key + "to average a picture of " + size_words(width, height) + " takes " +
-                gigabytes(averaged) + " of the graphics card's memory, and there is " +
-                gigabytes(memory.bytes) +
-                "; make the picture smaller (--scale), or let every frame stand alone "
-                "(--neighbours 0)");
-  const auto needed = [&](int each_side) {
-    return kept_bytes(width, height, {each_side, averaging.take_frames}) +
-           (memory.read_back ? averaged : 0);
-  };
-  if (needed(neighbours) <= free_bytes) return;
-  int fitting = neighbours - 1;
-  while (fitting > 0 && needed(fitting) > free_bytes) --fitting;
-  throw Error(key + "to average " + std::to_string(averaging.frames()) + " frames of " +
-              size_words(width, height) + " takes " + gigabytes(needed(neighbours)) +
-              " of the computer's memory, and " + gigabytes(free_bytes) +
-              " are free; make the picture smaller (--scale), or average fewer (--neighbours " +
-              std::to_string(fitting) + (fitting > 0 ? " fits)" : ", every frame stands alone)"));
+      picture_bytes(take.width, take.height, false) + history_bytes(take.width, take.height);
+  if (device.read_back || take.each_side == 0 || averaged <= device.bytes) return;
+  throw Error("quality.neighbours = " + std::to_string(take.each_side) +
+              ": to average a picture of " + size_words(take.width, take.height) + " takes " +
+              gigabytes(averaged) + " of the graphics card's memory, and there is " +
+              gigabytes(device.bytes) + smaller +
+              ", or let every frame stand alone (--neighbours 0)");
+}
+
+MemoryPlan plan_memory(const TakeOfPictures& take, const PictureMemory& device,
+                       std::optional<std::uint64_t> asked, std::uint64_t free_bytes) {
+  constexpr std::uint64_t most_unasked = 4'000'000'000;
+  const TakeMemory needed = take_memory(take, device);
+  const std::uint64_t allowed = asked.value_or(free_bytes / 10 * 9);
+  if (needed.whole() <= (asked ? allowed : std::min(allowed, most_unasked))) return {};
+  const std::uint64_t least = needed.rest + std::min(least_resident, needed.banded);
+  if (least > allowed)
+    throw Error("pictures of " + size_words(take.width, take.height) + " take at least " +
+                gigabytes(least) + " of the computer's memory, and " + gigabytes(allowed) +
+                (asked ? " are allowed" + std::string(smaller) + ", or allow more (--memory)"
+                       : " are free" + std::string(smaller)));
+  return {.in_scratch = true, .resident = std::min(allowed - needed.rest, most_resident)};
 }
 
 }  // namespace previz::render

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "drivers/calibration.hpp"
 
@@ -20,6 +21,7 @@ struct PictureMemory {
   std::uint64_t bytes = 0;
   std::uint64_t pixels = 0;  // the most that the device can address
   bool read_back = false;    // layers that are read back lie in the same memory
+  bool in_scratch = false;   // what is worked on in bands lies in files (scratch.hpp)
 };
 
 // Returns how many bytes are taken by the sums of every pixel, the plate, the camera's rays and a
@@ -37,30 +39,37 @@ inline void refuse_too_large(const PinholeIntrinsics& picture, const PictureMemo
 // (daemon/core/render/passes/history.hpp), where meshes deform.
 std::uint64_t history_bytes(int width, int height);
 
-// Offline, a picture is averaged with so many frames on each side, as far as the take has them.
-struct Averaging {
-  int each_side = 0;
-  std::uint64_t take_frames = 0;
-
-  std::uint64_t frames() const;  // those that one picture is averaged from
+// The pictures of a take that is rendered.
+struct TakeOfPictures {
+  int width = 0, height = 0;
+  int each_side = 0;  // the frames on each side with which a picture is averaged, as far
+                      // as there are so many
+  std::uint64_t take_frames = 0;  // that the take has
+  int parts = 1;                  // in which a frame's samples are summed (part_count())
 };
 
-// Returns how many bytes of the computer's memory averaging takes: for the frames that are kept
-// (Renderer::keep()), and for the layers of those that wait for the frames after them, or to be
-// written.
-std::uint64_t kept_bytes(int width, int height, const Averaging& averaging);
+// What rendering them takes of the computer's memory, in bytes.
+struct TakeMemory {
+  std::uint64_t banded = 0;  // what is worked on in bands, and can lie in scratch files
+  std::uint64_t rest = 0;    // all else
+  std::uint64_t whole() const { return banded + rest; }
+};
+TakeMemory take_memory(const TakeOfPictures& take, const PictureMemory& device);
 
-// Throws previz::Error, with the memory that averaging takes, the memory there is and what would
-// fit, where kept_bytes() are more than `free_bytes`, those that are free in the computer's memory,
-// or where the device has no room for a picture and its history. With `memory.read_back` both lie
-// in the computer's memory. A picture that is too large by itself is refused as such.
-void refuse_too_many_neighbours(int width, int height, const Averaging& averaging,
-                                const PictureMemory& memory, std::uint64_t free_bytes);
+// Throws previz::Error where the memory of a graphics card has no room for a picture and its
+// history. A picture that is too large by itself is refused as such.
+void refuse_too_large(const TakeOfPictures& take, const PictureMemory& device);
 
-// Returns how many bytes of the computer's memory the sums of a picture's parts take, where its
-// samples are summed in this many (SumTree): one for each level of the tree.
-std::uint64_t part_bytes(int width, int height, int parts);
-// Throws previz::Error where they are more than `free_bytes`.
-void refuse_too_many_parts(int width, int height, int parts, std::uint64_t free_bytes);
+// How a render keeps to the memory that it may take.
+struct MemoryPlan {
+  bool in_scratch = false;     // what is banded lies in scratch files,
+  std::uint64_t resident = 0;  // of which so many bytes stay in memory
+};
+// Takes scratch files where the whole would be more than the `asked` bytes; nobody has asked: more
+// than 4 GB or nine tenths of what is free. What is free beyond that holds the files all the same,
+// as the kernel's cache, which others can have at any time. Throws previz::Error where even the
+// rest is more than was asked, or than nine tenths of what is free.
+MemoryPlan plan_memory(const TakeOfPictures& take, const PictureMemory& device,
+                       std::optional<std::uint64_t> asked, std::uint64_t free_bytes);
 
 }  // namespace previz::render

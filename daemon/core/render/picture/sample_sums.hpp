@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "daemon/core/render/picture/layers.hpp"
+#include "daemon/core/render/picture/scratch.hpp"
 #include "drivers/calibration.hpp"
 #include "shaders/lib/render_shared.h"
 
@@ -45,10 +46,14 @@ SampleSpan samples_of(SampleRange range, int samples);
 
 // The sums of a picture's pixels, row-major.
 struct PixelSums {
-  std::vector<gpu::GpuPixel> pixels;
+  PixelSums() = default;
+  explicit PixelSums(const std::shared_ptr<Scratch>& scratch)
+      : pixels(scratch), caustics(scratch) {}
+
+  Sheet<gpu::GpuPixel> pixels;
   // Sum of what photons bring to the change (shaders/README.md, "Denoising"); empty: there are no
   // photons.
-  std::vector<glm::vec4> caustics;
+  Sheet<glm::vec4> caustics;
 };
 
 // The sums of some samples of a frame.

@@ -27,7 +27,7 @@ const char* name_of(View view) {
 
 Plate picture_of(View view, const Layers& layers, const lighting::Response& response,
                  double exposure) {
-  const auto radiance = [&](const std::vector<glm::vec3>& layer, double gain, double offset) {
+  const auto radiance = [&](const Sheet<glm::vec3>& layer, double gain, double offset) {
     return Signal([&layer, &response, exposure, gain, offset](std::size_t i, int c) -> double {
       return response.forward(offset + gain * exposure * static_cast<double>(layer[i][c]));
     });

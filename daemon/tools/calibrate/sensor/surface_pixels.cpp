@@ -203,7 +203,7 @@ void SurfaceProbe::render(render::Renderer& renderer, const ProbedShot& shot, in
 }
 
 void SurfaceProbe::add_pixels(const Plate& full, const ProbedShot& small,
-                              const std::vector<glm::vec3>& identity) {
+                              const render::Sheet<glm::vec3>& identity) {
   const Plate& plate = *small.plate;
   const lighting::Response response(take_.observer.response, plate.bits);
   const std::vector<bool> blind = blinded(full, plate.width, plate.height);
@@ -244,7 +244,7 @@ SurfacePixels SurfaceProbe::compare(const scene::Scene& scene, int samples) {
   for (std::size_t i = 0; i < shots_.size(); ++i) {
     worlds_.set_environment(shots_[i].light->lighting.environment, take_.set.lighting.sampling);
     render(worlds_, shots_[i], samples);
-    const std::vector<glm::vec3> rendered = worlds_.layers().real;
+    const render::Sheet<glm::vec3> rendered = worlds_.layers().real;
     for (; next < places_.size() && seen.pixels[next].frame == i; ++next)
       seen.pixels[next].rendered = glm::dvec3(rendered[places_[next]]);
   }

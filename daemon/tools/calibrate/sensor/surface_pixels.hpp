@@ -100,7 +100,7 @@ class SurfaceProbe {
 
  private:
   void add_pixels(const Plate& full, const ProbedShot& small,
-                  const std::vector<glm::vec3>& identity);
+                  const render::Sheet<glm::vec3>& identity);
   void render(render::Renderer& renderer, const ProbedShot& shot, int samples);
 
   const pipeline::Take& take_;
