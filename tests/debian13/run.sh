@@ -9,41 +9,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 root=build/debian13/root build=build/debian13/build
 targets=("$@")
-
-if [[ $EUID -ne 0 ]]; then
-  echo "debian13: run it as root, which it needs for mounts and chroot" >&2
-  exit 1
-fi
-for tool in mmdebstrap unshare; do
-  command -v "$tool" >/dev/null && continue
-  echo "debian13: $tool is missing; apt-get install mmdebstrap util-linux" >&2
-  exit 1
-done
-
-if [[ ! -e $root/etc/debian_version ]]; then
-  # shellcheck disable=SC2016  # the format is apt's
-  mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Label: Debian' | head -n 1)
-  [[ -n $mirror ]] || { echo "debian13: the package sources have no archive of Debian" >&2; exit 1; }
-  rm -rf "$root.part"
-  mkdir -p build/debian13
-  mmdebstrap --quiet --variant=minbase --aptopt='APT::Install-Recommends "false"' \
-    --include=ca-certificates trixie "$root.part" "deb $mirror trixie main"
-  mv "$root.part" "$root"
-fi
-
-# Runs a command in it, with the project at its own path. The mounts are in a namespace of their own
-# and end with the command.
-inside() {
-  # shellcheck disable=SC2016  # the inner shell expands them
-  unshare --mount bash -ec '
-    root=$1 project=$2
-    mkdir -p "$root$project"
-    mount --bind "$project" "$root$project"
-    mount --rbind /dev "$root/dev"
-    mount -t proc proc "$root/proc"
-    mount -t tmpfs run "$root/run"
-    exec chroot "$root" env --chdir="$project" HOME=/root "${@:3}"' - "$root" "$PWD" "$@"
-}
+inside() { tests/debian13/inside.sh "$@"; }
 
 inside config/install-deps.sh
 inside git config --global --replace-all safe.directory '*'
