@@ -1,6 +1,7 @@
 #include "tests/truth/truth_set.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -268,6 +269,18 @@ void load_observer_frames(const Node& observer, TruthSet& set) {
             [](const auto& a, const auto& b) { return a.timestamp_ns < b.timestamp_ns; });
 }
 
+// The frames of a set that has poses alone.
+void list_poses(const Node& observer, TruthSet& set) {
+  set.has_pictures = false;
+  for (const auto& [name, pose] : observer["poses_world_from_camera"].members()) {
+    ObserverFrame& frame = set.frames.emplace_back();
+    std::from_chars(name.data(), name.data() + name.size(), frame.index);
+    if (name != frame_name(frame.index)) pose.fail("is not of a frame, whose names are as '0000'");
+    frame.world_from_camera = pose.pose();
+    set.truth_frames.push_back(frame.index);
+  }
+}
+
 void load_light_frames(TruthSet& set) {
   const fs::path csv = set.directory / "light" / "light.csv";
   if (!fs::exists(csv)) {
@@ -329,6 +342,20 @@ std::vector<RelitLamp> parse_relit(const Node& relit) {
   return lamps;
 }
 
+std::vector<set::Light> parse_lamps(const Node& lamps) {
+  std::vector<set::Light> lights;
+  for (const Node& node : lamps.list()) {
+    set::Light& light = lights.emplace_back();
+    light.name = "lamp " + std::to_string(lights.size());
+    light.type = set::LightType::sphere;
+    light.position = node["position"].vector();
+    light.radius_m = node["radius_m"].number_above_zero();
+    light.emission = node["radiance"].vector();
+    light.gain_real = 1;
+  }
+  return lights;
+}
+
 }  // namespace
 
 std::string frame_name(int frame) {
@@ -354,7 +381,10 @@ TruthSet load_truth_set(const fs::path& directory) {
   const Node observer = root["observer"];
   set.observer = parse_observer(observer);
   set.exposure = observer["exposure"].number_above_zero();
-  load_observer_frames(observer, set);
+  if (root.has("truth"))
+    load_observer_frames(observer, set);
+  else
+    list_poses(observer, set);
   if (root.has("tags")) {
     const Node tags = root["tags"];
     set.tag_family = tags["family"].text();
@@ -368,7 +398,8 @@ TruthSet load_truth_set(const fs::path& directory) {
   set.phantom = directory / root["gltf"]["phantom"].text();
   set.virtual_objects = directory / root["gltf"]["virtual"].text();
   if (root.has("relit")) set.relit = parse_relit(root["relit"]);
-  load_truth_list(root["truth"], set);
+  if (root.has("lamps")) set.lamps = parse_lamps(root["lamps"]);
+  if (root.has("truth")) load_truth_list(root["truth"], set);
   if (set.truth_frames.empty())
     throw Error(file.string() + ": no frame has both truth and picture");
   return set;
@@ -398,6 +429,7 @@ set::Set set_of(const TruthSet& truth) {
   };
   add("phantom", truth.phantom, set::Presence::phantom);
   add("virtual", truth.virtual_objects, set::Presence::virtual_object);
+  set.lights = truth.lamps;
   set.lighting.environment = truth.environment;
   set.lighting.environment_as_written = truth.environment.string();
   return set;

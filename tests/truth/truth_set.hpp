@@ -15,8 +15,8 @@
 namespace previz::truth {
 
 struct ObserverFrame {
-  int index = 0;  // the set's own number; truth frames are named by it
-  std::filesystem::path file;
+  int index = 0;               // the set's own number; truth frames are named by it
+  std::filesystem::path file;  // empty in a set without pictures
   std::int64_t timestamp_ns = 0;
   glm::dmat4 world_from_camera{1.0};
 };
@@ -50,7 +50,10 @@ struct TruthSet {
   std::vector<LightFrame> light_frames;  // auto and brackets, by time; no sequence with other light
   std::filesystem::path environment, phantom, virtual_objects;
   std::vector<RelitLamp> relit;   // the truth has these changes
-  std::vector<int> truth_frames;  // those whose truth and observer picture are there
+  std::vector<set::Light> lamps;  // real ones
+  bool has_pictures = true;
+  // Those whose truth and observer picture are there; in a set without pictures all.
+  std::vector<int> truth_frames;
   std::map<int, TruthStatistics> statistics;
   std::vector<std::string> notes;  // what was left out and why, in plain words
 };

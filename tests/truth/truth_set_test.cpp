@@ -109,6 +109,20 @@ TEST_F(ChangedSet, MayBeOfAPinholeWithoutLightCameraTagsOrStatistics) {
   EXPECT_THROW(write_take(set, {LightFrom::truth, PoseFrom::tracked}, directory_ / "b"), Error);
 }
 
+TEST_F(ChangedSet, MayHaveLampsAndNoPictures) {
+  json_["lamps"] = {{{"position", {1, 2, 3}}, {"radius_m", 0.05}, {"radiance", {9, 8, 7}}}};
+  json_.erase("truth");
+  json_["observer"].erase("timestamps");
+  const TruthSet set = load();
+  EXPECT_FALSE(set.has_pictures);
+  EXPECT_EQ(set.truth_frames.size(), json_["observer"]["poses_world_from_camera"].size());
+  const std::vector<set::Light> lamps = set_of(set).lights;
+  ASSERT_EQ(lamps.size(), 1u);
+  EXPECT_EQ(lamps[0].position, glm::dvec3(1, 2, 3));
+  EXPECT_EQ(lamps[0].emission, glm::dvec3(9, 8, 7));
+  EXPECT_EQ(lamps[0].gain_real, 1) << "a real lamp shines in both worlds";
+}
+
 TEST_F(ChangedSet, RefusalsNameFileAndKey) {
   json_["observer"]["exposure"] = 0;
   EXPECT_THAT(refusal(), HasSubstr("set.json: set.observer.exposure: must be above 0"));
