@@ -6,7 +6,10 @@
 Real objects are shadow catchers, virtual ones ordinary objects; materials, light, camera and pixel
 filter are those of set.json (see ../../truth/README.md), but for the lens's distortion, which Cycles
 does not have. Nothing that would bias the picture is on: no clamping, no glossy filter, no denoiser,
-no adaptive sampling; caustics are traced, as deep as the set's truth.
+no adaptive sampling; caustics are traced, as deep as the set's truth. What does not bias it is as
+Blender has it by default, as the light tree and the pattern of samples are.
+
+Works in Blender 3.4 (Debian 12) and 4.3 (Debian 13).
 
 Writes DIR/SAMPLES.exr (multi-layer: Combined, Shadow Catcher) and DIR/renders.csv with the CPU
 seconds of all threads of each render. A render before them builds what they share.
@@ -25,8 +28,12 @@ import mathutils
 import numpy
 
 # Debian 12's glTF importer names a type that Debian 12's numpy no longer has.
-numpy.bool = bool
+if not hasattr(numpy, "bool"):
+    numpy.bool = bool
 
+IS_BEFORE_4 = bpy.app.version < (4, 0)
+MIRROR = "SHARP" if IS_BEFORE_4 else "GGX"  # of roughness 0
+LINEAR = "Linear" if IS_BEFORE_4 else "Linear Rec.709"
 BOUNCES = 16  # of the truth's
 
 
@@ -69,13 +76,19 @@ class Shader:
             self.connect(socket, value)
         return node.outputs[0]
 
+    def mix(self, share, without, whole):
+        node = self.node("ShaderNodeMixShader")
+        for socket, value in zip(node.inputs, (share, without, whole)):
+            self.connect(socket, value)
+        return node.outputs[0]
+
     def output(self, surface):
         self.node("ShaderNodeOutputMaterial", Surface=surface)
 
 
 def glossy(shader, color, roughness):
     node = shader.node("ShaderNodeBsdfGlossy", Color=color, Roughness=roughness)
-    node.distribution = "GGX" if roughness > 0 else "SHARP"
+    node.distribution = "GGX" if roughness > 0 else MIRROR
     return node.outputs[0]
 
 
@@ -91,39 +104,43 @@ def schlick_color(shader, f0):
     return mix.outputs[0]
 
 
-def base_color(shader, spec, imported_image):
-    if "tex" not in spec:
-        return (*spec["albedo"], 1)
+def image_texture(shader, spec, image):
     texture = shader.node("ShaderNodeTexImage")
-    texture.image = imported_image
+    texture.image = image
     texture.interpolation = "Closest" if spec.get("nearest") else "Linear"
-    return texture.outputs["Color"]
+    return texture
+
+
+def surface_of(shader, spec, color):
+    kind = spec["type"]
+    if kind == "diffuse":
+        return shader.node("ShaderNodeBsdfDiffuse", Color=color).outputs[0]
+    if kind == "metal":
+        return glossy(shader, schlick_color(shader, color), spec.get("roughness", 0))
+    if kind == "glass":
+        node = shader.node("ShaderNodeBsdfGlass", Color=color, Roughness=0.0, IOR=spec["ior"])
+        node.distribution = MIRROR
+        return node.outputs[0]
+    if kind == "plastic":
+        fresnel = shader.node("ShaderNodeFresnel", IOR=spec.get("ior", 1.5))
+        diffuse = shader.node("ShaderNodeBsdfDiffuse", Color=color)
+        return shader.mix(fresnel.outputs[0], diffuse.outputs[0],
+                          glossy(shader, (1, 1, 1, 1), spec["roughness"]))
+    raise ValueError(f"set.json: material type '{kind}' is not known here")
 
 
 def build_material(material, spec):
     """The surface that set.json describes, in place of what the importer made of the glTF."""
     images = [n.image for n in material.node_tree.nodes if n.type == "TEX_IMAGE"]
     shader = Shader(material)
-    color = base_color(shader, spec, images[0] if images else None)
-    kind = spec["type"]
-    if kind == "diffuse":
-        shader.output(shader.node("ShaderNodeBsdfDiffuse", Color=color).outputs[0])
-    elif kind == "metal":
-        shader.output(glossy(shader, schlick_color(shader, color), spec.get("roughness", 0)))
-    elif kind == "glass":
-        node = shader.node("ShaderNodeBsdfGlass", Color=color, Roughness=0.0, IOR=spec["ior"])
-        node.distribution = "SHARP"
-        shader.output(node.outputs[0])
-    elif kind == "plastic":
-        mix = shader.node("ShaderNodeMixShader")
-        fresnel = shader.node("ShaderNodeFresnel", IOR=spec.get("ior", 1.5))
-        diffuse = shader.node("ShaderNodeBsdfDiffuse", Color=color)
-        shader.connect(mix.inputs[0], fresnel.outputs[0])
-        shader.connect(mix.inputs[1], diffuse.outputs[0])
-        shader.connect(mix.inputs[2], glossy(shader, (1, 1, 1, 1), spec["roughness"]))
-        shader.output(mix.outputs[0])
-    else:
-        raise ValueError(f"set.json: material type '{kind}' is not known here")
+    texture = image_texture(shader, spec, images[0]) if images else None
+    color = texture.outputs["Color"] if "tex" in spec else (*spec["albedo"], 1)
+    surface = surface_of(shader, spec, color)
+    if "alpha_cutoff" in spec:
+        is_hole = shader.math("LESS_THAN", texture.outputs["Alpha"], spec["alpha_cutoff"])
+        hole = shader.node("ShaderNodeBsdfTransparent").outputs[0]
+        surface = shader.mix(is_hole, surface, hole)
+    shader.output(surface)
 
 
 def import_objects(file, is_real):
@@ -142,11 +159,27 @@ def build_world(file):
     shader = Shader(world)
     texture = shader.node("ShaderNodeTexEnvironment")
     texture.image = bpy.data.images.load(str(file))
-    texture.image.colorspace_settings.name = "Linear"
+    texture.image.colorspace_settings.name = LINEAR
     background = shader.node("ShaderNodeBackground", Color=texture.outputs["Color"])
     shader.node("ShaderNodeOutputWorld", Surface=background.outputs[0])
     world.cycles.sampling_method = "MANUAL"
     world.cycles.sample_map_resolution = texture.image.size[0]
+
+
+def build_lamp(lamp):
+    """A sphere of uniform radiance. Blender counts its watts as those of a Lambertian sphere's
+    surface, its radiance being their number / (4 pi^2 radius^2)."""
+    brightest = max(lamp["radiance"])
+    data = bpy.data.lights.new("lamp", "POINT")
+    data.shadow_soft_size = lamp["radius_m"]
+    data.energy = 4 * math.pi**2 * lamp["radius_m"] ** 2 * brightest
+    data.color = [channel / brightest for channel in lamp["radiance"]]
+    if not IS_BEFORE_4:
+        data.use_soft_falloff = False
+    light = bpy.data.objects.new("lamp", data)
+    light.location = lamp["position"]
+    light.is_shadow_catcher = True  # real: it shines on the catchers alone, too
+    bpy.context.scene.collection.objects.link(light)
 
 
 def build_camera(observer, frame, scale):
@@ -162,7 +195,7 @@ def build_camera(observer, frame, scale):
     # aside.
     data.shift_x = ((width - 1) / 2 - cx) / width
     data.shift_y = (cy - (height - 1) / 2) / width * fx / fy
-    lens = observer["lens"]
+    lens = observer.get("lens")
     if lens:
         data.dof.use_dof = True
         data.dof.focus_distance = lens["focus_distance_m"]
@@ -234,6 +267,8 @@ def main():
     for material in bpy.data.materials:
         # A name that both files have comes a second time as NAME.001.
         build_material(material, description["gltf"]["materials"][material.name.split(".")[0]])
+    for lamp in description.get("lamps", []):
+        build_lamp(lamp)
     build_world(options.directory / description["env"]["file"])
     build_camera(observer, options.frame, options.width / observer["width"])
     configure_cycles(options.threads)

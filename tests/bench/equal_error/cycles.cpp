@@ -6,10 +6,12 @@
 #include <ImfInputFile.h>
 
 #include <array>
+#include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <fstream>
 #include <glm/vec4.hpp>
+#include <memory>
 #include <sstream>
 
 #include "drivers/error.hpp"
@@ -76,12 +78,22 @@ Passes read_passes(const fs::path& path, int width, int height) {
 
 }  // namespace
 
+std::string blender_version(const std::string& blender) {
+  const std::unique_ptr<std::FILE, int (*)(std::FILE*)> out(
+      popen((blender + " --version").c_str(), "r"), pclose);
+  std::array<char, 256> line{};
+  if (!out || std::fgets(line.data(), line.size(), out.get()) == nullptr)
+    throw Error("'" + blender + "' does not run");
+  const std::string version = line.data();
+  return version.substr(0, version.find_last_not_of(" \n") + 1);
+}
+
 std::vector<CyclesRender> render_with_cycles(const CyclesOptions& options,
                                              const std::vector<int>& samples, std::uint32_t seed,
                                              const fs::path& directory) {
   fs::create_directories(directory);
   std::ostringstream command;
-  command << "blender --background --factory-startup --python-exit-code 1 --python "
+  command << options.blender << " --background --factory-startup --python-exit-code 1 --python "
           << quoted(options.script) << " -- --set " << quoted(options.set) << " --frame "
           << options.frame << " --width " << options.width << " --seed " << seed << " --threads "
           << options.threads << " --out " << quoted(directory) << " --samples ";
@@ -107,7 +119,7 @@ truth::EstimatedFrame read_shadow_catcher(const fs::path& file, const truth::Tru
     const glm::vec3 caught = plate.plate[i] * passes.ratio[i];
     estimate.mask.push_back(mask);
     estimate.diff.push_back(caught - plate.plate[i]);
-    estimate.mixed.push_back(mask > 0 ? glm::vec3(passes.combined[i]) / mask : caught);
+    estimate.mixed.push_back(glm::vec3(passes.combined[i]) + (1 - mask) * caught);
   }
   return estimate;
 }
