@@ -121,6 +121,9 @@ TEST_F(ChangedSet, MayHaveLampsAndNoPictures) {
   EXPECT_EQ(lamps[0].position, glm::dvec3(1, 2, 3));
   EXPECT_EQ(lamps[0].emission, glm::dvec3(9, 8, 7));
   EXPECT_EQ(lamps[0].gain_real, 1) << "a real lamp shines in both worlds";
+  EXPECT_THAT(test::error_of([&] { write_take(set, {}, directory_ / "take"); }),
+              HasSubstr("has no pictures"));
+  EXPECT_THAT(set_file_text(set, {}), HasSubstr("type = \"sphere\"\nposition = [1."));
 }
 
 TEST_F(ChangedSet, RefusalsNameFileAndKey) {

@@ -62,6 +62,7 @@ void stamp(Frame& frame, std::uint64_t sequence, std::int64_t timestamp_ns, doub
 
 void require(const TruthSet& set, const TakeOptions& options) {
   const std::string where = set.directory.string() + ": ";
+  if (!set.has_pictures) throw Error(where + "has no pictures, which a session is made of");
   if (options.pose == PoseFrom::tracked && set.tags.empty()) {
     throw Error(where + "has no tags, so the pose cannot be tracked (use --pose truth)");
   }
@@ -111,6 +112,11 @@ std::string set_file_text(const TruthSet& set, const TakeOptions& options) {
     out << "[[captured_light]]\nname = \"lamp " << i << "\"\ndirection = " << row(lamp.direction)
         << "\ncone_deg = " << cone_deg << "\ntint = " << row(lamp.gain_mixed) << "\n\n";
   }
+  for (const set::Light& lamp : set.lamps)
+    out << "[[light]]\nname = " << quoted(lamp.name)
+        << "\ntype = \"sphere\"\nposition = " << row(lamp.position)
+        << "\nradius_m = " << lamp.radius_m << "\nemission = " << row(lamp.emission)
+        << "\ngain_real = 1\n\n";
   out << "[lighting]\n";
   if (options.light == LightFrom::truth) {
     out << "environment = " << quoted(as_written(set.environment)) << "\n";

@@ -296,10 +296,10 @@ def interior():
                for i, (x, y) in enumerate([(-0.7, 0.45), (0.7, 0.45), (-0.7, 1.15), (0.7, 1.15)])]]
     virtual = [("knot", knot((-0.2, 0.8, 0.96), 0.24, 0.055), "clay"),
                ("box", box((0.42, 0.75, 0.87), (0.22, 0.22, 0.25), 30), "blue"),
-               ("ball", ball((1.1, 0.2, 0.3), 0.3), "clay")]
+               ("ball", ball((-1.3, 1.65, 0.35), 0.35), "clay")]
     materials = {"wall": diffuse(0.7, 0.68, 0.63), "boards": diffuse(0.35, 0.25, 0.17),
                  "table": diffuse(0.5, 0.4, 0.3), "clay": diffuse(0.65, 0.35, 0.22), "blue": diffuse(0.15, 0.25, 0.55)}
-    return {"camera": camera((0.9, -1.9, 1.6), (0.15, 0.7, 0.7), 55, 1.0), "materials": materials,
+    return {"camera": camera((0.7, -0.9, 1.45), (0.0, 0.75, 0.82), 55, 1.0), "materials": materials,
             "real": real, "virtual": virtual, "env": sky((3, 4, 6), (6, 6, 6), (1.2, 1.1, 0.9))}
 
 
