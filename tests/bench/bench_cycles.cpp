@@ -235,8 +235,8 @@ void Comparison::print_agreement(const Contestant& cycles) const {
 
 // Means of `factor`^2 pixels.
 template <class T>
-std::vector<T> reduced(const std::vector<T>& picture, int width, int height, int factor) {
-  std::vector<T> out;
+render::Sheet<T> reduced(const render::Sheet<T>& picture, int width, int height, int factor) {
+  render::Sheet<T> out;
   for (int y = 0; y < height; y += factor)
     for (int x = 0; x < width; x += factor) {
       T sum(0);

@@ -15,8 +15,8 @@ truth::EstimatedFrame rendered(MethodRun& run, std::uint32_t seed, int samples) 
 }
 
 template <class T>
-std::vector<T> middle(const std::vector<T>& a, const std::vector<T>& b) {
-  std::vector<T> result;
+render::Sheet<T> middle(const render::Sheet<T>& a, const render::Sheet<T>& b) {
+  render::Sheet<T> result;
   for (std::size_t i = 0; i < a.size(); ++i) result.push_back(0.5f * (a[i] + b[i]));
   return result;
 }
@@ -27,7 +27,7 @@ Reference reference_of(truth::TruthFrame frame, const truth::EstimatedFrame& a,
                        const truth::EstimatedFrame& b) {
   Reference reference{std::move(frame), {}};
   truth::TruthFrame& r = reference.frame;
-  const std::vector<glm::vec3> diff = middle(a.diff, b.diff);
+  const render::Sheet<glm::vec3> diff = middle(a.diff, b.diff);
   r.mask = middle(a.mask, b.mask);
   r.mixed = middle(a.mixed, b.mixed);
   r.real = r.plate;
