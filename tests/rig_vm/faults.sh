@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Brings one fault after another upon the rig in a VM, as tests/rig_vm/run.sh BUILD faults [FAULT]... does.
-#   faults.sh GUEST BUILD PREVIZD.deb [FAULT]...
+#   faults.sh GUEST BUILD PREVIZD.deb PREVIZ-TOOLS.deb [FAULT]...
 # Prints one line a fault: whether the rig held, what was promised, and what was found; without a FAULT
 # all of faults_in_guest.sh. Ends with 0 only if all held. Every fault meets the same rig, with the package
 # installed and its pictures running: it is prepared once, and again when the package or what prepares it
@@ -10,9 +10,9 @@ set -uo pipefail
 cd "$(dirname "$0")/../.." || exit
 here=tests/rig_vm
 limit_s=900 # for one fault; ten kills and starts take half of it
-guest=$(realpath "$1") build=$2 deb=$3
+guest=$(realpath "$1") build=$2 deb=$3 tools_deb=$4
 known=$(sed -n 's/^promise\[\([a-z_]*\)\]=.*/\1/p' $here/faults_in_guest.sh)
-faults=("${@:4}")
+faults=("${@:5}")
 [[ ${#faults[@]} -gt 0 ]] || mapfile -t faults <<<"$known"
 for fault in "${faults[@]}"; do
   grep -qx "$fault" <<<"$known" && continue

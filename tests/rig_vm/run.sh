@@ -77,7 +77,7 @@ run_part() {
 
 for part in "${parts[@]}"; do
   if [[ $part == faults ]]; then
-    "$here/faults.sh" "$guest" "$build" "$deb" "${faults[@]}"
+    "$here/faults.sh" "$guest" "$build" "$deb" "$tools_deb" "${faults[@]}"
     continue
   fi
   share=out/rig_vm/$part
