@@ -12,6 +12,7 @@ bool reads_storage() { return (DEVICE & DEVICE_READS_STORAGE) != 0u; }
 #define PREVIZ_TEXELS_float textureBuffer
 #define PREVIZ_TEXELS_vec2 textureBuffer
 #define PREVIZ_TEXELS_vec4 textureBuffer
+#define PREVIZ_TEXELS_uint utextureBuffer
 #define PREVIZ_TEXELS_uvec2 utextureBuffer
 #define PREVIZ_TEXELS_uvec4 utextureBuffer
 

@@ -1,7 +1,7 @@
 #!/bin/sh
 # All benchmarks of a build: run.sh BUILD_DIR OUT_DIR [SETDIR...]. Writes rays.md, instances.md,
 # move.md, deform.md, guides.md, hard.md, and where ground truth sets are given equal_error.md and tracking.md.
-# Beside Cycles: cycles/run. A live frame by its size, samples, triangles and passes: `previzd bench`.
+# Beside Cycles: cycles/run. In memory and in scratch files: memory/run. A live frame by its size, samples, triangles and passes: `previzd bench`.
 set -eu
 if [ $# -lt 2 ]; then
   echo "usage: $0 BUILD_DIR OUT_DIR [SETDIR...]" >&2

@@ -41,7 +41,7 @@ inline Plate present(std::span<const gpu::GpuPixel> pixels, const Plate& plate,
   render::Buffer codes;
   std::vector<std::uint16_t> padded = plate.samples;
   padded.resize((padded.size() + 2) / 2 * 2);
-  render::upload_storage(*shared_device(), purpose, codes, padded);
+  render::upload_texels(*shared_device(), purpose, codes, padded, vk::Format::eR32Uint);
   const bool has_plate = !plate.samples.empty();
   const bool is_clipped =
       has_plate && *std::ranges::max_element(plate.samples) >= response.clipping().from;

@@ -164,7 +164,7 @@ std::optional<LampHit> meet_lamp(const set::Light& light, const Ray& ray) {
 
 EmissiveMeshes::EmissiveMeshes(const scene::Scene& scene, const Geometry& geometry,
                                std::uint32_t world)
-    : scene_(scene), geometry_(geometry), first_entry_(scene.instances.size(), -1) {
+    : geometry_(geometry), first_entry_(scene.instances.size(), -1) {
   double sum = 0;
   for (std::uint32_t i = 0; i < scene.instances.size(); ++i) {
     const scene::Instance& instance = scene.instances[i];

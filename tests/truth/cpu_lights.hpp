@@ -51,7 +51,6 @@ class EmissiveMeshes {
   double area_pdf(std::uint32_t instance, std::uint32_t triangle) const;
 
  private:
-  const scene::Scene& scene_;
   const Geometry& geometry_;
   struct Entry {
     std::uint32_t instance, triangle;

@@ -143,7 +143,8 @@ void write_sums_exr(const std::filesystem::path& path, const RangeSums& sums) {
   exr_draft(path, header, channels).put();
 }
 
-RangeSums read_sums_exr(const std::filesystem::path& path) {
+RangeSums read_sums_exr(const std::filesystem::path& path,
+                        const std::shared_ptr<render::Scratch>& scratch) {
   const box::Reading reading(path);
   try {
     require_exr(path);
@@ -153,6 +154,7 @@ RangeSums read_sums_exr(const std::filesystem::path& path) {
     RangeSums result;
     read_attributes(path, file.header(), result);
     render::SampleSums& sums = result.sums;
+    sums.sums = render::PixelSums(scratch);
     sums.width = file.header().dataWindow().max.x + 1;
     sums.height = file.header().dataWindow().max.y + 1;
     sums.sums.pixels.resize(pixels);

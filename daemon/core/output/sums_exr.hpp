@@ -28,6 +28,7 @@ void write_sums_exr(const std::filesystem::path& path, const RangeSums& sums);
 
 // Reads a file that write_sums_exr() wrote. Throws previz::Error naming the file, and the channel
 // or attribute that is missing or cannot be understood.
-RangeSums read_sums_exr(const std::filesystem::path& path);
+RangeSums read_sums_exr(const std::filesystem::path& path,
+                        const std::shared_ptr<render::Scratch>& scratch = {});
 
 }  // namespace previz::output

@@ -99,6 +99,7 @@ void visit_render(Visitor visit, Options& render) {
   visit("denoise", render.denoise);
   visit("neighbours", render.neighbours, 0, 4);
   visit("memory", render.memory);
+  visit("scratch", render.scratch);
   visit("seconds", render.seconds, 0, 86'400);
   visit("seed", render.seed);
   visit("estimator", render.estimator);

@@ -6,6 +6,7 @@
 #include <array>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <iterator>
@@ -65,7 +66,7 @@ std::string percent_words(double share) {
 }
 
 std::string gigabytes(std::uint64_t bytes) {
-  return fmt::format("{:.2g}GB", static_cast<double>(bytes) / 1e9);
+  return fmt::format("{:.1f}GB", std::ceil(static_cast<double>(bytes) / 1e8) / 10);
 }
 
 std::string done_text(const Shot& shot) {
@@ -155,7 +156,7 @@ MadeOn made_on(const render::Device& device) {
 std::optional<render::SampleSums> merged_sums(const Job& job, const Shot& shot,
                                               output::Progress& progress) {
   try {
-    return job.sums->merged(shot.index);
+    return job.sums->merged(shot.index, render::scratch_of(*job.device));
   } catch (const Error& error) {
     progress.note(error.what());
     job.report.failures.emplace_back(error.what());
@@ -258,16 +259,42 @@ render::TakeOfPictures pictures_of(const RenderOptions& options, const pipeline:
           .parts = pipeline::has_fixed_samples(quality) ? render::part_count(quality.samples) : 1};
 }
 
-std::filesystem::path scratch_folder(const RenderOptions& options) {
-  if (!options.scratch.empty()) return options.scratch;
-  const char* const own = std::getenv("TMPDIR");
-  return own && *own != 0 ? own : "/var/tmp";
+// Returns scratch files of so many bytes, for which each folder is tried. Throws previz::Error,
+// with what is wrong with the first, where none can hold them.
+std::shared_ptr<render::Scratch> scratch_files(const RenderOptions& options,
+                                               const render::MemoryPlan& plan,
+                                               const render::TakeMemory& needed,
+                                               std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> folders{"/var/tmp"};
+  if (const char* const own = std::getenv("TMPDIR"); own && *own != 0)
+    folders.insert(folders.begin(), own);
+  if (options.scratch) folders = {*options.scratch};
+  std::string why;
+  for (const std::filesystem::path& tried : folders) {
+    try {
+      auto scratch = std::make_shared<render::Scratch>(tried, plan.resident);
+      folder = tried;
+      const std::uint64_t room = render::Scratch::room(tried);
+      if (needed.banded <= room) return scratch;
+      add_to_list(why,
+                  tried.string() + ": the scratch files of these pictures take " +
+                      gigabytes(needed.banded) + ", and there is room for " + gigabytes(room) +
+                      "; name another folder (--scratch), allow more memory (--memory " +
+                      gigabytes(needed.whole()) + ") or make the pictures smaller (--scale)",
+                  "\n");
+    } catch (const Error& error) {
+      add_to_list(why, error.what(), "\n");
+    }
+  }
+  throw Error(why);
 }
 
 // Lets the device work in scratch files where the pictures need more memory than they may take.
-// Throws previz::Error if that does not suffice, or the files cannot be there.
+// Throws previz::Error if that does not suffice, or the files cannot be there; nobody has asked for
+// a limit, and the memory is free: all stays in memory.
 void keep_to_memory(const RenderOptions& options, const pipeline::Take& take,
                     render::Device& device, std::ostream& out) {
+  render::use_scratch(device, nullptr);  // of another take
   const render::TakeOfPictures pictures = pictures_of(options, take);
   const render::PictureMemory memory = render::memory_of(device);
   const std::uint64_t free_bytes =
@@ -278,18 +305,17 @@ void keep_to_memory(const RenderOptions& options, const pipeline::Take& take,
     asked = static_cast<std::uint64_t>(1e6 * *take.set.quality.memory_mb);
   const render::MemoryPlan plan = render::plan_memory(pictures, memory, asked, free_bytes);
   if (plan.in_scratch) {
-    const std::filesystem::path folder = scratch_folder(options);
-    const std::uint64_t needed = render::take_memory(pictures, memory).banded;
-    const auto scratch = std::make_shared<render::Scratch>(folder, plan.resident);
-    if (const std::uint64_t room = render::Scratch::room(folder); needed > room)
-      throw Error(folder.string() + ": the scratch files of these pictures take " +
-                  gigabytes(needed) + ", and there is room for " + gigabytes(room) +
-                  "; name another folder (--scratch), allow more memory (--memory " +
-                  gigabytes(render::take_memory(pictures, memory).whole()) +
-                  ") or make the pictures smaller (--scale)");
-    render::use_scratch(device, scratch);
-    out << take.session.info.name << ": works in scratch files of up to " << gigabytes(needed)
-        << " in " << folder.string() << std::endl;
+    const render::TakeMemory needed = render::take_memory(pictures, memory);
+    try {
+      std::filesystem::path folder;
+      render::use_scratch(device, scratch_files(options, plan, needed, folder));
+      out << take.session.info.name << ": works in scratch files of up to "
+          << gigabytes(needed.banded) << " in " << folder.string() << std::endl;
+    } catch (const Error& error) {
+      if (asked || options.scratch || needed.whole() > free_bytes / 10 * 9) throw;
+      out << take.session.info.name << ": takes " << gigabytes(needed.whole())
+          << " of memory, because " << error.what() << std::endl;
+    }
   }
   render::refuse_too_large(pictures, render::memory_of(device));
 }

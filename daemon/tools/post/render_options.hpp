@@ -45,8 +45,8 @@ struct RenderOptions {
   bool force = false;  // render frames again that are already there
   render::DeviceOptions device;
   std::optional<std::uint64_t> memory;  // bytes that it may take; absent: quality.memory_mb
-  // For scratch files, where the memory does not suffice; empty: $TMPDIR, or /var/tmp.
-  std::filesystem::path scratch;
+  // For scratch files, where the memory does not suffice; absent: $TMPDIR, or /var/tmp.
+  std::optional<std::filesystem::path> scratch;
   // Bytes of the computer's memory that are free; absent: the kernel is asked.
   std::optional<std::uint64_t> free_memory;
   bool terminal = false;  // `out` is a terminal: progress is one rewritten line

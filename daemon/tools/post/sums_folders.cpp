@@ -57,12 +57,13 @@ SumsFolders::SumsFolders(const std::vector<std::filesystem::path>& folders,
                   "; render them with --sample-range " + range + " and name its folder, too");
 }
 
-render::SampleSums SumsFolders::merged(std::uint64_t frame) const {
+render::SampleSums SumsFolders::merged(std::uint64_t frame,
+                                       const std::shared_ptr<render::Scratch>& scratch) const {
   render::SumTree tree;
   std::tuple<int, int, bool> of_first;  // the size, and whether there are photons
   for (int index = 1; index <= count_; ++index) {
     const render::SampleRange range{index, count_};
-    render::SampleSums sums = sums_of(frame, range);
+    render::SampleSums sums = sums_of(frame, range, scratch);
     const std::tuple own{sums.width, sums.height, !sums.sums.caustics.empty()};
     if (index == 1) of_first = own;
     if (own != of_first)
@@ -74,7 +75,8 @@ render::SampleSums SumsFolders::merged(std::uint64_t frame) const {
   return tree.take();
 }
 
-render::SampleSums SumsFolders::sums_of(std::uint64_t frame, render::SampleRange range) const {
+render::SampleSums SumsFolders::sums_of(std::uint64_t frame, render::SampleRange range,
+                                        const std::shared_ptr<render::Scratch>& scratch) const {
   const std::string what =
       "frame " + std::to_string(frame) + ": sample range " + to_string(range) + ": ";
   const std::string again = "; render it again with --sample-range " + to_string(range) +
@@ -96,7 +98,7 @@ render::SampleSums SumsFolders::sums_of(std::uint64_t frame, render::SampleRange
       why += broken;
       continue;
     }
-    output::RangeSums read = output::read_sums_exr(file);
+    output::RangeSums read = output::read_sums_exr(file, scratch);
     if (read.frame == frame && read.range == range &&
         read.sums.samples == render::samples_of(range, samples_).count)
       return std::move(read.sums);

@@ -25,14 +25,16 @@ class SumsFolders {
   // Returns the sums of all samples of a frame. Throws previz::Error naming frame, range and file
   // where a range is missing, its file is not as it was written (size and SHA-256 in its line), or
   // what it contains does not go together with the other ranges.
-  render::SampleSums merged(std::uint64_t frame) const;
+  render::SampleSums merged(std::uint64_t frame,
+                            const std::shared_ptr<render::Scratch>& scratch = {}) const;
 
  private:
   struct Folder {
     std::filesystem::path path;
     std::map<std::uint64_t, FinishedFrame> frames;
   };
-  render::SampleSums sums_of(std::uint64_t frame, render::SampleRange range) const;
+  render::SampleSums sums_of(std::uint64_t frame, render::SampleRange range,
+                             const std::shared_ptr<render::Scratch>& scratch) const;
 
   const int samples_;
   int count_ = 0;                               // of ranges

@@ -242,12 +242,12 @@ TEST_F(Check, SaysHowMuchMemoryARenderTakes) {
       "[observer.intrinsics]\nwidth=1920\nheight=1080\nfx=1866.0\nfy=1866.0\ncx=959.5\ncy=539.5\n";
   const std::string words = "offline, in the computer's memory: about ";
   ASSERT_EQ(check(lens), 0) << said_;
-  expect_said(words + "2775 MiB, or 560 MiB and scratch files of 2215 MiB");
+  expect_said(words + "2975 MiB, or 578 MiB and scratch files of 2397 MiB");
   ASSERT_EQ(check(lens + "[quality]\nneighbours=1\n"), 0) << said_;
   expect_said("picture in the GPU's memory: about 1169 MiB");
   for (const char* quality : {"neighbours=0\n", "denoise=false\n"}) {
     ASSERT_EQ(check(lens + "[quality]\n" + quality), 0) << said_;
-    expect_said("scratch files of 475 MiB");
+    expect_said("scratch files of 499 MiB");
   }
   expect_said("picture in the GPU's memory: about 837 MiB");
 }

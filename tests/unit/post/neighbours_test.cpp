@@ -147,11 +147,30 @@ TEST_F(RenderNeighbours, WhatDoesNotFitIntoMemoryIsRefusedBeforeAnyFrameIsRender
   RenderOptions options;
   options.memory = 300'000'000;
   EXPECT_THAT(test::error_of([&] { render("out", options); }),
-              HasSubstr("pictures of 48x36 take at least 0.403 GB"));
+              HasSubstr("pictures of 48x36 take at least 0.402 GB"));
   EXPECT_EQ(content_of("out/frames.jsonl"), "");
   options.memory.reset();
   options.free_memory = 300'000'000;
   EXPECT_THAT(test::error_of([&] { render("out", options); }), HasSubstr("0.27 GB are free"));
+}
+
+// Between the two: what is in bands of 48x36 pixels takes 2.7 MB, half of which has to be in
+// memory.
+TEST_F(RenderNeighbours, InScratchFilesArePicturesOfMemory) {
+  render("memory");
+  RenderOptions options;
+  options.memory = 402'600'000;
+  options.scratch = "/var/tmp";  // on a disk, unlike some TMPDIR
+  EXPECT_EQ(render("scratch", options).frames.size(), std::size_t{small_take_frames});
+  for (int frame = 0; frame < small_take_frames; ++frame)
+    for (const char* ending : {".exr", ".png"}) {
+      const std::string name = "/000" + std::to_string(frame) + ending;
+      EXPECT_EQ(content_of("memory" + name), content_of("scratch" + name)) << name;
+    }
+  EXPECT_THAT(content_of("scratch/frames.jsonl"), HasSubstr("\"peak_memory_bytes\":"));
+  options.scratch = "/dev/shm";
+  EXPECT_THAT(test::error_of([&] { render("out", options); }),
+              HasSubstr("/dev/shm: cannot hold the scratch files of a render: it lies in the"));
 }
 
 TEST_F(RenderNeighbours, TheSetMayAskForUpToFour) {

@@ -14,6 +14,28 @@ std::shared_ptr<render::Scratch> scratch() {
   return std::make_shared<render::Scratch>(folder, 0);
 }
 
+// Returns the bytes of the mapping at this address that the process has in memory.
+std::uint64_t resident_at(const void* address) {
+  std::ifstream maps("/proc/self/smaps");
+  bool is_it = false;
+  for (std::string line; std::getline(maps, line);) {
+    std::uint64_t begin = 0, end = 0, kib = 0;
+    if (std::sscanf(line.c_str(), "%lx-%lx ", &begin, &end) == 2)
+      is_it = begin == reinterpret_cast<std::uintptr_t>(address);
+    else if (is_it && std::sscanf(line.c_str(), "Rss: %lu kB", &kib) == 1)
+      return 1024 * kib;
+  }
+  return std::uint64_t(-1);
+}
+
+TEST(Scratch, LeavesMemory) {
+  const render::Sheet<char> sheet(16 << 20, 'a', scratch());
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+  while (resident_at(sheet.data()) > 0 && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  EXPECT_EQ(resident_at(sheet.data()), 0u);
+}
+
 TEST(Scratch, GivesBackWhatWasWrittenHoweverOftenItLeavesMemory) {
   render::Sheet<std::uint32_t> sheet(1 << 20, 0, scratch());
   for (std::uint32_t round = 1; round < 5; ++round) {
@@ -86,6 +108,7 @@ TEST(Scratch, MakesThePicturesOfMemory) {
   const auto device = render::open_device(options);
   const Shown in_memory = shown_on(device, stage);
   render::use_scratch(*device, scratch());
+  EXPECT_EQ(render::memory_of(*device).in_scratch, !render::is_gpu(*device));
   const Shown in_files = shown_on(device, stage);
   EXPECT_EQ(in_files.alone.samples, in_memory.alone.samples);
   EXPECT_EQ(in_files.among.samples, in_memory.among.samples);

@@ -49,7 +49,8 @@ struct Kind {
 constexpr auto host_allocation = vk::ExternalMemoryHandleTypeFlagBits::eHostAllocationEXT;
 
 // Gives the buffer memory that lies in a file.
-void bind_scratch(Device& device, Buffer::Parts& parts, const vk::MemoryRequirements& needed) {
+void bind_scratch(Device& device, Buffer::Parts& parts, const vk::MemoryRequirements& needed,
+                  const Kind& kind) {
   const vk::DeviceSize page = Scratch::alignment();
   parts.host = Sheet<std::byte>((needed.size + page - 1) / page * page,
                                 SheetAllocator<std::byte>(device.scratch()));
@@ -57,7 +58,9 @@ void bind_scratch(Device& device, Buffer::Parts& parts, const vk::MemoryRequirem
                          .getMemoryHostPointerPropertiesEXT(host_allocation, parts.host.data())
                          .memoryTypeBits;
   const auto type = device.memory().type(types & needed.memoryTypeBits, {}, {});
-  const vk::ImportMemoryHostPointerInfoEXT import(host_allocation, parts.host.data());
+  vk::ImportMemoryHostPointerInfoEXT import(host_allocation, parts.host.data());
+  const vk::MemoryAllocateFlagsInfo with_address(vk::MemoryAllocateFlagBits::eDeviceAddress);
+  if (kind.usage & vk::BufferUsageFlagBits::eShaderDeviceAddress) import.pNext = &with_address;
   parts.memory =
       vk::raii::DeviceMemory(device.vk(), vk::MemoryAllocateInfo(parts.host.size(), type, &import));
 }
@@ -97,7 +100,7 @@ Buffer create_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size
     parts.buffer = vk::raii::Buffer(device.vk(), info);
     const vk::MemoryRequirements needed = parts.buffer.getMemoryRequirements();
     if (kind.in_scratch) {
-      bind_scratch(device, parts, needed);
+      bind_scratch(device, parts, needed, kind);
       result.mapped = parts.host.data();
     } else {
       result.mapped = bind_own(device, parts, needed, kind);
@@ -144,6 +147,7 @@ Buffer create_staging_buffer(Device& device, vk::DeviceSize size,
 vk::DeviceSize texel_bytes_of(vk::Format format) {
   switch (format) {
     case vk::Format::eR32Sfloat:
+    case vk::Format::eR32Uint:
       return 4;
     case vk::Format::eR32G32Sfloat:
     case vk::Format::eR32G32Uint:

@@ -432,17 +432,20 @@ DeviceFacts facts_of(const Device& device) {
 void use_scratch(Device& device, std::shared_ptr<Scratch> scratch) {
   device.use_scratch(std::move(scratch));
 }
+const std::shared_ptr<Scratch>& scratch_of(const Device& device) {
+  return device.scratch();
+}
 void keep_programs(Device& device) {
   device.keep_programs();
 }
 
 PictureMemory memory_of(const Device& device) {
   const DeviceLimits& allows = device.allows();
-  return {
-      .bytes = device.memory().bytes(),
-      .pixels = device.reads_storage() ? allows.storage_bytes / whole_pixel_bytes : allows.texels,
-      .read_back = device.shares_host_memory(),
-      .in_scratch = device.scratch() && device.imports_host_memory()};
+  return {.bytes = device.memory().bytes(),
+          .pixels = device.reads_storage() ? allows.storage_bytes / whole_pixel_bytes
+                                           : allows.texels / 3 * 2,
+          .read_back = device.shares_host_memory(),
+          .in_scratch = device.scratch() && device.imports_host_memory()};
 }
 
 DeviceTimes take_times(Device& device) {

@@ -110,6 +110,7 @@ PictureMemory memory_of(const Device& device);
 // From now on what is as large as a picture lies in files, as far as the computer's memory would
 // hold it: all of a frame that is rendered by a CPU device, and the frames that are kept.
 void use_scratch(Device& device, std::shared_ptr<Scratch> scratch);
+const std::shared_ptr<Scratch>& scratch_of(const Device& device);  // null: nothing lies in files
 // Keeps what has been compiled since the last call, if anything was, for the next start
 // (DeviceOptions::cache). Writes in a thread of its own.
 void keep_programs(Device& device);

@@ -108,11 +108,12 @@ DevicePlate::DevicePlate(Device& device) : device_(device) {
   reserve(codes_, 0);
 }
 
-void DevicePlate::reserve(Buffer& codes, std::size_t pixels) {
+void DevicePlate::reserve(Buffer& codes, std::size_t pixels, bool is_made_here) {
   // Two pixels are written at once.
   const vk::DeviceSize size =
       std::max<std::size_t>((pixels + 1) / 2, 1) * 6 * sizeof(std::uint16_t);
-  if (codes.size < size) codes = create_storage_buffer(device_, for_plate, size);
+  if (codes.size < size)
+    codes = create_texel_buffer(device_, for_plate, size, vk::Format::eR32Uint, is_made_here);
 }
 
 // Runs a kernel that works on two pixels of the picture in each invocation.
@@ -140,7 +141,7 @@ void DevicePlate::take(const Frame& frame) {
 void DevicePlate::take(const Frame& frame, int width, int height, const CodeTables& tables) {
   make_codes(frame, whole_);
   const std::size_t pixels = static_cast<std::size_t>(width) * height;
-  reserve(codes_, pixels);
+  reserve(codes_, pixels, true);
   Buffers buffers{{"plate_samples", &whole_}, {"small_samples", &codes_}};
   tables.add_to(buffers);
   gpu::GpuPlateScale constants{};
@@ -156,7 +157,7 @@ void DevicePlate::make_codes(const Frame& frame, Buffer& codes) {
   check_size(frame);
   const std::span<const std::byte> bytes = std::as_bytes(std::span(frame.bytes));
   const std::size_t pixels = static_cast<std::size_t>(frame.width) * frame.height;
-  reserve(codes, pixels);
+  reserve(codes, pixels, !device_.shares_host_memory());
   if (frame.format == PixelFormat::rgb16) return upload_bytes(device_, codes, bytes);
   // A processor makes a plate in a twentieth of the time if it does so by itself.
   if (device_.shares_host_memory()) {

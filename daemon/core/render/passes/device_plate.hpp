@@ -32,7 +32,8 @@ class DevicePlate {
   const Buffer& whole() const { return whole_; }
 
  private:
-  void reserve(Buffer& codes, std::size_t pixels);
+  // A device may let its passes write less than it reads: `is_made_here` says that one does.
+  void reserve(Buffer& codes, std::size_t pixels, bool is_made_here = false);
   void make_codes(const Frame& frame, Buffer& codes);
   template <typename Constants>
   void dispatch(Kernel& kernel, Constants constants, std::size_t pixels, const Buffers& buffers);

@@ -97,11 +97,12 @@ std::uint64_t history_bytes(int width, int height) {
 
 TakeMemory take_memory(const TakeOfPictures& take, const PictureMemory& device) {
   const std::uint64_t pixels = pixels_of(take.width, take.height), frames = frames_of(take);
-  // Layers are made, wait, and are written.
-  constexpr std::uint64_t at_once = 3;
+  // Layers are made, wait, and are written; at the take's end those of all that waited for frames
+  // after them are made at once. Whoever writes them copies one.
+  const std::uint64_t at_once = std::max(take.each_side + 2, 3);
   const std::uint64_t layers = std::min(at_once, take.take_frames);
   const auto levels = static_cast<std::uint64_t>(std::bit_width(static_cast<unsigned>(take.parts)));
-  std::uint64_t banded = pixels * layers * layer_bytes;
+  std::uint64_t banded = pixels * (layers * layer_bytes + 3 * sizeof(float));
   if (take.each_side > 0) banded += pixels * frames * sum_bytes;
   if (take.parts > 1) banded += pixels * levels * sum_bytes;
   // Frames are decoded ahead, kept, and shown, as the camera's bytes and as codes.
@@ -131,14 +132,16 @@ MemoryPlan plan_memory(const TakeOfPictures& take, const PictureMemory& device,
                        std::optional<std::uint64_t> asked, std::uint64_t free_bytes) {
   constexpr std::uint64_t most_unasked = 4'000'000'000;
   const TakeMemory needed = take_memory(take, device);
-  const std::uint64_t allowed = asked.value_or(free_bytes / 10 * 9);
+  const std::uint64_t usable = free_bytes / 10 * 9;
+  const std::uint64_t allowed = std::min(asked.value_or(usable), usable);
   if (needed.whole() <= (asked ? allowed : std::min(allowed, most_unasked))) return {};
-  const std::uint64_t least = needed.rest + std::min(least_resident, needed.banded);
+  const std::uint64_t least = needed.rest + std::min(least_resident, needed.banded / 2);
   if (least > allowed)
     throw Error("pictures of " + size_words(take.width, take.height) + " take at least " +
                 gigabytes(least) + " of the computer's memory, and " + gigabytes(allowed) +
-                (asked ? " are allowed" + std::string(smaller) + ", or allow more (--memory)"
-                       : " are free" + std::string(smaller)));
+                (asked && *asked < usable
+                     ? " are allowed" + std::string(smaller) + ", or allow more (--memory)"
+                     : " are free" + std::string(smaller) + ", or close other programs"));
   return {.in_scratch = true, .resident = std::min(allowed - needed.rest, most_resident)};
 }
 

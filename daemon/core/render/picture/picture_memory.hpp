@@ -65,10 +65,10 @@ struct MemoryPlan {
   bool in_scratch = false;     // what is banded lies in scratch files,
   std::uint64_t resident = 0;  // of which so many bytes stay in memory
 };
-// Takes scratch files where the whole would be more than the `asked` bytes; nobody has asked: more
-// than 4 GB or nine tenths of what is free. What is free beyond that holds the files all the same,
-// as the kernel's cache, which others can have at any time. Throws previz::Error where even the
-// rest is more than was asked, or than nine tenths of what is free.
+// Takes scratch files where the whole would be more than the `asked` bytes or nine tenths of what
+// is free; nobody has asked: or more than 4 GB. What is free beyond that holds the files all the
+// same, as the kernel's cache, which others can have at any time. Throws previz::Error where even
+// the rest is more.
 MemoryPlan plan_memory(const TakeOfPictures& take, const PictureMemory& device,
                        std::optional<std::uint64_t> asked, std::uint64_t free_bytes);
 

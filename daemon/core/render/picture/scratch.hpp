@@ -19,10 +19,10 @@ namespace previz::render {
 // and reads it again when it is used. May be used by any thread.
 class Scratch {
  public:
-  // Keeps about `most_resident` bytes of all blocks in the process's memory. Throws previz::Error
+  // Keeps about `resident` bytes of all blocks in the process's memory. Throws previz::Error
   // where the folder cannot hold such files: it is not there, cannot be written, or lies in memory
   // itself.
-  Scratch(std::filesystem::path folder, std::uint64_t most_resident);
+  Scratch(std::filesystem::path folder, std::uint64_t resident);
   ~Scratch();
   Scratch(const Scratch&) = delete;
   Scratch& operator=(const Scratch&) = delete;
@@ -35,7 +35,7 @@ class Scratch {
   // Returns zeros. Throws previz::Error, with the folder and the size, where the disk has no room,
   // which is reserved at once.
   void* take(std::size_t bytes);
-  void give_back(void* block, std::size_t bytes);
+  void give_back(void* memory, std::size_t bytes);
 
  private:
   struct Block {
