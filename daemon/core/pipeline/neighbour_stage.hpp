@@ -12,9 +12,9 @@
 namespace previz::pipeline {
 
 // A sliding window over the shots, of which each is rendered once: at most 2 * neighbours + 1 of
-// them are kept (Renderer::keep() says how large they are). A shot's picture depends on the shots around it alone, those whose
-// index differs by no more than `neighbours`. One that passes through untouched, or that is
-// missing, is nobody's neighbour, and what is left keeps its order.
+// them are kept (Renderer::keep() says how large they are). A shot's picture depends on the shots
+// around it alone, those whose index differs by no more than `neighbours`. One that passes through
+// untouched, or that is missing, is nobody's neighbour, and what is left keeps its order.
 class NeighbourStage {
  public:
   // `render` must outlive this, with a set that is denoised and RenderStageOptions::seeds_shots.

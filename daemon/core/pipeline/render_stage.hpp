@@ -82,8 +82,8 @@ class RenderStage {
   // keep() and show_among() do the same in two parts, for shots of a take that are averaged with
   // their neighbours. keep() is begin() and the samples; a shot that it finishes (it is untouched)
   // or that was cancelled (it is not whole) has no frame: null. show_among() makes the shot's
-  // picture, and its layers, from the chain of kept frames (Renderer::show_among), the last of which
-  // is its own.
+  // picture, and its layers, from the chain of kept frames (Renderer::show_among), the last of
+  // which is its own.
   render::KeptFramePtr keep(Shot& shot);
   void show_among(Shot& shot, const std::vector<render::KeptFramePtr>& chain);
 

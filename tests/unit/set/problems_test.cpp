@@ -81,7 +81,8 @@ const Mistake unknown[] = {
     {"[quality]\nseed = 4\n", "2:1: quality.seed: ", "does it belong under [estimator]?"},
     {"[set]\nsize_m = 4\n", "2:1: set.size_m: ", "does it belong under [[tag]]?"},
     {"[quality]\nzzzzzzzzzz = 4\n", "2:1: quality.zzzzzzzzzz: ",
-     "allowed: samples, adaptive, denoise, accumulate, neighbours, memory_mb, error, seconds, scale, fps"},
+     "allowed: samples, adaptive, denoise, accumulate, neighbours, memory_mb, error, seconds, "
+     "scale, fps"},
     {"[quality]\n\"a\\nb\" = 4\n", "2:1: quality.a\\nb: ", "unknown key"},
 };
 INSTANTIATE_TEST_SUITE_P(Unknown, SetMistake, testing::ValuesIn(unknown));
