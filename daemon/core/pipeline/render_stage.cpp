@@ -14,11 +14,12 @@
 namespace previz::pipeline {
 namespace {
 
-// Fills the layers with a plate alone, with no virtual object in front and no geometry behind:
-// everything but the composite stays 0.
-render::Layers with_plate(render::Layers layers, const Plate& plate, double exposure,
-                          const lighting::Response& response) {
+// Returns the layers of a plate alone, with no virtual object in front and no geometry behind:
+// everything but the composite is 0.
+render::Layers plate_layers(const Plate& plate, double exposure, const lighting::Response& response,
+                            const std::shared_ptr<render::Scratch>& scratch) {
   const std::vector<double>& signal = response.inverse();
+  render::Layers layers = render::make_layers(plate.width, plate.height, 0, scratch);
   for (std::size_t i = 0; i < plate.samples.size(); ++i)
     layers.composite[i / 3][static_cast<glm::length_t>(i % 3)] =
         static_cast<float>(signal[plate.samples[i]] / exposure);
@@ -54,6 +55,7 @@ RenderStage::RenderStage(std::shared_ptr<render::Device> device, const set::Set&
     : set_(set),
       calibration_(calibration),
       options_(std::move(options)),
+      scratch_(device ? render::scratch_of(*device) : nullptr),
       renderer_(std::move(options_.renderer)) {
   const ObserverCalibration picture = scaled(calibration, options_.scale);
   if (renderer_)
@@ -299,8 +301,8 @@ PlatePtr RenderStage::sized(Shot& shot) const {
 
 void RenderStage::pass_through(Shot& shot, PlatePtr plate, std::string reason) const {
   if (options_.layers)
-    shot.layers = std::make_shared<const render::Layers>(with_plate(
-        renderer_->no_layers(plate->width, plate->height), *plate, exposure_of(shot), *response_));
+    shot.layers = std::make_shared<const render::Layers>(
+        plate_layers(*plate, exposure_of(shot), *response_, scratch_));
   shot.untouched = std::move(reason);
   shot.picture = std::move(plate);
   shot.whole = true;

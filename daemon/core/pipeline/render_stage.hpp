@@ -132,6 +132,7 @@ class RenderStage {
   const ObserverCalibration calibration_;       // at the observer's size
   std::optional<lighting::Response> response_;  // for the last plate's bit depth
   RenderStageOptions options_;
+  const std::shared_ptr<render::Scratch> scratch_;  // the device's, if there is one
   render::View view_ = render::View::composite;
   std::shared_ptr<render::Renderer> renderer_;  // never null
   double error_ = 0;

@@ -429,10 +429,6 @@ Layers Renderer::layers() const {
   return layers;
 }
 
-Layers Renderer::no_layers(int width, int height) const {
-  return make_layers(width, height, 0, impl_->device->scratch());
-}
-
 const Plate& Renderer::plate() const {
   return impl_->codes();
 }

@@ -115,8 +115,6 @@ class Renderer {
   void separate_parts();
   // Returns the layers of the samples so far.
   Layers layers() const;
-  // Returns layers of this size that are all 0, where those of a frame would lie.
-  Layers no_layers(int width, int height) const;
   // Returns the current frame's plate at the size of its layers; valid until the next begin().
   const Plate& plate() const;
   // Returns the composite of the samples so far through exposure and response, as the display shows
