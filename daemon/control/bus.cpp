@@ -287,6 +287,7 @@ struct Bus::Impl {
   std::deque<std::string> names;  // names of methods, which the table points at
   std::vector<sd_bus_vtable> table;
   sd_bus* bus = nullptr;
+  sd_bus_slot* interface = nullptr;  // the table's place on the bus
   Status published;
 
   Impl(sd_event* loop, Verbs the_verbs) : served{std::move(the_verbs), std::nullopt} {
@@ -298,21 +299,27 @@ struct Bus::Impl {
       served.callers.emplace(bus, [this](const std::string& who, const std::string& verb) {
         if (served.verbs.denied) served.verbs.denied(who, verb);
       });
-      check(sd_bus_add_object_vtable(bus, nullptr, object_path, interface_name, table.data(),
+      check(sd_bus_add_object_vtable(bus, &interface, object_path, interface_name, table.data(),
                                      &served),
             "the interface cannot be registered");
       request_name();
       check(sd_bus_attach_event(bus, loop, SD_EVENT_PRIORITY_NORMAL), "cannot join the event loop");
     } catch (...) {
-      served.callers.reset();
-      sd_bus_close_unref(bus);
+      close();
       throw;
     }
     published = served.verbs.status();
   }
   ~Impl() {
     sd_bus_detach_event(bus);
+    close();
+  }
+
+  // A call that still waits for its answer keeps the bus alive, and the table must be off it by
+  // then.
+  void close() {
     served.callers.reset();
+    sd_bus_slot_unref(interface);
     sd_bus_close_unref(bus);  // without a flush, which may wait
   }
 

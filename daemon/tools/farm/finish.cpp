@@ -123,7 +123,12 @@ void complete_take(const JobFolder& folder, const Job& job, const JobTake& take,
   if (!take.video) return;
   std::vector<post::FinishedFrame> frames;
   for (std::uint64_t frame = take.frames.first; frame <= take.frames.last; ++frame)
-    if (const post::FinishedFrame* finished = pictures.finished(frame)) frames.push_back(*finished);
+    if (const post::FinishedFrame* finished = pictures.finished(frame))
+      frames.push_back(*finished);
+    else
+      throw Error(take.pictures.string() + ": frame " + std::to_string(frame) +
+                  " was whole a moment ago and is gone, so that there is no review video; run the "
+                  "last step again");
   pictures.write_video(frames, out);
 }
 

@@ -78,7 +78,8 @@ class RigOnTheBus : public testing::Test {
       while (!quit_) sd_event_run(event_, 10'000);
     });
   }
-  void TearDown() override {
+  void TearDown() override { stop(); }
+  void stop() {
     if (!loop_.joinable()) return;
     quit_ = true;
     loop_.join();
@@ -145,6 +146,18 @@ TEST_F(RigOnTheBus, AnAnswerMayComeLater) {
   EXPECT_EQ(later.wait_for(std::chrono::seconds(0)), std::future_status::timeout);
   EXPECT_EQ(previzctl("action move_left").out, "move_left\n");
   EXPECT_EQ(later.get().out, "a.exr\n");
+}
+
+TEST_F(RigOnTheBus, AnAnswerMayComeWhenTheBusHasEnded) {
+  answers_later_ = true;
+  std::future<Said> asked = std::async(std::launch::async, previzctl, "action snapshot");
+  EXPECT_TRUE(test::wait_until("it is asked", [&] {
+    return previzctl("status").out.find("last message: snapshot") != std::string::npos;
+  }));
+  stop();
+  reply_({"a.exr"});
+  reply_ = {};
+  EXPECT_NE(asked.get().status, 0);
 }
 
 // Its set changes, and with it the loop and the verbs; who calls in between is answered afterwards.
