@@ -20,8 +20,8 @@ void main() {
   Hit hit;
   seen[index] = GpuSeen(0.0, NO_INDEX);
   if (!trace_closest(vec3(0.0), direction, 0.0, 3.4e38, WORLD_REAL, hit)) return;
-  if (materials[instances[hit.instance].material].alpha_mode != ALPHA_OPAQUE) return;
+  if (material_at(instance_at(hit.instance).material).alpha_mode != ALPHA_OPAQUE) return;
   // A mixed path does not meet what is removed from the picture, however close behind it the path ends.
-  if (instances[hit.instance].presence != WORLD_BOTH) return;
+  if (instance_at(hit.instance).presence != WORLD_BOTH) return;
   seen[index] = GpuSeen(1.0 / (hit.t * depth_of_unit), hit.instance);
 }

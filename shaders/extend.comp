@@ -8,16 +8,16 @@
 
 void main() {
   if (gl_GlobalInvocationID.x >= control.active_count) return;
-  const uint path = queue[active_queue_index(gl_GlobalInvocationID.x)];
-  const vec4 origin = ray_origin[path];
-  const uint bits = path_throughput[path].state;
+  const uint path = read_queue(active_queue_index(gl_GlobalInvocationID.x));
+  const vec4 origin = read_ray_origin(path);
+  const uint bits = read_throughput(path).state;
   // The path leaves its last hit, unless it starts here or resumes on its way.
   const bool leaves_surface = path_depth(bits) > 0u && origin.w == 0.0;
   const uvec2 source =
-      leaves_surface ? uvec2(hits[path].instance, hits[path].primitive) : TRACE_FROM_NOWHERE;
+      leaves_surface ? read_hits(path * HIT_TEXELS) : TRACE_FROM_NOWHERE;
   const float t_min = path_is_behind(bits) ? origin.w : origin.w * RESUME_BEFORE;
   Hit hit;
-  const bool found = closest_met(origin.xyz, ray_direction[path].xyz, t_min, 3.4e38,
+  const bool found = closest_met(origin.xyz, read_ray_direction(path).xyz, t_min, 3.4e38,
                                  path_worlds(bits), source, hit);
-  hits[path] = GpuHit(found ? hit.t : -1.0, hit.barycentrics, hit.instance, hit.primitive);
+  write_hit(path, GpuHit(found ? hit.t : -1.0, hit.barycentrics, hit.instance, hit.primitive));
 }

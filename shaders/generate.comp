@@ -18,11 +18,11 @@ bool may_be_covered(uvec2 pixel) {
   const float pixel_angle = 1.5 * length(corner - ray);  // that of half the diagonal, with a margin
   const vec3 direction = normalize(transform_vector(frame.world_from_camera, ray));
   for (uint i = 0u; i < frame.bound_count; ++i) {
-    const float far = length(bounds[i].xyz) + bounds[i].w;
-    float radius = bounds[i].w + pixel_angle * far;
+    const float far = length(fetch(bounds, int(i)).xyz) + fetch(bounds, int(i)).w;
+    float radius = fetch(bounds, int(i)).w + pixel_angle * far;
     if (has_feature(FEATURE_LENS)) radius += frame.lens_radius * (1.0 + far / frame.focus_distance);
-    const float along = max(dot(bounds[i].xyz, direction), 0.0);
-    const vec3 off = bounds[i].xyz - along * direction;
+    const float along = max(dot(fetch(bounds, int(i)).xyz, direction), 0.0);
+    const vec3 off = fetch(bounds, int(i)).xyz - along * direction;
     if (dot(off, off) <= radius * radius) return true;
   }
   return false;
@@ -57,7 +57,7 @@ void main() {
     const bool difference =
         has_feature(FEATURE_DIFFERENCE) && !may_be_covered(pixel) && !may_be_clipped(pixel);
     const uint bits = WORLD_BOTH | (difference ? PATH_DIFFERENCE : 0u);
-    path_throughput[path] = GpuThroughput(vec3(1.0), bits);
+    write_throughput(path, vec3(1.0), bits);
     sample_mixed[slot] = vec4(0.0);
     sample_real[slot] = vec4(0.0, 0.0, 0.0, difference ? SAMPLE_DIFFERENCE : SAMPLE_FULL);
     if (has_feature(FEATURE_CAMERA)) sample_landed[slot] = vec4(0.0);

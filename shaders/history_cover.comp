@@ -66,7 +66,7 @@ uint find(uint index, uint ray) {
                      normalize(transform_vector(frame.world_from_camera, target)), 0.0, 3.4e38,
                      WORLD_BOTH, hit))
     return 0u;
-  const uint through = lets_light_through(instances[hit.instance].material) ? SEES_THROUGH : 0u;
+  const uint through = lets_light_through(instance_at(hit.instance).material) ? SEES_THROUGH : 0u;
   return through + uint(hit.presence != WORLD_BOTH);
 }
 

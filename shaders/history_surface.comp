@@ -95,7 +95,7 @@ void find_seen(uint index, MirroredRay ray) {
     const Surface s =
         make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), ray.direction, 0.0);
     // What shines through, through a hole or through a pane, is not at this surface.
-    const bool is_pane = lets_light_through(instances[hit.instance].material);
+    const bool is_pane = lets_light_through(instance_at(hit.instance).material);
     if (is_pane && mirrors == 0u) {
       things[index].x = pack_thing(NO_THING, SEE_THROUGH_CLASS, 0u);
       return;

@@ -24,9 +24,9 @@ struct Flight {
 };
 
 Flight load_flight(uint path) {
-  const vec4 origin = ray_origin[path];
-  const vec4 direction = ray_direction[path];
-  const GpuThroughput carried = path_throughput[path];
+  const vec4 origin = read_ray_origin(path);
+  const vec4 direction = read_ray_direction(path);
+  const GpuThroughput carried = read_throughput(path);
   const uint bits = carried.state;
   return Flight(origin.xyz, origin.w, direction.xyz, direction.w, carried.factor, path_worlds(bits),
                 path_depth(bits), path_medium(bits), path_passes(bits), path_is_behind(bits));
@@ -38,7 +38,7 @@ void store_flight(Flight f, uint path) {
   const uint bits = f.worlds | (f.is_behind ? PATH_BEHIND : 0u) |
                     (f.passes << PATH_PASSES_SHIFT) | (f.vertices << PATH_DEPTH_SHIFT) |
                     (f.medium << PATH_MEDIUM_SHIFT);
-  path_throughput[path] = GpuThroughput(f.flux, bits);
+  write_throughput(path, f.flux, bits);
 }
 
 // Samples the Dirac lobes of a surface in the direction of light. It is the adjoint of
@@ -165,11 +165,11 @@ void main() {
   uint forked = NO_INDEX;
   uint outcome = FLIGHT_OVER;
   if (gl_GlobalInvocationID.x < control.active_count) {
-    path = queue[active_queue_index(gl_GlobalInvocationID.x)];
-    const GpuHit hit = hits[path];
+    path = read_queue(active_queue_index(gl_GlobalInvocationID.x));
+    const GpuHit hit = read_hit(path);
     if (hit.t >= 0.0) {
       Flight f = load_flight(path);
-      const uint presence = instances[hit.instance].presence & f.worlds;
+      const uint presence = instance_at(hit.instance).presence & f.worlds;
       if (presence != f.worlds) {
         Flight other = f;
         other.worlds = f.worlds & ~presence;

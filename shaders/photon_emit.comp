@@ -19,7 +19,7 @@ bool emit(uint photon) {
   }
   ray_origin[path] = vec4(e.origin, 0.0);
   ray_direction[path] = vec4(e.direction, 1.0);
-  path_throughput[path] = GpuThroughput(e.flux, worlds);
+  write_throughput(path, e.flux, worlds);
   return worlds != 0u && any(greaterThan(e.flux, vec3(0.0)));
 }
 

@@ -41,16 +41,16 @@ struct Path {
 };
 
 Path load_path(uint index) {
-  const vec4 origin = ray_origin[index];
-  const vec4 direction = ray_direction[index];
-  const GpuThroughput throughput = path_throughput[index];
+  const vec4 origin = read_ray_origin(index);
+  const vec4 direction = read_ray_direction(index);
+  const GpuThroughput throughput = read_throughput(index);
   const uint bits = throughput.state;
   return Path(index, path_slot(index), origin.xyz, origin.w, direction.xyz, direction.w, throughput.factor,
               path_worlds(bits), path_depth(bits), (bits & PATH_ROUGH) != 0u,
               (has_feature(FEATURE_DIFFERENCE) || has_feature(FEATURE_CAMERA)) &&
                   (bits & PATH_DIFFERENCE) != 0u,
               has_feature(FEATURE_CAMERA) && (bits & PATH_LANDED) != 0u, path_medium(bits),
-              has_feature(FEATURE_MANY_LIGHTS) ? path_receiver[index] : NO_NORMAL,
+              has_feature(FEATURE_MANY_LIGHTS) ? read_path_receiver(index) : NO_NORMAL,
               path_passes(bits), path_is_behind(bits));
 }
 
@@ -61,7 +61,7 @@ void store_path(Path p, uint index) {
                     (p.difference ? PATH_DIFFERENCE : 0u) | (p.landed ? PATH_LANDED : 0u) |
                     (p.is_behind ? PATH_BEHIND : 0u) | (p.passes << PATH_PASSES_SHIFT) |
                     (p.depth << PATH_DEPTH_SHIFT) | (p.medium << PATH_MEDIUM_SHIFT);
-  path_throughput[index] = GpuThroughput(p.throughput, bits);
+  write_throughput(index, p.throughput, bits);
   if (has_feature(FEATURE_MANY_LIGHTS)) path_receiver[index] = p.receiver;
 }
 
@@ -123,18 +123,20 @@ void meet_lights(Path p, float t_hit) {
 void meet_environment(Path p) {
   if (cancels(p, EQUAL_GAIN)) return;
   float weight = 1.0;
+  float pdf;
+  const vec3 radiance = environment_radiance(p.direction, pdf);
   if (has_feature(FEATURE_ENVIRONMENT_SAMPLING) && p.pdf > 0.0)
-    weight = mis_weight(p.pdf, frame.environment_selection * environment_pdf(p.direction));
-  receive(p, p.throughput * environment_radiance(p.direction) * weight *
+    weight = mis_weight(p.pdf, frame.environment_selection * pdf);
+  receive(p, p.throughput * radiance * weight *
                  medium_transmittance(p.medium, 3.4e38), EQUAL_GAIN);
 }
 
 void meet_emission(Path p, Surface s, GpuHit hit) {
   if (all(equal(s.emission, vec3(0.0))) || cancels(p, EQUAL_GAIN)) return;
   float weight = 1.0;
-  const uint first = instances[hit.instance].first_light;
+  const uint first = instance_at(hit.instance).first_light;
   if (has_feature(FEATURE_LIGHTS) && p.pdf > 0.0 && first != NO_INDEX) {
-    const GpuLight light = lights[first + hit.primitive];
+    const GpuLight light = placeless_light(first + hit.primitive);
     const float pdf = triangle_pdf(light, p.direction, hit.t);
     weight = mis_weight(p.pdf, selection_of(p, light) * pdf);
   }
@@ -228,7 +230,7 @@ uint choose_light(Path p, Surface s, Sampler random, inout float u, out float se
       index = select_light(make_receiver(s.position, p.receiver), lamp, among_lights);
     } else {
       index = pick_light(u, false);
-      among_lights = lights[index].selection;
+      among_lights = placeless_light(index).selection;
     }
     selection = (1.0 - selection) * among_lights;
     return index;
@@ -398,7 +400,7 @@ bool is_matt(Surface s) {
 // worlds at that point.
 bool meet_measured(inout Path p, Surface s, GpuHit hit) {
   const bool is_needed = p.worlds == WORLD_REAL || !(p.landed || cancels(p, EQUAL_GAIN));
-  if (p.depth == 0u || !is_needed || (instances[hit.instance].presence & WORLD_REAL) == 0u)
+  if (p.depth == 0u || !is_needed || (instance_at(hit.instance).presence & WORLD_REAL) == 0u)
     return false;
   vec3 radiance;
   if (!is_matt(s) || any(greaterThan(s.emission, vec3(0.0))) ||
@@ -489,7 +491,7 @@ void meet_surface(inout Path p, GpuHit hit, out uint forked, out GpuShadowRay ra
   forked = NO_INDEX;
   lit = false;
   scattered = false;
-  const uint presence = instances[hit.instance].presence & p.worlds;
+  const uint presence = instance_at(hit.instance).presence & p.worlds;
   if (has_feature(FEATURE_FORKS) && presence != p.worlds) {
     if (does(SHADE_RECEIVE) && p.depth == 0u) sample_mixed[p.slot].w = 1.0;
     if (does(SHADE_SCATTER)) fork(p, p.worlds & ~presence, hit.t, forked);
@@ -517,8 +519,8 @@ void main() {
   GpuShadowRay ray;
   Path p;
   if (active_path) {
-    p = load_path(queue[active_queue_index(gl_GlobalInvocationID.x)]);
-    const GpuHit hit = hits[p.index];
+    p = load_path(read_queue(active_queue_index(gl_GlobalInvocationID.x)));
+    const GpuHit hit = read_hit(p.index);
     receive_on_the_way(p, hit);
     if (hit.t >= 0.0) meet_surface(p, hit, forked, ray, lit, scattered);
     if (does(SHADE_SCATTER) && scattered) store_path(p, p.index);

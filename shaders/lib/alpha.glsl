@@ -15,7 +15,7 @@ float hit_coverage(Hit hit) {
 }
 
 vec3 hit_transmittance(Hit hit, vec3 direction) {
-  if (!may_be_pane(instances[hit.instance].material)) return vec3(0.0);
+  if (!may_be_pane(instance_at(hit.instance).material)) return vec3(0.0);
   return pane_transmittance(
       make_surface(GpuHit(hit.t, hit.barycentrics, hit.instance, hit.primitive), direction, 0.0));
 }

@@ -35,7 +35,7 @@ void append_next(bool wanted, uint path) {
 
 void append_shadow(bool wanted, GpuShadowRay ray) {
   const uint place = place_in_shadow(wanted);
-  if (wanted) shadow_rays[place] = ray;
+  if (wanted) write_shadow_ray(place, ray);
 }
 
 #endif

@@ -19,7 +19,7 @@ vec3 past_point(GpuInstance instance, GpuMotion motion, uint vertex) {
 vec3 position_before(Hit hit, Surface s, GpuMotion motion, out float bent) {
   bent = 0.0;
   if (motion.points == NO_INDEX) return moved(motion.before_from_now, s.position);
-  const GpuInstance instance = instances[hit.instance];
+  const GpuInstance instance = instance_at(hit.instance);
   const uvec3 index = fetch(triangles, int(instance.first_triangle + hit.primitive)).xyz;
   const vec3 a = past_point(instance, motion, index.x);
   const vec3 b = past_point(instance, motion, index.y);

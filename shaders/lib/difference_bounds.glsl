@@ -9,7 +9,7 @@
 
 // The centre and the radius of each object that is not in both worlds, then of each object that can
 // reflect without blur.
-layout(scalar) readonly buffer Bounds { vec4 bounds[]; };
+PREVIZ_FETCHED(vec4, bounds)
 
 // Returns 1 - cos of the half angle under which the bound is seen, or 0 from inside it.
 float bound_cap(vec4 bound, vec3 point) {
@@ -21,10 +21,10 @@ float bound_cap(vec4 bound, vec3 point) {
 // Returns whether the segment from the point can meet any bound.
 bool meets_bounds(vec3 point, vec3 direction, float t_max) {
   for (uint i = 0u; i < frame.bound_count; ++i) {
-    const vec3 to_center = bounds[i].xyz - point;
+    const vec3 to_center = fetch(bounds, int(i)).xyz - point;
     const float nearest = clamp(dot(to_center, direction), 0.0, t_max);
     const vec3 off = to_center - nearest * direction;
-    if (dot(off, off) <= bounds[i].w * bounds[i].w) return true;
+    if (dot(off, off) <= fetch(bounds, int(i)).w * fetch(bounds, int(i)).w) return true;
   }
   return false;
 }
@@ -34,7 +34,7 @@ bool meets_bounds(vec3 point, vec3 direction, float t_max) {
 float bounds_reach(vec3 point) {
   float total = 0.0;
   for (uint i = 0u; i < frame.bound_count; ++i) {
-    const float cap = bound_cap(bounds[i], point);
+    const float cap = bound_cap(fetch(bounds, int(i)), point);
     total += cap > 0.0 ? cap : 2.0;
   }
   return total;
@@ -44,7 +44,7 @@ float bounds_reach(vec3 point) {
 // angle.
 float bounds_total(vec3 point) {
   float total = 0.0;
-  for (uint i = 0u; i < frame.bound_count; ++i) total += bound_cap(bounds[i], point);
+  for (uint i = 0u; i < frame.bound_count; ++i) total += bound_cap(fetch(bounds, int(i)), point);
   return total;
 }
 
@@ -54,7 +54,7 @@ vec3 bounds_sample(vec3 point, float total, vec2 u) {
   uint chosen = 0u;
   float cap = 0.0;
   for (uint i = 0u; i < frame.bound_count; ++i) {
-    const float next = bound_cap(bounds[i], point);
+    const float next = bound_cap(fetch(bounds, int(i)), point);
     if (next <= 0.0) continue;
     chosen = i;
     cap = next;
@@ -62,7 +62,7 @@ vec3 bounds_sample(vec3 point, float total, vec2 u) {
     if (rest < 0.0) break;
   }
   u.x = clamp(1.0 + rest / cap, 0.0, 0.99999994);
-  return sample_cone(normalize(bounds[chosen].xyz - point), cap, u);
+  return sample_cone(normalize(fetch(bounds, int(chosen)).xyz - point), cap, u);
 }
 
 // Returns the density of bounds_sample() per steradian: every cone that contains the direction adds
@@ -71,10 +71,10 @@ float bounds_pdf(vec3 point, float total, vec3 direction) {
   if (total <= 0.0) return 0.0;
   float cones = 0.0;
   for (uint i = 0u; i < frame.bound_count; ++i) {
-    const vec3 to_center = bounds[i].xyz - point;
+    const vec3 to_center = fetch(bounds, int(i)).xyz - point;
     const float along = dot(to_center, direction);
     const vec3 off = to_center - along * direction;
-    const float radius_squared = bounds[i].w * bounds[i].w;
+    const float radius_squared = fetch(bounds, int(i)).w * fetch(bounds, int(i)).w;
     if (dot(to_center, to_center) > radius_squared && along > 0.0 && dot(off, off) <= radius_squared)
       cones += 1.0;
   }

@@ -6,42 +6,38 @@
 #include "shaders/lib/octahedral.h"
 #include "shaders/lib/scene.glsl"
 
-// (size + 2)^2: the map with a border that is wrapped by the octahedral rule.
+// (size + 2)^2: the map with a border that is wrapped by the octahedral rule, and the density of a texel
+// per steradian.
 PREVIZ_FETCHED(vec4, environment)
 // A quadtree of sampling density: level l has 4^l texels, each with the densities of its
 // four children; the mean density is 1 on every level.
 PREVIZ_FETCHED(vec4, importance)
 
 // Interpolates bilinearly between texel centres; a border of one texel holds what lies over the
-// edge.
-vec3 environment_radiance(vec3 direction) {
+// edge. `pdf` is the density of environment_sample() in this direction, which is that of the nearest texel.
+vec3 environment_radiance(vec3 direction, out float pdf) {
   const int size = int(frame.environment_size);
   const int stride = size + 2;
   const vec2 at = (octahedral_point(direction) * 0.5 + 0.5) * float(size) + 0.5;
   const vec2 low = clamp(floor(at), vec2(0.0), vec2(float(size)));
   const vec2 f = at - low;
   const int first = int(low.y) * stride + int(low.x);
-  const vec3 top = mix(fetch(environment, first).rgb, fetch(environment, first + 1).rgb, f.x);
-  const vec3 bottom = mix(fetch(environment, first + stride).rgb,
-                          fetch(environment, first + stride + 1).rgb, f.x);
-  return mix(top, bottom, f.y);
+  const vec4 top_left = fetch(environment, first), top_right = fetch(environment, first + 1);
+  const vec4 left = fetch(environment, first + stride), right = fetch(environment, first + stride + 1);
+  const bool is_right = f.x >= 0.5;
+  pdf = f.y >= 0.5 ? (is_right ? right.w : left.w) : (is_right ? top_right.w : top_left.w);
+  return mix(mix(top_left.rgb, top_right.rgb, f.x), mix(left.rgb, right.rgb, f.x), f.y);
+}
+
+vec3 environment_radiance(vec3 direction) {
+  float pdf;
+  return environment_radiance(direction, pdf);
 }
 
 // Returns the texel of IMPORTANCE that holds the densities of the four children of a node.
 int importance_texel(uint level, uvec2 at) {
   // (4^level - 1) / 3 texels precede this level.
   return int(((1u << (2u * level)) - 1u) / 3u + (at.y << level) + at.x);
-}
-
-// Returns the density of environment_sample() in a direction, per steradian.
-float environment_pdf(vec3 direction) {
-  if (frame.environment_levels == 0u) return 1.0 / (4.0 * PI);
-  const float size = float(frame.environment_size);
-  const vec2 at = (octahedral_point(direction) * 0.5 + 0.5) * size;
-  const uvec2 texel = uvec2(clamp(at, vec2(0.0), vec2(size - 1.0)));
-  const vec4 densities =
-      fetch(importance, importance_texel(frame.environment_levels - 1u, texel >> 1));
-  return densities[(texel.x & 1u) + 2u * (texel.y & 1u)] / (4.0 * PI);
 }
 
 // Picks the lower (false) or upper (true) half by the weights, and stretches the rest of u to [0,

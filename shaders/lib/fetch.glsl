@@ -33,4 +33,16 @@ bool reads_storage() { return (DEVICE & DEVICE_READS_STORAGE) != 0u; }
   PREVIZ_FETCHED_AS(textureBuffer, vec4, name, uvec2, unpack_four_halves)
 #define fetch(name, index) fetch_##name(index)
 
+// Declare a buffer that passes also write, as name[index]; read_name(index) reads what an earlier pass has
+// written there.
+#define PREVIZ_STATE(type, name)                            \
+  uniform PREVIZ_TEXELS_##type name##_texels;               \
+  layout(scalar) buffer State_##name { type name[]; };      \
+  type read_##name(uint index) {                            \
+    type element;                                           \
+    if (reads_storage()) element = name[index];             \
+    else element = type(texelFetch(name##_texels, int(index))); \
+    return element;                                         \
+  }
+
 #endif

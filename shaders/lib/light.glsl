@@ -6,12 +6,26 @@
 #include "shaders/lib/light_tree.glsl"
 #include "shaders/lib/path.glsl"
 
-layout(scalar) readonly buffer Lights { GpuLight lights[]; };
-layout(scalar) readonly buffer LightPositions { vec3 light_positions[]; };  // of each light
+PREVIZ_FETCHED(uvec4, lights)          // LIGHT_TEXELS a GpuLight
+PREVIZ_FETCHED(vec4, light_positions)  // of each light
+
+// Returns a light without its position.
+const int LIGHT_TEXELS = 10;
+GpuLight placeless_light(uint index) {
+  uvec4 t[LIGHT_TEXELS];
+  vec4 f[LIGHT_TEXELS];
+  for (int i = 0; i < LIGHT_TEXELS; ++i) {
+    t[i] = fetch(lights, int(index) * LIGHT_TEXELS + i);
+    f[i] = uintBitsToFloat(t[i]);
+  }
+  return GpuLight(f[0].xyz, t[0].w, f[1].xyz, f[1].w, f[2].xyz, f[2].w, f[3].xyz, f[3].w, f[4].xyz, f[4].w,
+                  f[5].xyz, f[5].w, f[6].xyz, f[6].w, f[7].xy, f[7].zw, f[8].xy, t[8].z, t[8].w, t[9].x, t[9].y,
+                  f[9].z, f[9].w);
+}
 
 GpuLight light_at(uint index) {
-  GpuLight light = lights[index];
-  light.position = light_positions[index];
+  GpuLight light = placeless_light(index);
+  light.position = fetch(light_positions, int(index)).xyz;
   return light;
 }
 
@@ -32,7 +46,7 @@ const float SHADOW_END = 0.9999;
 // The probability that a light or one before it is picked: among all lights, or among what the tree
 // of lamps leaves to be picked without it.
 float cdf_of(uint index, bool beside_tree) {
-  return beside_tree ? lights[index].rest_cdf : lights[index].cdf;
+  return beside_tree ? placeless_light(index).rest_cdf : placeless_light(index).cdf;
 }
 
 // Picks a light by cdf_of(); the rest of u is stretched to [0, 1).
@@ -65,14 +79,14 @@ float light_selection(GpuLight light, Receiver r) {
 uint select_light(Receiver r, vec2 lamp, out float selection) {
   const bool by_tree = choose(lamp.x, frame.tree_share);
   const uint picked = by_tree ? NO_INDEX : pick_light(lamp.y, true);
-  const uint wanted = by_tree ? NO_INDEX : lights[picked].leaf;
+  const uint wanted = by_tree ? NO_INDEX : placeless_light(picked).leaf;
   float probability = 0.0;
   uint found = NO_INDEX;
   if (by_tree || wanted != NO_INDEX)
     found = descend_tree(r, wanted, lamp.y, lamp.x * 5.9604645e-8, probability);
   const uint index = by_tree ? found : picked;
   selection = frame.tree_share * probability;
-  if (index != NO_INDEX) selection += lights[index].rest_selection;
+  if (index != NO_INDEX) selection += placeless_light(index).rest_selection;
   return index;
 }
 

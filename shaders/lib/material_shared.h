@@ -115,6 +115,7 @@ struct GpuMaterial {
   uint mappings[2];     // of every texture, of 4 bits each: by mapping_of()
   float clearcoat_normal_scale;
   uint anisotropy_steps;  // of ANISOTROPIC_TABLES from albedo_table on; 0: they are of one strength
+  uint padding[3];
 };
 
 // glTF's alpha modes: the surface is all there, or there where its alpha reaches the cutoff, or its
@@ -124,8 +125,11 @@ PREVIZ_CONST uint ALPHA_MASK = 1u;
 PREVIZ_CONST uint ALPHA_BLEND = 2u;
 
 #ifdef __cplusplus
-static_assert(sizeof(GpuMaterial) == 196);
+static_assert(sizeof(GpuMaterial) == 208);  // of MATERIAL_TEXELS (shaders/lib/scene.glsl)
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
+static_assert(offsetof(GpuMaterial, albedo_table) == 80);
+static_assert(offsetof(GpuMaterial, layer_textures) == 16 * 9);
+static_assert(offsetof(GpuMaterial, mappings) == 180);
 }  // namespace previz::gpu
 #endif
 #endif

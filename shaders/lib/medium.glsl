@@ -14,7 +14,7 @@ uint path_medium(uint bits) {
 vec3 medium_transmittance(uint medium, float distance) {
   if (!has_feature(FEATURE_ATTENUATION) || medium == 0u) return vec3(1.0);
   // A finite distance keeps 0 times infinity out of the channels that the medium leaves alone.
-  return exp(-materials[medium - 1u].attenuation * min(distance, 1e37));
+  return exp(-material_at(medium - 1u).attenuation * min(distance, 1e37));
 }
 
 // Returns the medium of a segment that ends at the surface. A segment that never entered a solid
@@ -23,7 +23,7 @@ vec3 medium_transmittance(uint medium, float distance) {
 uint medium_before(uint medium, Surface s) {
   if (!has_feature(FEATURE_ATTENUATION) || medium != 0u || s.medium == 0u || s.entering)
     return medium;
-  return materials[s.medium - 1u].alpha_mode == ALPHA_OPAQUE ? s.medium : 0u;
+  return material_at(s.medium - 1u).alpha_mode == ALPHA_OPAQUE ? s.medium : 0u;
 }
 
 // Returns the medium into which a ray leaves the surface.

@@ -55,8 +55,8 @@ float share_of_sphere(vec4 sphere, Surface s) {
   const uint lamps = min(frame.light_count, MOST_LAMPS);
   for (uint i = 0u; i < lamps; ++i) {
     const uint lamp = i * frame.light_count / lamps;
-    if (lights[lamp].type == LIGHT_DIRECTIONAL) continue;
-    const vec3 to_lamp = light_positions[lamp] - s.position;
+    if (placeless_light(lamp).type == LIGHT_DIRECTIONAL) continue;
+    const vec3 to_lamp = fetch(light_positions, int(lamp)).xyz - s.position;
     const float distance = length(to_lamp);
     if (meets_sphere(sphere, s.position, to_lamp / max(distance, 1e-30), distance)) return 1.0;
   }

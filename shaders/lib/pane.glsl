@@ -23,12 +23,12 @@ const uint KEY_PASSES = 0x68e31da4u;
 const uint KEY_PASSES_MET = 0xb5297a4du;
 
 bool may_be_pane(uint material) {
-  return materials[material].thin_walled != 0u && materials[material].transmission > 0.0;
+  return material_at(material).thin_walled != 0u && material_at(material).transmission > 0.0;
 }
 
 // Returns whether what is behind the surface may be seen through it, unbent.
 bool lets_light_through(uint material) {
-  return materials[material].alpha_mode != ALPHA_OPAQUE || may_be_pane(material);
+  return material_at(material).alpha_mode != ALPHA_OPAQUE || may_be_pane(material);
 }
 
 // Returns the share of light that goes straight through the surface; 0 where it is no pane.

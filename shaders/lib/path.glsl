@@ -11,13 +11,13 @@
 // A slot is one sample of one pixel. It has two paths, because a path can fork once: path 2 slot, and
 // path 2 slot + 1 for the world that parted. With FEATURE_CAMERA a path that landed can fork once
 // more: path 2 slots + slot.
-layout(scalar) buffer RayOrigin { vec4 ray_origin[]; };         // of a path: origin, t_min
-layout(scalar) buffer RayDirection { vec4 ray_direction[]; };   // of a path: unit direction, pdf (0: no MIS)
-layout(scalar) buffer Throughput { GpuThroughput path_throughput[]; };  // of a path
-layout(scalar) buffer Receivers { uint path_receiver[]; };     // of a path: see lib/light_tree.glsl
-layout(scalar) buffer Hits { GpuHit hits[]; };                  // of a path
-layout(scalar) buffer Queue { uint queue[]; };                  // [2][paths]: paths to extend, ping-pong
-layout(scalar) buffer Shadow { GpuShadowRay shadow_rays[]; };   // as many as there are paths
+PREVIZ_STATE(vec4, ray_origin)        // of a path: origin, t_min
+PREVIZ_STATE(vec4, ray_direction)     // of a path: unit direction, pdf (0: no MIS)
+PREVIZ_STATE(uvec4, path_throughput)  // of a path: a GpuThroughput
+PREVIZ_STATE(uint, path_receiver)     // of a path: see lib/light_tree.glsl
+PREVIZ_STATE(uvec2, hits)             // HIT_TEXELS a path: a GpuHit
+PREVIZ_STATE(uint, queue)             // [2][paths]: paths to extend, ping-pong
+PREVIZ_STATE(uvec2, shadow_rays)      // SHADOW_RAY_TEXELS each, as many as there are paths: a GpuShadowRay
 layout(scalar) buffer Mixed { vec4 sample_mixed[]; };           // of a slot: Lm, M
 layout(scalar) buffer Real { vec4 sample_real[]; };             // of a slot: Lr, one of SAMPLE_*
 layout(scalar) buffer Landed { vec4 sample_landed[]; };         // of a slot: the real part of PATH_LANDED
@@ -80,6 +80,48 @@ uint slot_sample(uint slot) { return batch.first_sample + slot / tile_slots(); }
 Sampler slot_sampler(uint slot, uvec2 pixel) {
   const Sampler random = make_sampler(frame.seed, pixel, frame.past_samples + slot_sample(slot));
   return frame.has_separate_parts != 0u ? separate_parts(random) : random;
+}
+
+GpuThroughput read_throughput(uint path) {
+  const uvec4 words = read_path_throughput(path);
+  return GpuThroughput(uintBitsToFloat(words.xyz), words.w);
+}
+void write_throughput(uint path, vec3 factor, uint state) {
+  path_throughput[path] = uvec4(floatBitsToUint(factor), state);
+}
+
+GpuHit read_hit(uint path) {
+  const uint first = path * HIT_TEXELS;
+  const uvec2 triangle = read_hits(first);
+  return GpuHit(uintBitsToFloat(read_hits(first + 2u).x), uintBitsToFloat(read_hits(first + 1u)), triangle.x,
+                triangle.y);
+}
+void write_hit(uint path, GpuHit hit) {
+  const uint first = path * HIT_TEXELS;
+  hits[first] = uvec2(hit.instance, hit.primitive);
+  hits[first + 1u] = floatBitsToUint(hit.barycentrics);
+  hits[first + 2u].x = floatBitsToUint(hit.t);
+}
+
+GpuShadowRay read_shadow_ray(uint index) {
+  uvec2 t[SHADOW_RAY_TEXELS];
+  vec2 f[SHADOW_RAY_TEXELS];
+  for (uint i = 0u; i < SHADOW_RAY_TEXELS; ++i) {
+    t[i] = read_shadow_rays(index * SHADOW_RAY_TEXELS + i);
+    f[i] = uintBitsToFloat(t[i]);
+  }
+  return GpuShadowRay(vec3(f[0], f[1].x), f[1].y, vec3(f[2], f[3].x), t[3].y, vec3(f[4], f[5].x),
+                      vec3(f[5].y, f[6]));
+}
+void write_shadow_ray(uint index, GpuShadowRay ray) {
+  const uint first = index * SHADOW_RAY_TEXELS;
+  shadow_rays[first] = floatBitsToUint(ray.origin.xy);
+  shadow_rays[first + 1u] = floatBitsToUint(vec2(ray.origin.z, ray.t_max));
+  shadow_rays[first + 2u] = floatBitsToUint(ray.direction.xy);
+  shadow_rays[first + 3u] = uvec2(floatBitsToUint(ray.direction.z), ray.path_and_worlds);
+  shadow_rays[first + 4u] = floatBitsToUint(ray.mixed.xy);
+  shadow_rays[first + 5u] = floatBitsToUint(vec2(ray.mixed.z, ray.real.x));
+  shadow_rays[first + 6u] = floatBitsToUint(ray.real.yz);
 }
 
 // The queue buffer has two halves: the active one is being worked on, the next one is being filled.

@@ -9,7 +9,7 @@
 
 // The centre and the radius of each object that is not in both worlds, then of each object that can
 // reflect without blur.
-layout(scalar) readonly buffer Bounds { vec4 bounds[]; };
+PREVIZ_FETCHED(vec4, bounds)
 
 struct Emission {
   vec3 origin;
@@ -18,7 +18,7 @@ struct Emission {
   Gain gain;
 };
 
-vec4 specular_bound(uint i) { return bounds[frame.bound_count + i]; }
+vec4 specular_bound(uint i) { return fetch(bounds, int(frame.bound_count + i)); }
 
 // Returns 1 - cos of the half angle under which a bound is seen; from inside it is the whole
 // sphere's, 2.
@@ -164,7 +164,7 @@ Emission emit_photon(Sampler random) {
   } else {
     const uint index = pick_light(choice.x, false);
     e = emit_light(light_at(index), random, choice);
-    selection = (1.0 - environment) * lights[index].selection;
+    selection = (1.0 - environment) * placeless_light(index).selection;
   }
   e.flux /= selection;
   return e;

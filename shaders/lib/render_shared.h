@@ -107,6 +107,10 @@ struct GpuShadowRay {
   vec3 real;
 };
 
+// As they lie in memory, in words of two.
+PREVIZ_CONST uint HIT_TEXELS = 3u;
+PREVIZ_CONST uint SHADOW_RAY_TEXELS = 7u;
+
 // A photon that arrived, by way of Dirac lobes only, at a surface with a lobe that is not Dirac.
 struct GpuPhoton {
   vec3 position;
@@ -189,6 +193,7 @@ struct GpuInstance {
   uint first_extra;
   uint extras_per_vertex;
   uint tangent_extra;  // which of them is the tangent, four fractions from -1 to 1; 0: none
+  uint padding;
 };
 
 PREVIZ_CONST uint TEXTURE_REPEAT = 0u;
@@ -505,7 +510,7 @@ static_assert(sizeof(GpuHit) == 20);
 static_assert(sizeof(GpuShadowRay) == 56);
 static_assert(sizeof(GpuPixel) == 160);
 static_assert(sizeof(GpuControl) == 100);
-static_assert(sizeof(GpuInstance) == 124);
+static_assert(sizeof(GpuInstance) == 128);  // of INSTANCE_TEXELS
 static_assert(sizeof(GpuTexture) == 32);
 static_assert(sizeof(GpuLight) == 160);
 static_assert(offsetof(GpuLight, uv0) == 112);

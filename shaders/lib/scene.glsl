@@ -13,12 +13,53 @@ PREVIZ_FETCHED(uvec4, triangles)  // 1 a triangle: three indices into the vertic
 PREVIZ_FETCHED(uvec2, extras)     // of GpuInstance: colours as four 16-bit fractions, and texture
                                   // coordinates as two floats
 PREVIZ_FETCHED(uvec2, texels)     // all textures one after the other: four halves a texel, linear
-layout(scalar) readonly buffer Instances { GpuInstance instances[]; };
-layout(scalar) readonly buffer Materials { GpuMaterial materials[]; };
-layout(scalar) readonly buffer Textures { GpuTexture textures[]; };
-layout(scalar) readonly buffer Frame { GpuFrame frame; };
+PREVIZ_FETCHED(uvec4, instances)  // INSTANCE_TEXELS a GpuInstance
+PREVIZ_FETCHED(uvec4, materials)  // MATERIAL_TEXELS a GpuMaterial
+PREVIZ_FETCHED(uvec4, textures)   // TEXTURE_TEXELS a GpuTexture
+layout(scalar) uniform Frame { GpuFrame frame; };
 
 const float PI = 3.14159265358979;
+
+// What is not used of a record is not fetched.
+const int INSTANCE_TEXELS = 8;
+const int MATERIAL_TEXELS = 13;
+
+GpuInstance instance_at(uint instance) {
+  const int first = int(instance) * INSTANCE_TEXELS;
+  vec4 rows[6];
+  for (int i = 0; i < 6; ++i) rows[i] = uintBitsToFloat(fetch(instances, first + i));
+  const uvec4 a = fetch(instances, first + 6);
+  const uvec4 b = fetch(instances, first + 7);
+  return GpuInstance(vec4[](rows[0], rows[1], rows[2]), vec4[](rows[3], rows[4], rows[5]), a.x, a.y,
+                     a.z, a.w, b.x, b.y, b.z, b.w);
+}
+
+GpuMaterial material_at(uint material) {
+  uvec4 t[MATERIAL_TEXELS];
+  vec4 f[MATERIAL_TEXELS];
+  for (int i = 0; i < MATERIAL_TEXELS; ++i) {
+    t[i] = fetch(materials, int(material) * MATERIAL_TEXELS + i);
+    f[i] = uintBitsToFloat(t[i]);
+  }
+  return GpuMaterial(f[0].xyz, f[0].w, f[1].xyz, f[1].w, f[2].x, f[2].y, f[2].z, t[2].w, t[3].x, t[3].y,
+                     t[3].z, t[3].w, f[4].x, t[4].y, f[4].z, f[4].w, t[5].x, f[5].yzw, f[6].x, f[6].y,
+                     vec3(f[6].zw, f[7].x), f[7].y, vec3(f[7].zw, f[8].x), f[8].yz, t[8].w,
+                     uint[](t[9].x, t[9].y, t[9].z, t[9].w, t[10].x, t[10].y, t[10].z, t[10].w, t[11].x),
+                     uint[](t[11].y, t[11].z), f[11].w, t[12].x, uint[](t[12].y, t[12].z, t[12].w));
+}
+
+const int TEXTURE_TEXELS = 2;
+GpuTexture texture_at(uint index) {
+  const uvec4 a = fetch(textures, int(index) * TEXTURE_TEXELS);
+  const uvec4 b = fetch(textures, int(index) * TEXTURE_TEXELS + 1);
+  return GpuTexture(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
+}
+
+// Returns a material's texture of a layer (LAYER_*).
+uint layer_texture(uint material, uint layer) {
+  const uint word = 36u + layer;
+  return fetch(materials, int(material * uint(MATERIAL_TEXELS) + (word >> 2)))[word & 3u];
+}
 
 // A point of a surface that is seen from the direction `wo`. Normals are turned to the viewer's
 // side.
@@ -63,7 +104,7 @@ int wrap_texel(int i, int size, uint mode) {
 
 // Looks up a texture, bilinearly or at the nearest texel.
 vec4 sample_texture(uint index, vec2 uv) {
-  const GpuTexture t = textures[index];
+  const GpuTexture t = texture_at(index);
   const ivec2 size = ivec2(t.width, t.height);
   // Beyond this range a float cannot resolve texels; the clamp also keeps NaN out of the
   // addressing.
@@ -88,12 +129,12 @@ vec4 sample_texture(uint index, vec2 uv) {
 // is a point.
 vec4 sample_footprint(uint index, vec2 uv, float area) {
   if (!has_feature(FEATURE_FILTERED_TEXTURES)) return sample_texture(index, uv);
-  const uint levels = textures[index].levels;
-  const float taken = area * float(textures[index].width) * float(textures[index].height);
+  const uint levels = texture_at(index).levels;
+  const float taken = area * float(texture_at(index).width) * float(texture_at(index).height);
   if (levels == 0u || !(taken > 1.0)) return sample_texture(index, uv);
   const float level = min(0.5 * log2(taken), float(levels));
   const uint fine = min(uint(level), levels - 1u);
-  const uint first = textures[index].first_level;
+  const uint first = texture_at(index).first_level;
   return mix(sample_texture(fine == 0u ? index : first + fine - 1u, uv),
              sample_texture(first + fine, uv), level - float(fine));
 }
@@ -175,7 +216,8 @@ vec4 vertex_color(GpuInstance instance, uvec3 vertices, vec3 b) {
 
 // Returns by which of the mesh's texture coordinates a material reads a texture (TEXTURE_OF_*).
 uint mapping_of(uint material, uint role) {
-  return (materials[material].mappings[role >> 3] >> (4u * (role & 7u))) & 15u;
+  const GpuMaterial m = material_at(material);
+  return ((role < 8u ? m.mappings[0] : m.mappings[1]) >> (4u * (role & 7u))) & 15u;
 }
 
 // Returns the triangle with the texture coordinates by which the material reads a texture.
@@ -284,7 +326,7 @@ vec3 tangent_near(vec3 direction, vec3 normal) {
 }
 
 vec2 hit_uv(uint instance, uint primitive, vec2 barycentrics) {
-  const uvec3 index = fetch(triangles, int(instances[instance].first_triangle + primitive)).xyz;
+  const uvec3 index = fetch(triangles, int(instance_at(instance).first_triangle + primitive)).xyz;
   const vec3 b = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
   vec2 uv = vec2(0.0);
   for (int i = 0; i < 3; ++i)
@@ -294,13 +336,13 @@ vec2 hit_uv(uint instance, uint primitive, vec2 barycentrics) {
 }
 
 float vertex_alpha(uint instance, uint primitive, vec2 barycentrics) {
-  const uvec3 index = fetch(triangles, int(instances[instance].first_triangle + primitive)).xyz;
-  return vertex_color(instances[instance], index, vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics)).a;
+  const uvec3 index = fetch(triangles, int(instance_at(instance).first_triangle + primitive)).xyz;
+  return vertex_color(instance_at(instance), index, vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics)).a;
 }
 
 // Returns the share of a surface that is there, by the alpha of its material.
 float coverage(uint instance, uint primitive, vec2 barycentrics) {
-  const GpuMaterial m = materials[instances[instance].material];
+  const GpuMaterial m = material_at(instance_at(instance).material);
   if (m.alpha_mode == ALPHA_OPAQUE) return 1.0;
   float alpha = m.alpha;
   if (has_feature(FEATURE_TEXTURES) && m.base_color_texture != NO_INDEX)
@@ -357,12 +399,12 @@ vec4 look_up_layer(TexturePoint at, uint layer) {
   float area;
   const vec2 uv = mapped_uv(at, TEXTURE_OF_LAYERS + layer, area);
   const uint material = at.instance.material;
-  return sample_texture(materials[material].layer_textures[layer], uv);
+  return sample_texture(layer_texture(material, layer), uv);
 }
 
 // Returns whether the material has this texture (LAYER_*).
 bool has_layer(uint material, uint layer) {
-  return has_feature(FEATURE_LAYER_TEXTURES) && (materials[material].layers & (1u << layer)) != 0u;
+  return has_feature(FEATURE_LAYER_TEXTURES) && (material_at(material).layers & (1u << layer)) != 0u;
 }
 
 // Applies the textures that multiply a factor; the others give directions. There is one look-up for all
@@ -370,7 +412,7 @@ bool has_layer(uint material, uint layer) {
 #define PREVIZ_LAYER_BIT(layer, factor, channels) | (1u << layer)
 #define PREVIZ_APPLY_LAYER(layer, factor, channels) case layer: s.factor *= texel.channels; break;
 void apply_layers(inout Surface s, uint material, TexturePoint at) {
-  uint left = materials[material].layers & (0u PREVIZ_LAYER_TEXTURES(PREVIZ_LAYER_BIT));
+  uint left = material_at(material).layers & (0u PREVIZ_LAYER_TEXTURES(PREVIZ_LAYER_BIT));
   for (; left != 0u; left &= left - 1u) {
     const uint layer = uint(findLSB(left));
     const vec4 texel = look_up_layer(at, layer);
@@ -385,12 +427,12 @@ void apply_layers(inout Surface s, uint material, TexturePoint at) {
 // Returns the direction of the material's anisotropy on the texture times its strength, and the step of
 // the tables of that strength (Surface).
 vec2 anisotropy_at(uint material, TexturePoint at, out float step) {
-  const vec2 given = materials[material].anisotropy;
+  const vec2 given = material_at(material).anisotropy;
   step = -1.0;
   if (all(equal(given, vec2(0.0))) || !has_layer(material, LAYER_ANISOTROPY)) return given;
   const vec3 texel = look_up_layer(at, LAYER_ANISOTROPY).rgb;
-  if (materials[material].anisotropy_steps > 0u)
-    step = clamp(texel.b, 0.0, 1.0) * float(materials[material].anisotropy_steps);
+  if (material_at(material).anisotropy_steps > 0u)
+    step = clamp(texel.b, 0.0, 1.0) * float(material_at(material).anisotropy_steps);
   vec2 along = texel.rg * 2.0 - 1.0;
   const float size = length(along);
   along = size > 0.0 ? along / size : vec2(1.0, 0.0);
@@ -413,7 +455,7 @@ vec3 anisotropic_direction(TexturePoint at, vec2 anisotropy, vec3 normal) {
   s.name = has_feature(feature) ? m.name : otherwise;
 void apply_material(inout Surface s, TexturePoint at, vec2 anisotropy) {
   const uint material = at.instance.material;
-  const GpuMaterial m = materials[material];
+  const GpuMaterial m = material_at(material);
   s.base_color = m.base_color;
   s.metallic = m.metallic;
   float roughness = m.roughness;
@@ -499,8 +541,8 @@ bool has_clear_normal() { return has_feature(FEATURE_CLEARCOAT) && has_feature(F
 
 vec3 clear_normal_at(uint material, TexturePoint at, vec3 normal, vec3 outward) {
   if (!has_layer(material, LAYER_CLEARCOAT_NORMAL)) return normal;
-  return normal_at(at, materials[material].layer_textures[LAYER_CLEARCOAT_NORMAL],
-                   materials[material].clearcoat_normal_scale,
+  return normal_at(at, layer_texture(material, LAYER_CLEARCOAT_NORMAL),
+                   material_at(material).clearcoat_normal_scale,
                    TEXTURE_OF_LAYERS + LAYER_CLEARCOAT_NORMAL, normal, outward);
 }
 
@@ -511,7 +553,7 @@ vec3 lacquer_normal(Surface s) { return has_clear_normal() ? s.clear_normal : s.
 // across the ray (0: a point). The hit's barycentrics are the weights of the triangle's second and
 // third vertex.
 Surface make_surface(GpuHit hit, vec3 direction, float footprint) {
-  const GpuInstance instance = instances[hit.instance];
+  const GpuInstance instance = instance_at(hit.instance);
   const uvec3 index = fetch(triangles, int(instance.first_triangle + hit.primitive)).xyz;
   const vec4 p0 = fetch(vertices, int(2u * index.x));
   const vec4 p1 = fetch(vertices, int(2u * index.y));
@@ -561,8 +603,8 @@ Surface make_surface(GpuHit hit, vec3 direction, float footprint) {
     s.tangent = anisotropic_direction(at, anisotropy, s.normal);
   }
   if (has_clear_normal()) s.clear_normal = clear_normal_at(material, at, s.normal, outward);
-  if (has_feature(FEATURE_NORMAL_MAPS) && materials[material].normal_texture != NO_INDEX)
-    s.normal = normal_at(at, materials[material].normal_texture, materials[material].normal_scale,
+  if (has_feature(FEATURE_NORMAL_MAPS) && material_at(material).normal_texture != NO_INDEX)
+    s.normal = normal_at(at, material_at(material).normal_texture, material_at(material).normal_scale,
                          TEXTURE_OF_NORMAL, s.normal, outward);
   if (dot(s.normal, s.geometric_normal) < 0.0) s.normal = -s.normal;
   apply_material(s, at, anisotropy);

@@ -23,7 +23,7 @@ class Accumulator {
     render::upload_storage(device, purpose, limits_, std::vector{gpu::UNLIMITED});
     gpu::GpuFrame frame{};
     frame.width = frame.height = 1;
-    render::upload_storage(device, purpose, frame_, std::vector{frame});
+    render::upload_uniform(device, purpose, frame_, frame);
   }
 
   static constexpr std::uint32_t batch_samples = 4096;

@@ -39,9 +39,10 @@ std::vector<vk::DescriptorSetLayoutBinding> read_bindings(const fs::path& file) 
   std::uint32_t number = 0;
   for (std::string type; in >> number >> type;)
     bindings.emplace_back(number,
-                          type == "storage"  ? vk::DescriptorType::eStorageBuffer
-                          : type == "texels" ? vk::DescriptorType::eUniformTexelBuffer
-                                             : vk::DescriptorType::eAccelerationStructureKHR,
+                          type == "storage"   ? vk::DescriptorType::eStorageBuffer
+                          : type == "uniform" ? vk::DescriptorType::eUniformBuffer
+                          : type == "texels"  ? vk::DescriptorType::eUniformTexelBuffer
+                                              : vk::DescriptorType::eAccelerationStructureKHR,
                           1, vk::ShaderStageFlagBits::eCompute);
   return bindings;
 }

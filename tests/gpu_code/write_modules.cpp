@@ -31,9 +31,10 @@ constexpr std::uint32_t card = previz::gpu::DEVICE_IS_CARD | previz::gpu::DEVICE
 
 const char* words_for(previz::render::BufferKind kind) {
   using previz::render::BufferKind;
-  return kind == BufferKind::storage  ? "storage"
-         : kind == BufferKind::texels ? "texels"
-                                      : "structure";
+  return kind == BufferKind::storage   ? "storage"
+         : kind == BufferKind::uniform ? "uniform"
+         : kind == BufferKind::texels  ? "texels"
+                                       : "structure";
 }
 
 void write(const std::filesystem::path& stem, const Pass& pass, std::uint32_t features) {

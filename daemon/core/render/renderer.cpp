@@ -133,7 +133,7 @@ void Renderer::Impl::upload_frame() {
   gpu_frame.clip_from = is_clipped ? response->clipping().from : gpu::NO_INDEX;
   scene.describe(gpu_frame, needed());
   const Purpose purpose{"the frame's settings", "close other programs"};
-  upload_storage(*device, purpose, frame_buffer, std::vector{gpu_frame});
+  upload_uniform(*device, purpose, frame_buffer, gpu_frame);
 }
 
 std::uint32_t Renderer::Impl::photons() const {

@@ -27,7 +27,7 @@ std::vector<Photons> sort_photons(render::Device& device, const std::vector<std:
   for (std::size_t i = 0; i < photons.size(); ++i) photons[i].mixed.x = static_cast<float>(i);
   Buffer frames, photon_buffer, key_buffer;
   const render::Purpose purpose{"a test", ""};
-  render::upload_storage(device, purpose, frames, std::vector{frame});
+  render::upload_uniform(device, purpose, frames, frame);
   render::upload_storage(device, purpose, photon_buffer, photons);
   render::upload_storage(device, purpose, key_buffer, keys);
   Buffers buffers;

@@ -1,6 +1,7 @@
 // What a SPIR-V module says about itself, and what is left of it when features are switched off.
 #include "daemon/core/render/device/spirv.hpp"
 
+#include <set>
 #include <spirv-tools/libspirv.hpp>
 
 #include "daemon/core/render/device/kernel.hpp"
@@ -53,12 +54,23 @@ TEST(Spirv, WhatIsFetchedIsTexelsOrStorageByTheDevice) {
       if (binding.name == name) kinds.push_back(binding.kind);
     return kinds;
   };
+  const auto names_of = [](const std::vector<SpirvInfo::Binding>& bindings) {
+    std::set<std::string> names;
+    for (const SpirvInfo::Binding& binding : bindings) names.insert(binding.name);
+    return names;
+  };
   const auto as_texels = bindings_for(0), as_storage = bindings_for(gpu::DEVICE_READS_STORAGE);
-  EXPECT_EQ(as_texels.size(), as_storage.size());
+  EXPECT_EQ(names_of(as_texels), names_of(as_storage));
+  EXPECT_EQ(names_of(as_storage).size(), as_storage.size());
   for (const char* const name : {"vertices", "triangles", "texels", "environment"}) {
     EXPECT_THAT(kinds_of(as_texels, name), ElementsAre(render::BufferKind::texels)) << name;
     EXPECT_THAT(kinds_of(as_storage, name), ElementsAre(render::BufferKind::storage)) << name;
   }
+  // Those are written, too.
+  EXPECT_THAT(
+      kinds_of(as_texels, "ray_origin"),
+      testing::UnorderedElementsAre(render::BufferKind::texels, render::BufferKind::storage));
+  EXPECT_THAT(kinds_of(as_storage, "ray_origin"), ElementsAre(render::BufferKind::storage));
   EXPECT_TRUE(std::ranges::none_of(
       as_storage, [](render::BufferKind kind) { return kind == render::BufferKind::texels; },
       &SpirvInfo::Binding::kind));

@@ -232,6 +232,10 @@ Buffer create_indirect_buffer(Device& device, const Purpose& purpose, vk::Device
       vk::BufferUsageFlagBits::eStorageBuffer | vk::BufferUsageFlagBits::eIndirectBuffer);
 }
 
+Buffer create_uniform_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size) {
+  return create_device_buffer(device, purpose, size, vk::BufferUsageFlagBits::eUniformBuffer);
+}
+
 Buffer create_texel_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size,
                            vk::Format format, bool is_storage) {
   return texel_buffer(device, purpose, size, format, is_storage, false);

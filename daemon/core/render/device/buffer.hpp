@@ -43,6 +43,8 @@ struct Buffer {
 // does not allow so large a buffer or has no memory for it.
 Buffer create_storage_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size);
 Buffer create_indirect_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size);
+// Creates a buffer that all invocations read at the same places, which is quicker: 16 KiB at most.
+Buffer create_uniform_buffer(Device& device, const Purpose& purpose, vk::DeviceSize size);
 // Creates a buffer that shaders fetch from (shaders/lib/fetch.glsl), as texels where the device
 // reads texels. It is written by uploads, or with `is_storage` by shaders, for which a device may
 // allow less.
@@ -136,6 +138,11 @@ void upload_storage(Device& device, const Purpose& purpose, Buffer& buffer,
   const vk::DeviceSize size = data.size() * sizeof(T);
   if (!buffer.buffer || buffer.size < size) buffer = create_storage_buffer(device, purpose, size);
   upload_bytes(device, buffer, std::as_bytes(std::span(data)));
+}
+template <typename T>
+void upload_uniform(Device& device, const Purpose& purpose, Buffer& buffer, const T& data) {
+  if (!buffer.buffer) buffer = create_uniform_buffer(device, purpose, sizeof(T));
+  upload_bytes(device, buffer, std::as_bytes(std::span(&data, 1)));
 }
 template <typename T>
 void upload_texels(Device& device, const Purpose& purpose, Buffer& buffer,

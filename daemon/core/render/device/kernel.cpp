@@ -25,6 +25,8 @@ vk::DescriptorType descriptor_of(BufferKind kind) {
   switch (kind) {
     case BufferKind::storage:
       return vk::DescriptorType::eStorageBuffer;
+    case BufferKind::uniform:
+      return vk::DescriptorType::eUniformBuffer;
     case BufferKind::texels:
       return vk::DescriptorType::eUniformTexelBuffer;
     case BufferKind::acceleration_structure:

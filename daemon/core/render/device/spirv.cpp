@@ -41,8 +41,10 @@ constexpr std::uint32_t mode_local_size = 17, mode_local_size_id = 38;
 constexpr std::uint32_t mode_subgroup_uniform_control_flow = 4421;
 constexpr std::uint32_t capability_group_non_uniform = 61;
 constexpr std::uint32_t decoration_spec_id = 1, decoration_binding = 33;
-constexpr std::string_view fetched_suffix = "_storage";  // shaders/lib/fetch.glsl
-constexpr std::uint32_t storage_uniform_constant = 0, storage_storage_buffer = 12;
+// One buffer that is seen in two ways (shaders/lib/fetch.glsl).
+constexpr std::string_view storage_suffix = "_storage", texels_suffix = "_texels";
+constexpr std::uint32_t storage_uniform_constant = 0, storage_uniform = 2,
+                        storage_storage_buffer = 12;
 
 // Everything that a module says about one of its ids.
 struct SpirvId {
@@ -150,12 +152,16 @@ SpirvInfo describe_spirv(std::span<const std::uint32_t> spirv) {
   for (const std::uint32_t id : variables) {
     const SpirvId& variable = ids[id];
     const bool is_storage = variable.storage == storage_storage_buffer;
-    if (!variable.is_used || !(is_storage || variable.storage == storage_uniform_constant))
+    const bool is_uniform = variable.storage == storage_uniform;
+    if (!variable.is_used ||
+        !(is_storage || is_uniform || variable.storage == storage_uniform_constant))
       continue;
     const SpirvId& type = ids[ids[variable.type].pointee];
     std::string_view name = *variable.name != 0 ? variable.name : type.first_member;
-    if (name.ends_with(fetched_suffix)) name.remove_suffix(fetched_suffix.size());
+    const std::string_view suffix = is_storage ? storage_suffix : texels_suffix;
+    if (name.ends_with(suffix)) name.remove_suffix(suffix.size());
     const BufferKind kind = is_storage                       ? BufferKind::storage
+                            : is_uniform                     ? BufferKind::uniform
                             : type.is_acceleration_structure ? BufferKind::acceleration_structure
                                                              : BufferKind::texels;
     info.bindings.push_back({std::string(name), variable.binding, kind});

@@ -9,7 +9,7 @@
 
 namespace previz::render {
 
-enum class BufferKind { storage, texels, acceleration_structure };
+enum class BufferKind { storage, uniform, texels, acceleration_structure };
 
 struct SpirvInfo {
   struct Binding {

@@ -62,8 +62,7 @@ std::uint32_t slots_of(const gpu::GpuBatch& tile) {
 // array with an element for each slot, path, pixel or photon is no larger than a storage buffer may
 // be.
 std::uint32_t most_slots(const Device& device, std::uint32_t paths_a_slot) {
-  const std::size_t a_path = std::max({sizeof(gpu::vec4), sizeof(gpu::GpuHit),
-                                       sizeof(gpu::GpuShadowRay), 2 * sizeof(std::uint32_t)});
+  const std::size_t a_path = gpu::SHADOW_RAY_TEXELS * sizeof(gpu::uvec2);  // the largest
   const std::size_t a_slot =
       std::max(std::max(sizeof(gpu::GpuPixel), sizeof(gpu::GpuPhoton)), paths_a_slot * a_path);
   const std::size_t allowed = device.limits().maxStorageBufferRange / a_slot;
@@ -149,13 +148,17 @@ void Wavefront::create_path_buffers(std::uint32_t slots) {
                       &shadow_rays_, &sample_mixed_, &sample_real_, &sample_landed_, &sample_aov_,
                       &sample_albedo_, &sample_caustic_})
     *old = Buffer{};  // frees the old memory before the new is allocated
-  ray_origin_ = create_storage_buffer(device_, for_paths(), paths * sizeof(gpu::vec4));
-  ray_direction_ = create_storage_buffer(device_, for_paths(), paths * sizeof(gpu::vec4));
-  throughput_ = create_storage_buffer(device_, for_paths(), paths * sizeof(gpu::GpuThroughput));
-  receivers_ = create_storage_buffer(device_, for_paths(), paths * sizeof(std::uint32_t));
-  hits_ = create_storage_buffer(device_, for_paths(), paths * sizeof(gpu::GpuHit));
-  queue_ = create_storage_buffer(device_, for_paths(), 2 * paths * sizeof(std::uint32_t));
-  shadow_rays_ = create_storage_buffer(device_, for_paths(), paths * sizeof(gpu::GpuShadowRay));
+  const auto create_state = [&](vk::DeviceSize count, vk::DeviceSize size, vk::Format format) {
+    return create_texel_buffer(device_, for_paths(), count * size, format, /*is_storage=*/true);
+  };
+  ray_origin_ = create_state(paths, sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat);
+  ray_direction_ = create_state(paths, sizeof(gpu::vec4), vk::Format::eR32G32B32A32Sfloat);
+  throughput_ = create_state(paths, sizeof(gpu::GpuThroughput), vk::Format::eR32G32B32A32Uint);
+  receivers_ = create_state(paths, sizeof(std::uint32_t), vk::Format::eR32Uint);
+  hits_ = create_state(paths, gpu::HIT_TEXELS * sizeof(gpu::uvec2), vk::Format::eR32G32Uint);
+  queue_ = create_state(2 * paths, sizeof(std::uint32_t), vk::Format::eR32Uint);
+  shadow_rays_ =
+      create_state(paths, gpu::SHADOW_RAY_TEXELS * sizeof(gpu::uvec2), vk::Format::eR32G32Uint);
   sample_mixed_ = create_storage_buffer(device_, for_paths(), slots * sizeof(gpu::vec4));
   sample_real_ = create_storage_buffer(device_, for_paths(), slots * sizeof(gpu::vec4));
   sample_landed_ = create_storage_buffer(device_, for_paths(),

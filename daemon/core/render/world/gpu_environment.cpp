@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <numbers>
 #include <string>
 
 #include "drivers/error.hpp"
@@ -107,6 +108,11 @@ EncodedEnvironment encode_environment(const lighting::EnvironmentMap& map) {
     for (auto& level : pyramid) level.assign(level.size(), 1.0);
   }
   const double scale = e.mean > 0 ? 1 / e.mean : 1;
+  glm::vec4* texel = e.radiance.data();
+  for (int j = -1; j <= map.size; ++j)
+    for (int i = -1; i <= map.size; ++i)
+      (texel++)->a = static_cast<float>(pyramid.front()[lighting::wrapped_texel(map.size, i, j)] *
+                                        scale * std::numbers::inv_pi / 4);
   for (std::uint32_t level = 0; level < e.levels; ++level) {
     const auto& children = pyramid[e.levels - 1 - level];
     const auto texels = quads(children, std::size_t{2} << level, scale);

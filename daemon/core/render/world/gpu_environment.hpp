@@ -13,7 +13,7 @@ namespace previz::render {
 struct EncodedEnvironment {
   std::uint32_t size = 1;
   std::uint32_t levels = 0;  // log2(size)
-  // (size + 2)^2, border wrapped by the octahedral rule
+  // (size + 2)^2, border wrapped by the octahedral rule; alpha: density of samples per steradian
   std::vector<glm::vec4> radiance = std::vector<glm::vec4>(9);
   std::vector<glm::vec4> importance;  // densities, level by level; see render_shared.h
   double mean = 0;                    // mean of (r + g + b) / 3 over the sphere

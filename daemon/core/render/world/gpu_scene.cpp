@@ -242,7 +242,7 @@ void GpuScene::upload_materials(double specular_alpha) {
     as_read.push_back(this->as_read(material));
   const EncodedMaterials encoded = encode_materials(as_read, specular_alpha);
   const Purpose purpose{"the materials", "use fewer materials"};
-  upload_storage(device_, purpose, materials_, encoded.materials);
+  upload_texels(device_, purpose, materials_, encoded.materials, vk::Format::eR32G32B32A32Uint);
   upload_texels(device_, purpose, albedo_, encoded.albedo, vk::Format::eR32Sfloat);
 }
 
@@ -295,7 +295,7 @@ void GpuScene::upload_textures() {
                         filters_textures_
                             ? "use smaller textures, or set estimator.filter_textures to false"
                             : "use smaller textures"};
-  upload_storage(device_, purpose, textures_, textures);
+  upload_texels(device_, purpose, textures_, textures, vk::Format::eR32G32B32A32Uint);
   upload_texels(device_, purpose, texels_, texels, vk::Format::eR32G32Uint);
 }
 
@@ -331,7 +331,7 @@ void GpuScene::upload_bounds(const glm::dvec3& camera_position) {
     for (const glm::dvec4& bound : part)
       bounds.emplace_back(glm::dvec3(bound) - camera_position, bound.w);
   const Purpose purpose{"the bounds of virtual objects", "use fewer objects"};
-  upload_storage(device_, purpose, bounds_buffer_, bounds);
+  upload_texels(device_, purpose, bounds_buffer_, bounds, vk::Format::eR32G32B32A32Sfloat);
 }
 
 // The extent does not depend on the camera, to the last bit, so that lights need not be weighed
@@ -380,7 +380,7 @@ void GpuScene::upload_instances(const glm::dvec3& camera_position) {
   const scene::TopBvh top_bvh = scene::build_top_bvh(top);
   upload_bytes(device_, bvh_, std::as_bytes(std::span(top_bvh.texels)));
   const Purpose purpose{"the scene's objects", "use fewer objects"};
-  upload_storage(device_, purpose, instances_, instances);
+  upload_texels(device_, purpose, instances_, instances, vk::Format::eR32G32B32A32Uint);
   if (device_.traces_in_hardware()) place_structures(top);
 }
 

@@ -166,17 +166,18 @@ void SceneLights::encode(const scene::Scene& scene) {
   differ_ = std::any_of(all.lights.begin(), all.lights.end(), [](const gpu::GpuLight& light) {
     return light.gain_mixed != light.gain_real;
   });
-  upload_storage(device_, for_lights, lights_, all.lights);
+  upload_texels(device_, for_lights, lights_, all.lights, vk::Format::eR32G32B32A32Uint);
   upload_texels(device_, for_lights, light_tree_, tree.nodes, vk::Format::eR32G32B32A32Uint);
   positions_ = std::move(all.positions);
 }
 
 void SceneLights::upload_positions(const glm::dvec3& camera_position) {
   seen_from_ = camera_position;
-  std::vector<glm::vec3> positions;
+  std::vector<glm::vec4> positions;
   positions.reserve(positions_.size());
-  for (const glm::dvec3& position : positions_) positions.emplace_back(position - camera_position);
-  upload_storage(device_, for_lights, light_positions_, positions);
+  for (const glm::dvec3& position : positions_)
+    positions.emplace_back(position - camera_position, 0.0);
+  upload_texels(device_, for_lights, light_positions_, positions, vk::Format::eR32G32B32A32Sfloat);
 }
 
 void SceneLights::describe(gpu::GpuFrame& frame) const {
