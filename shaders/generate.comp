@@ -18,11 +18,12 @@ bool may_be_covered(uvec2 pixel) {
   const float pixel_angle = 1.5 * length(corner - ray);  // that of half the diagonal, with a margin
   const vec3 direction = normalize(transform_vector(frame.world_from_camera, ray));
   for (uint i = 0u; i < frame.bound_count; ++i) {
-    const float far = length(fetch(bounds, int(i)).xyz) + fetch(bounds, int(i)).w;
-    float radius = fetch(bounds, int(i)).w + pixel_angle * far;
+    const vec4 bound = fetch(bounds, int(i));
+    const float far = length(bound.xyz) + bound.w;
+    float radius = bound.w + pixel_angle * far;
     if (has_feature(FEATURE_LENS)) radius += frame.lens_radius * (1.0 + far / frame.focus_distance);
-    const float along = max(dot(fetch(bounds, int(i)).xyz, direction), 0.0);
-    const vec3 off = fetch(bounds, int(i)).xyz - along * direction;
+    const float along = max(dot(bound.xyz, direction), 0.0);
+    const vec3 off = bound.xyz - along * direction;
     if (dot(off, off) <= radius * radius) return true;
   }
   return false;

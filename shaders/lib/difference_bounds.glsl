@@ -21,10 +21,11 @@ float bound_cap(vec4 bound, vec3 point) {
 // Returns whether the segment from the point can meet any bound.
 bool meets_bounds(vec3 point, vec3 direction, float t_max) {
   for (uint i = 0u; i < frame.bound_count; ++i) {
-    const vec3 to_center = fetch(bounds, int(i)).xyz - point;
+    const vec4 bound = fetch(bounds, int(i));
+    const vec3 to_center = bound.xyz - point;
     const float nearest = clamp(dot(to_center, direction), 0.0, t_max);
     const vec3 off = to_center - nearest * direction;
-    if (dot(off, off) <= fetch(bounds, int(i)).w * fetch(bounds, int(i)).w) return true;
+    if (dot(off, off) <= bound.w * bound.w) return true;
   }
   return false;
 }
@@ -71,10 +72,11 @@ float bounds_pdf(vec3 point, float total, vec3 direction) {
   if (total <= 0.0) return 0.0;
   float cones = 0.0;
   for (uint i = 0u; i < frame.bound_count; ++i) {
-    const vec3 to_center = fetch(bounds, int(i)).xyz - point;
+    const vec4 bound = fetch(bounds, int(i));
+    const vec3 to_center = bound.xyz - point;
     const float along = dot(to_center, direction);
     const vec3 off = to_center - along * direction;
-    const float radius_squared = fetch(bounds, int(i)).w * fetch(bounds, int(i)).w;
+    const float radius_squared = bound.w * bound.w;
     if (dot(to_center, to_center) > radius_squared && along > 0.0 && dot(off, off) <= radius_squared)
       cones += 1.0;
   }

@@ -33,6 +33,15 @@ bool reads_storage() { return (DEVICE & DEVICE_READS_STORAGE) != 0u; }
   PREVIZ_FETCHED_AS(textureBuffer, vec4, name, uvec2, unpack_four_halves)
 #define fetch(name, index) fetch_##name(index)
 
+// Declares the words of record `index` of such a buffer, of uvec4, as integers and as floats.
+#define PREVIZ_FETCH_RECORD(name, texel_count, index, integers, floats)      \
+  uvec4 integers[texel_count];                                               \
+  vec4 floats[texel_count];                                                  \
+  for (int texel = 0; texel < texel_count; ++texel) {                        \
+    integers[texel] = fetch(name, int(index) * texel_count + texel);         \
+    floats[texel] = uintBitsToFloat(integers[texel]);                        \
+  }
+
 // Declare a buffer that passes also write, as name[index]; read_name(index) reads what an earlier pass has
 // written there.
 #define PREVIZ_STATE(type, name)                            \

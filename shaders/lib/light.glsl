@@ -12,12 +12,7 @@ PREVIZ_FETCHED(vec4, light_positions)  // of each light
 // Returns a light without its position.
 const int LIGHT_TEXELS = 10;
 GpuLight placeless_light(uint index) {
-  uvec4 t[LIGHT_TEXELS];
-  vec4 f[LIGHT_TEXELS];
-  for (int i = 0; i < LIGHT_TEXELS; ++i) {
-    t[i] = fetch(lights, int(index) * LIGHT_TEXELS + i);
-    f[i] = uintBitsToFloat(t[i]);
-  }
+  PREVIZ_FETCH_RECORD(lights, LIGHT_TEXELS, index, t, f)
   return GpuLight(f[0].xyz, t[0].w, f[1].xyz, f[1].w, f[2].xyz, f[2].w, f[3].xyz, f[3].w, f[4].xyz, f[4].w,
                   f[5].xyz, f[5].w, f[6].xyz, f[6].w, f[7].xy, f[7].zw, f[8].xy, t[8].z, t[8].w, t[9].x, t[9].y,
                   f[9].z, f[9].w);

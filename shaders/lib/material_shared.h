@@ -125,7 +125,7 @@ PREVIZ_CONST uint ALPHA_MASK = 1u;
 PREVIZ_CONST uint ALPHA_BLEND = 2u;
 
 #ifdef __cplusplus
-static_assert(sizeof(GpuMaterial) == 208);  // of MATERIAL_TEXELS (shaders/lib/scene.glsl)
+static_assert(sizeof(GpuMaterial) == 208);  // of MATERIAL_TEXELS (shaders/lib/records.glsl)
 static_assert(offsetof(GpuMaterial, base_color_texture) == 48);
 static_assert(offsetof(GpuMaterial, albedo_table) == 80);
 static_assert(offsetof(GpuMaterial, layer_textures) == 16 * 9);

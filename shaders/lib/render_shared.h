@@ -107,7 +107,7 @@ struct GpuShadowRay {
   vec3 real;
 };
 
-// As they lie in memory, in words of two.
+// A hit and a shadow ray lie in memory as so many pairs of words (lib/path.glsl).
 PREVIZ_CONST uint HIT_TEXELS = 3u;
 PREVIZ_CONST uint SHADOW_RAY_TEXELS = 7u;
 

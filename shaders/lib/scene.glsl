@@ -2,64 +2,15 @@
 #ifndef PREVIZ_SCENE_GLSL
 #define PREVIZ_SCENE_GLSL
 
-#include "shaders/lib/fetch.glsl"
-#include "shaders/lib/render_shared.h"
-
-layout(constant_id = 0) const uint FEATURES = 0xffffffffu;
-bool has_feature(uint feature) { return (FEATURES & feature) != 0u; }
+#include "shaders/lib/textures.glsl"
 
 PREVIZ_FETCHED(vec4, vertices)    // 2 a vertex: position, u; normal, v (object space)
 PREVIZ_FETCHED(uvec4, triangles)  // 1 a triangle: three indices into the vertices
 PREVIZ_FETCHED(uvec2, extras)     // of GpuInstance: colours as four 16-bit fractions, and texture
                                   // coordinates as two floats
-PREVIZ_FETCHED(uvec2, texels)     // all textures one after the other: four halves a texel, linear
-PREVIZ_FETCHED(uvec4, instances)  // INSTANCE_TEXELS a GpuInstance
-PREVIZ_FETCHED(uvec4, materials)  // MATERIAL_TEXELS a GpuMaterial
-PREVIZ_FETCHED(uvec4, textures)   // TEXTURE_TEXELS a GpuTexture
 layout(scalar) uniform Frame { GpuFrame frame; };
 
 const float PI = 3.14159265358979;
-
-// What is not used of a record is not fetched.
-const int INSTANCE_TEXELS = 8;
-const int MATERIAL_TEXELS = 13;
-
-GpuInstance instance_at(uint instance) {
-  const int first = int(instance) * INSTANCE_TEXELS;
-  vec4 rows[6];
-  for (int i = 0; i < 6; ++i) rows[i] = uintBitsToFloat(fetch(instances, first + i));
-  const uvec4 a = fetch(instances, first + 6);
-  const uvec4 b = fetch(instances, first + 7);
-  return GpuInstance(vec4[](rows[0], rows[1], rows[2]), vec4[](rows[3], rows[4], rows[5]), a.x, a.y,
-                     a.z, a.w, b.x, b.y, b.z, b.w);
-}
-
-GpuMaterial material_at(uint material) {
-  uvec4 t[MATERIAL_TEXELS];
-  vec4 f[MATERIAL_TEXELS];
-  for (int i = 0; i < MATERIAL_TEXELS; ++i) {
-    t[i] = fetch(materials, int(material) * MATERIAL_TEXELS + i);
-    f[i] = uintBitsToFloat(t[i]);
-  }
-  return GpuMaterial(f[0].xyz, f[0].w, f[1].xyz, f[1].w, f[2].x, f[2].y, f[2].z, t[2].w, t[3].x, t[3].y,
-                     t[3].z, t[3].w, f[4].x, t[4].y, f[4].z, f[4].w, t[5].x, f[5].yzw, f[6].x, f[6].y,
-                     vec3(f[6].zw, f[7].x), f[7].y, vec3(f[7].zw, f[8].x), f[8].yz, t[8].w,
-                     uint[](t[9].x, t[9].y, t[9].z, t[9].w, t[10].x, t[10].y, t[10].z, t[10].w, t[11].x),
-                     uint[](t[11].y, t[11].z), f[11].w, t[12].x, uint[](t[12].y, t[12].z, t[12].w));
-}
-
-const int TEXTURE_TEXELS = 2;
-GpuTexture texture_at(uint index) {
-  const uvec4 a = fetch(textures, int(index) * TEXTURE_TEXELS);
-  const uvec4 b = fetch(textures, int(index) * TEXTURE_TEXELS + 1);
-  return GpuTexture(a.x, a.y, a.z, a.w, b.x, b.y, b.z, b.w);
-}
-
-// Returns a material's texture of a layer (LAYER_*).
-uint layer_texture(uint material, uint layer) {
-  const uint word = 36u + layer;
-  return fetch(materials, int(material * uint(MATERIAL_TEXELS) + (word >> 2)))[word & 3u];
-}
 
 // A point of a surface that is seen from the direction `wo`. Normals are turned to the viewer's
 // side.
@@ -87,57 +38,6 @@ struct Surface {
   float anisotropy_step;  // of the anisotropy's tables, counted from no strength at all; below 0: the only one
   uint medium;            // behind the surface, where that is a coloured solid (lib/medium.glsl)
 };
-
-vec4 fetch_texel(GpuTexture t, ivec2 at) {
-  const uvec2 bits = fetch(texels, int(t.first_texel) + at.y * int(t.width) + at.x);
-  return vec4(unpackHalf2x16(bits.x), unpackHalf2x16(bits.y));
-}
-
-// Returns the texel that stands for texel i beyond the edges, by the wrap mode.
-int wrap_texel(int i, int size, uint mode) {
-  if (mode == TEXTURE_CLAMP) return clamp(i, 0, size - 1);
-  const int period = mode == TEXTURE_MIRROR ? 2 * size : size;
-  i = i - period * int(floor(float(i) / float(period)));
-  i = clamp(i, 0, period - 1);  // far out, float division may be off by one
-  return i < size ? i : period - 1 - i;
-}
-
-// Looks up a texture, bilinearly or at the nearest texel.
-vec4 sample_texture(uint index, vec2 uv) {
-  const GpuTexture t = texture_at(index);
-  const ivec2 size = ivec2(t.width, t.height);
-  // Beyond this range a float cannot resolve texels; the clamp also keeps NaN out of the
-  // addressing.
-  uv = clamp(uv, vec2(-65536.0), vec2(65536.0));
-  const vec2 at = uv * vec2(size);
-  if (t.nearest != 0u) {
-    const ivec2 i = ivec2(floor(at));
-    return fetch_texel(t, ivec2(wrap_texel(i.x, size.x, t.wrap_u), wrap_texel(i.y, size.y, t.wrap_v)));
-  }
-  const vec2 low = floor(at - 0.5);
-  const vec2 f = at - 0.5 - low;
-  const int x0 = wrap_texel(int(low.x), size.x, t.wrap_u);
-  const int x1 = wrap_texel(int(low.x) + 1, size.x, t.wrap_u);
-  const int y0 = wrap_texel(int(low.y), size.y, t.wrap_v);
-  const int y1 = wrap_texel(int(low.y) + 1, size.y, t.wrap_v);
-  return mix(mix(fetch_texel(t, ivec2(x0, y0)), fetch_texel(t, ivec2(x1, y0)), f.x),
-             mix(fetch_texel(t, ivec2(x0, y1)), fetch_texel(t, ivec2(x1, y1)), f.x), f.y);
-}
-
-// Looks up a texture's mean over a footprint of this area (in the units of uv), which takes so many of
-// its texels: between the two levels whose texels are next in size. A footprint of less than a texel
-// is a point.
-vec4 sample_footprint(uint index, vec2 uv, float area) {
-  if (!has_feature(FEATURE_FILTERED_TEXTURES)) return sample_texture(index, uv);
-  const uint levels = texture_at(index).levels;
-  const float taken = area * float(texture_at(index).width) * float(texture_at(index).height);
-  if (levels == 0u || !(taken > 1.0)) return sample_texture(index, uv);
-  const float level = min(0.5 * log2(taken), float(levels));
-  const uint fine = min(uint(level), levels - 1u);
-  const uint first = texture_at(index).first_level;
-  return mix(sample_texture(fine == 0u ? index : first + fine - 1u, uv),
-             sample_texture(first + fine, uv), level - float(fine));
-}
 
 vec3 transform_point(vec4 rows[3], vec3 p) {
   return vec3(dot(rows[0].xyz, p) + rows[0].w, dot(rows[1].xyz, p) + rows[1].w,

@@ -3,6 +3,7 @@
 #include "daemon/core/render/picture/scratch.hpp"
 
 #include "tests/support/averaged_frames.hpp"
+#include "tests/support/wait_until.hpp"
 
 namespace previz::test::scratch_test {
 
@@ -30,10 +31,7 @@ std::uint64_t resident_at(const void* address) {
 
 TEST(Scratch, LeavesMemory) {
   const render::Sheet<char> sheet(16 << 20, 'a', scratch());
-  const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-  while (resident_at(sheet.data()) > 0 && std::chrono::steady_clock::now() < deadline)
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  EXPECT_EQ(resident_at(sheet.data()), 0u);
+  EXPECT_TRUE(wait_until("it has left", [&] { return resident_at(sheet.data()) == 0; }));
 }
 
 TEST(Scratch, GivesBackWhatWasWrittenHoweverOftenItLeavesMemory) {

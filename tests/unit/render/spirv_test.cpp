@@ -66,7 +66,7 @@ TEST(Spirv, WhatIsFetchedIsTexelsOrStorageByTheDevice) {
     EXPECT_THAT(kinds_of(as_texels, name), ElementsAre(render::BufferKind::texels)) << name;
     EXPECT_THAT(kinds_of(as_storage, name), ElementsAre(render::BufferKind::storage)) << name;
   }
-  // Those are written, too.
+  // The state of paths is written, too.
   EXPECT_THAT(
       kinds_of(as_texels, "ray_origin"),
       testing::UnorderedElementsAre(render::BufferKind::texels, render::BufferKind::storage));
