@@ -72,6 +72,8 @@ inline Ended run_program(const std::vector<std::string>& words, const ProgramLim
     ::setrlimit(RLIMIT_AS, &memory);
 #endif
     ::setrlimit(RLIMIT_CORE, &none);
+    // AddressSanitizer would report the signal as a fault of the program, in its own words.
+    if (limits.signal == SIGSEGV) ::setenv("ASAN_OPTIONS", "handle_segv=0", 1);
     ::execv(program.c_str(), arguments.data());
     ::_exit(127);
   }

@@ -7,6 +7,11 @@
 // nor the threads' hand-over within Aravis, Embree and Mesa's CPU driver, nor how the standard
 // library counts the owners of an exception that one thread hands to another; and it lets a child
 // that was forked beside threads start its own, as the recorder's tests do, only if it is asked to.
+#include <unistd.h>
+
+namespace {
+const pid_t program = ::getpid();
+}
 
 extern "C" {
 
@@ -19,6 +24,11 @@ const char* __tsan_default_suppressions() {
   return "race:libaravis-0.8.so\nrace:libglib-2.0.so\nrace:libgio-2.0.so\nrace:libgobject-2.0.so\n"
          "race:libembree3.so\nrace:swrast_dri.so\nrace:libvulkan_lvp.so\nrace:libopencv_core.so\n"
          "race:std::__exception_ptr::exception_ptr::_M_release\n";
+}
+
+// A child that was forked has the threads of its parent in its books, and waits for them in vain.
+int __lsan_is_turned_off() {
+  return ::getpid() != program;
 }
 
 // Without the longest memory a thread's access is reported without the stack that would suppress

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <fstream>
+#include <istream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -33,6 +34,26 @@ bool has_its_size(const std::string& type, std::int32_t size) {
   return found == sizes.end() || found->second == size;
 }
 
+// Returns where OpenEXR (3.1) takes the end of a value to be that begins here: it counts the
+// channels of a list and the pixels of a preview, whatever size is stated before. What it would
+// then take for the next attribute is no attribute.
+std::int64_t end_of_value(std::istream& file, std::string_view type, std::int64_t size) {
+  const std::int64_t begin = file.tellg();
+  if (type == "chlist") {
+    constexpr std::int64_t bytes_of_channel = 16;  // behind its name
+    std::string name;
+    while (std::getline(file, name, '\0') && !name.empty()) file.ignore(bytes_of_channel);
+    return file.tellg();
+  }
+  if (type == "preview") {
+    std::array<std::uint32_t, 2> side{};
+    file.read(reinterpret_cast<char*>(side.data()), sizeof side);
+    if (std::max(side[0], side[1]) > size) return -1;
+    return begin + std::int64_t{sizeof side} + std::int64_t{4} * side[0] * side[1];
+  }
+  return begin + size;
+}
+
 }  // namespace
 
 void check_exr_header(const std::filesystem::path& path) {
@@ -45,7 +66,8 @@ void check_exr_header(const std::filesystem::path& path) {
     file.read(reinterpret_cast<char*>(&size), sizeof size);
     const std::int64_t begin = file.tellg();
     if (!file || begin < 0) return;
-    if (size < 0 || size > bytes - begin || !has_its_size(type, size))
+    if (size < 0 || size > bytes - begin || !has_its_size(type, size) ||
+        end_of_value(file, type, size) != begin + size)
       throw Error(path.string() +
                   ": cannot be read as OpenEXR: its header is damaged, or its end is missing; copy "
                   "or export it again");

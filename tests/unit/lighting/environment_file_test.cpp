@@ -11,6 +11,7 @@
 
 namespace previz::lighting::environment_file_test {
 
+using std::literals::string_view_literals::operator""sv;
 using std::numbers::pi;
 using test::towards;
 
@@ -197,18 +198,36 @@ TEST_F(LoadEnvironment, AHugeWindowIsRefusedBeforeMemoryIsAskedFor) {
   EXPECT_THAT(refusal(), HasSubstr(std::to_string(most_side + 1) + "x1 pixels; allowed: at most"));
 }
 
+// Writes a header that begins with this attribute, and nothing behind its value but 64 zeros.
+void write_attribute(const std::filesystem::path& file, std::string_view name_and_type,
+                     std::int32_t size, std::string_view value) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name_and_type;
+  stream.write(reinterpret_cast<const char*>(&size), sizeof size);
+  stream << value << std::string(64, '\0');
+}
+
 TEST_F(LoadEnvironment, AnAttributeThatEndsBehindTheFileIsRefused) {
-  const std::string name("owner\0string\0", 13);
-  std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name
-                                        << std::string("\x10\0\0\0", 4) << "15 of 16 bytes.";
+  write_attribute(file, "owner\0string\0"sv, 64 + 16, "15 of 16 bytes.");
   EXPECT_THAT(refusal(), HasSubstr("its header is damaged"));
 }
 
 TEST_F(LoadEnvironment, AnAttributeOfAnotherSizeThanItsTypesIsRefused) {
-  const std::string name("pixelAspectRatio\0float\0", 23);
-  std::ofstream(file, std::ios::binary) << std::string("\x76\x2f\x31\x01\2\0\0\0", 8) << name
-                                        << std::string("\x08\0\0\0", 4) << std::string(64, '\0');
+  write_attribute(file, "pixelAspectRatio\0float\0"sv, 8, "");
   EXPECT_THAT(refusal(), HasSubstr("its header is damaged"));
+}
+
+// OpenEXR reads both to the end of their value, and what comes then as the next attribute.
+TEST_F(LoadEnvironment, AValueThatEndsElsewhereThanItsSizeSaysIsRefused) {
+  const std::string channel = "R" + std::string(17, '\0');
+  write_attribute(file, "channels\0chlist\0"sv, 19 + 4, channel + '\0');
+  EXPECT_THAT(refusal(), HasSubstr("its header is damaged"));
+  write_attribute(file, "channels\0chlist\0"sv, 12, channel + '\0');
+  EXPECT_THAT(refusal(), HasSubstr("its header is damaged"));
+  write_attribute(file, "preview\0preview\0"sv, 8 + 4 + 4, "\1\0\0\0\1\0\0\0rgba"sv);
+  EXPECT_THAT(refusal(), HasSubstr("its header is damaged"));
+  write_attribute(file, "preview\0preview\0"sv, 8 + 4, "\1\0\0\0\1\0\0\0rgba"sv);
+  EXPECT_THAT(refusal(), Not(HasSubstr("its header is damaged")));
 }
 
 }  // namespace previz::lighting::environment_file_test
