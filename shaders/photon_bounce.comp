@@ -134,11 +134,10 @@ uint meet_surface(inout Flight f, Surface s, GpuHit hit, vec2 random) {
   f.flux *= weight / (1.0 - p_stay);
   f.vertices += 1u;
   f.survival *= min(max(max(weight.r, weight.g), weight.b), 1.0);
-  if (f.vertices >= frame.roulette_depth && f.survival < 1.0) {
-    if (random.y >= f.survival) return FLIGHT_OVER;
-    f.flux /= f.survival;
-    f.survival = 1.0;
-  }
+  const float survival = f.vertices < frame.roulette_depth ? 1.0 : survival_of(f.survival);
+  if (random.y >= survival) return FLIGHT_OVER;
+  f.flux /= survival;
+  f.survival /= survival;
   f.origin = offset_origin(s, wi);
   f.t_min = 0.0;
   f.is_behind = false;

@@ -14,10 +14,6 @@
 #include "shaders/lib/medium.glsl"
 #include "shaders/lib/pane.glsl"
 
-// A path of the difference that is far from all differences survives a vertex with at least this
-// probability, and its throughput is never raised above the inverse.
-const float LEAST_SURVIVAL = 0.1;
-
 layout(constant_id = 2) const uint PARTS = SHADE_ALL;
 bool does(uint part) { return (PARTS & part) != 0u; }
 
@@ -304,21 +300,6 @@ void meet_photons(Path p, Surface s, Lobes l) {
     sample_caustic[2u * p.slot + 1u] += vec4(real, min(weight * gathered.real_variance, MOST_VARIANCE));
 }
 
-// Plays Russian roulette with a path of the difference; the farther it is from all objects that are
-// in one world only, the less it can still bring. Returns true if the path ends.
-bool ends_far_off(inout Path p, Surface s, inout float chance) {
-  if (!p.difference || p.worlds != WORLD_BOTH || p.depth == 0u || frame.difference_roulette <= 0.0)
-    return false;
-  // The roulette is played at every vertex. If the throughput did not count, a path that survived k
-  // vertices would bring 10^k times its light.
-  const float least = LEAST_SURVIVAL * clamp(largest_of(abs(p.throughput)), 1.0, 1.0 / LEAST_SURVIVAL);
-  const float survival = clamp(frame.difference_roulette * bounds_reach(s.position), least, 1.0);
-  if (chance >= survival) return true;
-  chance /= survival;
-  p.throughput /= survival;
-  return false;
-}
-
 // Samples the next direction and prepares the path for it. Returns false if the path ends.
 bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2 chance) {
   vec3 direction;
@@ -328,11 +309,9 @@ bool scatter(inout Path p, Surface s, Lobes l, Technique t, Sampler random, vec2
   if (!sample_direction(t, s, l, u, chance.y, direction, weight, pdf)) return false;
   p.throughput *= weight;
   if (all(equal(p.throughput, vec3(0.0)))) return false;
-  const float strongest = largest_of(abs(p.throughput));
-  if (p.depth + 1u >= frame.roulette_depth && strongest < 1.0) {
-    if (chance.x >= strongest) return false;
-    p.throughput /= strongest;
-  }
+  const float survival = p.depth + 1u < frame.roulette_depth ? 1.0 : survival_of(largest_of(abs(p.throughput)));
+  if (chance.x >= survival) return false;
+  p.throughput /= survival;
   p.origin = offset_origin(s, direction);
   p.t_min = 0.0;
   p.is_behind = false;
@@ -462,8 +441,7 @@ void shade_vertex(inout Path p, Surface s, out GpuShadowRay ray, out bool lit, o
   scattered = false;
   const uvec2 pixel = uvec2(batch.x, batch.y) + slot_pixel(p.slot);
   const Sampler random = slot_sampler(p.slot, pixel);
-  vec2 chance = sample_2d(random, vertex_pair(PAIR_CHANCE, p.depth));
-  if (ends_far_off(p, s, chance.x)) return;
+  const vec2 chance = sample_2d(random, vertex_pair(PAIR_CHANCE, p.depth));
   Lobes l = make_lobes(s);
   if (has_feature(FEATURE_PANES)) l = without_passing(s, l, pane_transmittance(s));
   if (has_feature(FEATURE_MANY_LIGHTS))

@@ -30,17 +30,6 @@ bool meets_bounds(vec3 point, vec3 direction, float t_max) {
   return false;
 }
 
-// Returns the sum of the bounds' solid angles over 2 pi, a measure of how much can differ at a
-// point. A bound that contains the point counts with the whole sphere, 2.
-float bounds_reach(vec3 point) {
-  float total = 0.0;
-  for (uint i = 0u; i < frame.bound_count; ++i) {
-    const float cap = bound_cap(fetch(bounds, int(i)), point);
-    total += cap > 0.0 ? cap : 2.0;
-  }
-  return total;
-}
-
 // Returns the sum of all caps, by which bounds_sample() chooses a cone in proportion to its solid
 // angle.
 float bounds_total(vec3 point) {

@@ -280,7 +280,6 @@ struct GpuFrame {
   float environment_spread;   // solid angle over 2 pi from which the environment's light comes
   float lamp_spread;          // the same for the lights
   float lamp_part;            // share of the lights in all power
-  float difference_roulette;  // survival of a path of the difference over bounds_reach()
   uint specular_bound_count;  // BOUNDS that follow, at which photons are aimed
   uint photon_count;          // emitted per pass
   float photon_environment;   // probability that a photon starts from the environment
@@ -514,7 +513,7 @@ static_assert(sizeof(GpuInstance) == 128);  // of INSTANCE_TEXELS
 static_assert(sizeof(GpuTexture) == 32);
 static_assert(sizeof(GpuLight) == 160);
 static_assert(offsetof(GpuLight, uv0) == 112);
-static_assert(sizeof(GpuFrame) == 240);
+static_assert(sizeof(GpuFrame) == 236);
 static_assert(sizeof(GpuLightNode) == 48);
 static_assert(sizeof(GpuBatch) == 32);
 static_assert(sizeof(GpuThroughput) == 16);

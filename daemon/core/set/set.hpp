@@ -210,7 +210,7 @@ struct Estimation {
   RealRadiance real_radiance = RealRadiance::traced;
   double composite_floor = 0.02;  // radiance over the sensor's white, below which hybrid adds
   int max_depth = 16;             // path vertices after the camera, 1..64
-  int roulette_depth = 4;         // Russian roulette from this vertex on
+  int roulette_depth = 2;         // Russian roulette from this vertex on
   std::uint32_t seed = 1;
   double specular_roughness = 1e-3;  // alpha at or below which a lobe is a Dirac delta
   // Share of a shared path's directions that are sampled towards objects of one world only; 0 is

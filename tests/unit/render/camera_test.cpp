@@ -166,9 +166,8 @@ TEST(CameraRadiance, AMirrorShowsThePlateWithVirtualShadows) {
   for (const std::size_t i : mirrored_pixels(view, result.layers))
     shown.mixed.push_back(result.layers.composite[i]);
   ASSERT_GT(shown.mixed.size(), 20u);
-  // The difference is followed by chance, so far from the roof.
-  EXPECT_NEAR(mean(shown.mixed).g, 2 - brought, 4 * standard_error_of_pixels(shown));
-  EXPECT_LT(standard_error_of_pixels(shown), 0.01);
+  EXPECT_NEAR(mean(shown.mixed).g, 2 - brought, 0.51 * white / 65535);  // half a code, and rounding
+  EXPECT_EQ(standard_error_of_pixels(shown), 0);  // no difference is left to chance
 }
 
 // Where the plate is clipped, or the floor not matt, the model's own radiance is traced: here none.

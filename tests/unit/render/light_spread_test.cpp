@@ -258,27 +258,40 @@ TEST(LightShare, AFaintLampFarOffTakesNoneFromTheLampBesideAnObject) {
               after.mean);
 }
 
-// A small ball in a hall of 40 m whose walls shine with 1 and reflect a half: almost every path of
-// the difference is far off, and plays the roulette at each of its 8 vertices. Its throughput is at
-// most 10. A light sample brings at most f L / (2 p) of it, where p is half the BSDF's density or
-// more, hence half at each vertex; what its parted halves meet brings 1 + 1/2 + 1/4 + ..., and half
-// as much again by light samples, hence three times. So no sample brings more than 10 (8 / 2 + 3).
-TEST(DifferenceRoulette, NeverRaisesAPathAboveTenTimesItsLight) {
-  View view = empty_view({5, 5, 5}, {20, 20, 3}, pinhole(48, 36, 0.9));
+// A room of albedo 1/2, with a ball that is in one world only: each bounce leaves half of a path's
+// light.
+View shining_room() {
+  View view = empty_view({1.5, 1.5, 1}, {0.5, 0.8, 0}, pinhole(48, 36, 0.9));
   scene::Material wall = diffuse(glm::vec3(0.5f));
   wall.emission = glm::vec3(1);
-  view.scene = furnace_box({40, 40, 40}, wall);
-  add(view.scene, icosphere_mesh(0.1, 2), diffuse(glm::vec3(0)), glm::dmat4(1), scene::world_mixed);
-  set::Estimation estimation = up_to_depth(8, set::Estimator::difference);
-  estimation.roulette_depth = 64;  // no other roulette
-  SetRenderer renderer(view, estimation);
-  float most = 0;
-  for (std::uint32_t seed = 0; seed < 64; ++seed) {
-    for (const glm::vec3& diff : renderer.rendered_clean(1, seed).diff)
-      most = std::max(most, std::abs(diff.g));
+  view.scene = furnace_box({4, 4, 4}, wall);
+  add(view.scene, icosphere_mesh(0.5, 2), diffuse(glm::vec3(0.5f)), glm::dmat4(1),
+      scene::world_mixed);
+  return view;
+}
+
+render::Layers played(int max_depth, int roulette_depth) {
+  set::Estimation estimation = up_to_depth(max_depth);
+  estimation.difference_sampling = 0;  // every direction leaves the albedo
+  estimation.roulette_depth = roulette_depth;
+  return SetRenderer(shining_room(), estimation).rendered_clean(16, 1);
+}
+
+// After three bounces an eighth is left, more than a tenth.
+TEST(Roulette, SparesAPathUntilATenthOfItsLightIsLeft) {
+  const render::Layers with = played(3, 1), without = played(3, 64);
+  EXPECT_GT(mean(with.mixed).g, 1.5);  // of 1 + 1/2 + 1/4 + 1/8 + 1/16
+  for (std::size_t i = 0; i < with.mixed.size(); ++i) {
+    ASSERT_EQ(with.mixed[i], without.mixed[i]);
+    ASSERT_EQ(with.diff[i], without.diff[i]);
   }
-  EXPECT_LE(most, 70);
-  EXPECT_GT(most, 0);
+}
+
+TEST(Roulette, EndsFaintPathsAndKeepsTheMean) {
+  const render::Layers with = played(16, 1), without = played(16, 64);
+  EXPECT_NE(mean(with.mixed), mean(without.mixed));
+  EXPECT_NEAR(mean(with.mixed).g, mean(without.mixed).g,
+              4 * std::hypot(standard_error_of_pixels(with), standard_error_of_pixels(without)));
 }
 
 }  // namespace previz::test::light_spread_test

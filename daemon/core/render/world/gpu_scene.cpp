@@ -443,8 +443,6 @@ void GpuScene::describe(gpu::GpuFrame& frame, std::uint32_t features) const {
   frame.environment_levels = environment_levels_;
   lights_.describe(frame);
   frame.bound_count = static_cast<std::uint32_t>(difference_bounds_.size());
-  // Lamps that differ bring a difference everywhere, near objects or not.
-  frame.difference_roulette = lights_.differ() ? 0.0f : 2.0f;
   frame.specular_bound_count = static_cast<std::uint32_t>(specular_bounds_.size());
   frame.scene_center = glm::vec3(scene_center_ - seen_from_);
   // The radius is slightly wider, so that rounding leaves no surface outside.

@@ -1,6 +1,5 @@
 #include "daemon/core/render/world/scene_lights.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <glm/geometric.hpp>
@@ -163,9 +162,6 @@ void SceneLights::encode(const scene::Scene& scene) {
   const LightTree tree = build_light_tree(all, has_tree ? lamps : 0, groups);
   tree_share_ = select_by_tree(all.lights);
   tree_origin_ = tree.origin;
-  differ_ = std::any_of(all.lights.begin(), all.lights.end(), [](const gpu::GpuLight& light) {
-    return light.gain_mixed != light.gain_real;
-  });
   upload_texels(device_, for_lights, lights_, all.lights, vk::Format::eR32G32B32A32Uint);
   upload_texels(device_, for_lights, light_tree_, tree.nodes, vk::Format::eR32G32B32A32Uint);
   positions_ = std::move(all.positions);

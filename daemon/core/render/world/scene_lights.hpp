@@ -39,7 +39,6 @@ class SceneLights {
   // Returns the index of the first of an instance's lights; NO_INDEX if it does not emit.
   std::uint32_t first_light(std::size_t instance) const { return first_light_[instance]; }
   double power() const { return power_; }  // W per channel, mean of the channels
-  bool differ() const { return differ_; }  // between the worlds
   // Returns how often lights were encoded since this object was made.
   std::uint64_t encoded() const { return encoded_; }
 
@@ -82,7 +81,6 @@ class SceneLights {
   std::uint32_t count_ = 0, visible_count_ = 0, distant_count_ = 0;
   float tree_share_ = 0;
   double power_ = 0, spread_ = 2;
-  bool differ_ = false;
   Buffer lights_, light_positions_, light_tree_;
 };
 
