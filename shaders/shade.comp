@@ -109,9 +109,10 @@ void meet_lights(Path p, float t_hit) {
   const bool by_tree = has_tree() && frame.visible_light_count > FEW_LIGHTS;
   const uint tried = by_tree ? frame.distant_light_count : frame.visible_light_count;
   for (uint i = 0u; i < tried; ++i) cross_light(p, i, t_hit);
+  const uint wanted = cancels(p, EQUAL_GAIN) ? LIGHT_NODE_DIFFERS : LIGHT_NODE_VISIBLE;
   uint node = by_tree ? 0u : NO_INDEX;
   while (has_feature(FEATURE_MANY_LIGHTS) && node != NO_INDEX) {
-    const uint index = next_crossed(node, p.origin + frame.tree_offset, p.direction, t_hit);
+    const uint index = next_crossed(wanted, node, p.origin + frame.tree_offset, p.direction, t_hit);
     if (index != NO_INDEX) cross_light(p, index, t_hit);
   }
 }

@@ -85,19 +85,20 @@ float node_importance(GpuLightNode node, Receiver r) {
   return min(result / max(distance_squared, 1e-30), MOST_IMPORTANCE);
 }
 
-// Returns the importance of a node as the sum of its children's, which a receiver among the lamps needs:
-// it tells lamps nearby from a great many on the other side of the same sphere.
-float branch_importance(uint index, Receiver r) {
-  const GpuLightNode node = light_node(index);
-  if ((node.links & LIGHT_NODE_LEAF) != 0u) return node_importance(node, r);
-  return node_importance(light_node(node.first), r) + node_importance(light_node(node.first + 1u), r);
-}
+// A node as a descent sees it. Its importance is the sum of its children's, which a receiver among the
+// lamps needs: it tells lamps nearby from a great many on the other side of the same sphere.
+struct LightBranch {
+  uint first, links;  // of the GpuLightNode
+  float importance;
+};
 
-// Returns the probability of the first of two children, below 0 if neither can shine on the receiver.
-float first_probability(uint first, Receiver r) {
-  const float a = branch_importance(first, r);
-  const float both = a + branch_importance(first + 1u, r);
-  return both > 0.0 ? a / both : -1.0;
+// A leaf stands in the place of its first child, so that a leaf and a branch take the same steps.
+LightBranch light_branch(uint index, Receiver r) {
+  const uvec2 words = fetch(light_tree, 3 * int(index) + 2).zw;
+  const bool is_leaf = (words.y & LIGHT_NODE_LEAF) != 0u;
+  const float first = node_importance(light_node(is_leaf ? index : words.x), r);
+  const float second = node_importance(light_node(is_leaf ? index : words.x + 1u), r);
+  return LightBranch(words.x, words.y, first + (is_leaf ? 0.0 : second));
 }
 
 // Returns whether a leaf is the second of two children, or below it. The nodes below the first child
@@ -114,23 +115,21 @@ bool is_below_second(uint leaf, uint first) {
 // the result is NO_INDEX.
 uint descend_tree(Receiver r, uint wanted, float u, float finer, out float probability) {
   probability = 1.0;
-  GpuLightNode node = light_node(0);
-  while ((node.links & LIGHT_NODE_LEAF) == 0u) {
-    const float first = first_probability(node.first, r);
-    if (first < 0.0) {
-      probability = 0.0;
-      return NO_INDEX;
-    }
-    const bool is_first = wanted == NO_INDEX ? first >= 1.0 || u + finer < first
-                                             : !is_below_second(wanted, node.first);
-    const float share = is_first ? first : 1.0 - first;
+  uvec2 at = fetch(light_tree, 2).zw;  // the root's `first` and `links`
+  while ((at.y & LIGHT_NODE_LEAF) == 0u) {
+    const LightBranch a = light_branch(at.x, r), b = light_branch(at.x + 1u, r);
+    const float both = a.importance + b.importance;
+    const float share_of_first = both > 0.0 ? a.importance / both : 0.0;
+    const bool is_first = wanted == NO_INDEX ? share_of_first >= 1.0 || u + finer < share_of_first
+                                             : !is_below_second(wanted, at.x);
+    const float share = !(both > 0.0) ? 0.0 : is_first ? share_of_first : 1.0 - share_of_first;
     probability *= share;
     if (share <= 0.0) return NO_INDEX;
-    u = clamp((is_first ? u : u - first) / share, 0.0, 0.99999994);
+    u = clamp((is_first ? u : u - share_of_first) / share, 0.0, 0.99999994);
     finer /= share;
-    node = light_node(is_first ? node.first : node.first + 1u);
+    at = is_first ? uvec2(a.first, a.links) : uvec2(b.first, b.links);
   }
-  return node.first;
+  return at.x;
 }
 
 // Returns whether a ray may meet a lamp of a node before t_hit. The sphere is a little wider for the
@@ -144,22 +143,17 @@ bool crosses(GpuLightNode node, vec3 origin, vec3 direction, float t_hit) {
   return dot(off, off) <= squared && along >= -radius && along - radius <= t_hit;
 }
 
-// Returns the next light with an extent, and no mesh, that a ray may meet; NO_INDEX at the end. `node`
-// is where the walk stands, at first 0. The links to the parents lead on, without a stack: behind a
-// first child comes the second one, behind the second what comes behind its parent.
-uint next_crossed(inout uint node, vec3 origin, vec3 direction, float t_hit) {
+// Returns the next light with an extent, and no mesh, that a ray may meet, of those below nodes with this
+// bit: LIGHT_NODE_VISIBLE or LIGHT_NODE_DIFFERS; NO_INDEX at the end. `node` is where the walk stands, at
+// first 0.
+uint next_crossed(uint bit, inout uint node, vec3 origin, vec3 direction, float t_hit) {
   while (node != NO_INDEX) {
     const GpuLightNode n = light_node(node);
-    const bool crossed =
-        (n.links & LIGHT_NODE_VISIBLE) != 0u && crosses(n, origin, direction, t_hit);
+    const bool crossed = (n.links & bit) != 0u && crosses(n, origin, direction, t_hit);
     const bool is_leaf = (n.links & LIGHT_NODE_LEAF) != 0u;
-    if (crossed && !is_leaf) {
-      node = n.first;
-      continue;
-    }
-    while ((node & 1u) != 0u) node = light_node(node).links >> LIGHT_NODE_PARENT_SHIFT;
-    node = node == 0u ? NO_INDEX : node + 1u;
-    if (crossed) return n.first;
+    node = crossed && !is_leaf ? n.first : n.links >> LIGHT_NODE_NEXT_SHIFT;
+    if (node == 0u) node = NO_INDEX;
+    if (crossed && is_leaf) return n.first;
   }
   return NO_INDEX;
 }

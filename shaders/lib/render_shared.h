@@ -252,12 +252,13 @@ struct GpuLightNode {
   float cos_spread;      // of the cone of their axes,
   float least_cosine;    // and of the angle around these beyond which they do not shine
   uint first;            // its first child; of a leaf: its light
-  uint links;            // LIGHT_NODE_*, and its parent
+  uint links;            // LIGHT_NODE_*, and the node behind all below this one; 0: there is none
 };
 PREVIZ_CONST uint LIGHT_NODE_LEAF = 1u;
 PREVIZ_CONST uint LIGHT_NODE_TWO_SIDED = 2u;
 PREVIZ_CONST uint LIGHT_NODE_VISIBLE = 4u;  // some lamp has an extent and no mesh
-PREVIZ_CONST uint LIGHT_NODE_PARENT_SHIFT = 3u;
+PREVIZ_CONST uint LIGHT_NODE_DIFFERS = 8u;  // and does not shine alike in both worlds
+PREVIZ_CONST uint LIGHT_NODE_NEXT_SHIFT = 4u;
 // So few lights are chosen by power alone, and a ray tries all that it could see; a tree pays for more.
 PREVIZ_CONST uint FEW_LIGHTS = 4u;
 

@@ -267,12 +267,13 @@ class LightTreeWriter {
                   std::span<const BoundedShape> bounded, double whole)
       : tree_(tree), lights_(lights), groups_(groups), bounded_(bounded), whole_(whole) {}
 
-  // Writes what is at `from` of the lamps' and groups' own tree.
-  void write_top(const BoundedShape& top, std::uint32_t from, std::size_t node, std::size_t parent);
+  // Writes what is at `from` of the lamps' and groups' own tree. `next` is the node behind all
+  // below this one; 0: there is none.
+  void write_top(const BoundedShape& top, std::uint32_t from, std::size_t node, std::size_t next);
 
  private:
-  void write_group(std::size_t group, std::uint32_t from, std::size_t node, std::size_t parent);
-  void write(std::size_t node, std::size_t parent, const LampBounds& bounds);
+  void write_group(std::size_t group, std::uint32_t from, std::size_t node, std::size_t next);
+  void write(std::size_t node, std::size_t next, const LampBounds& bounds);
   void write_leaf(std::size_t node, std::uint32_t light);
   std::size_t add_children(std::size_t node);
 
@@ -283,9 +284,9 @@ class LightTreeWriter {
   double whole_;
 };
 
-void LightTreeWriter::write(std::size_t node, std::size_t parent, const LampBounds& bounds) {
+void LightTreeWriter::write(std::size_t node, std::size_t next, const LampBounds& bounds) {
   gpu::GpuLightNode& n = tree_.nodes[node];
-  n.links = static_cast<std::uint32_t>(parent) << gpu::LIGHT_NODE_PARENT_SHIFT;
+  n.links = static_cast<std::uint32_t>(next) << gpu::LIGHT_NODE_NEXT_SHIFT;
   if (!(bounds.intensity > 0)) return;  // its intensity stays 0
   const glm::dvec3 center = 0.5 * (bounds.low + bounds.high) - tree_.origin;
   // The radius covers what the rounding of the places to single precision may shift them by.
@@ -304,10 +305,11 @@ void LightTreeWriter::write(std::size_t node, std::size_t parent, const LampBoun
 void LightTreeWriter::write_leaf(std::size_t node, std::uint32_t light) {
   tree_.nodes[node].first = light;
   tree_.nodes[node].links |= gpu::LIGHT_NODE_LEAF;
-  const std::uint32_t type = lights_.lights[light].type;
-  if (type == gpu::LIGHT_SPHERE || type == gpu::LIGHT_RECTANGLE)
-    tree_.nodes[node].links |= gpu::LIGHT_NODE_VISIBLE;
-  lights_.lights[light].leaf = static_cast<std::uint32_t>(node);
+  gpu::GpuLight& lamp = lights_.lights[light];
+  lamp.leaf = static_cast<std::uint32_t>(node);
+  if (lamp.type != gpu::LIGHT_SPHERE && lamp.type != gpu::LIGHT_RECTANGLE) return;
+  tree_.nodes[node].links |= gpu::LIGHT_NODE_VISIBLE;
+  if (lamp.gain_mixed != lamp.gain_real) tree_.nodes[node].links |= gpu::LIGHT_NODE_DIFFERS;
 }
 
 std::size_t LightTreeWriter::add_children(std::size_t node) {
@@ -318,29 +320,29 @@ std::size_t LightTreeWriter::add_children(std::size_t node) {
 }
 
 void LightTreeWriter::write_group(std::size_t group, std::uint32_t from, std::size_t node,
-                                  std::size_t parent) {
+                                  std::size_t next) {
   const BoundedShape& bounded = bounded_[group];
-  write(node, parent, bounded.bounds[from]);
+  write(node, next, bounded.bounds[from]);
   const LightBranch& branch = (*bounded.shape)[from];
   if (branch.is_leaf) return write_leaf(node, groups_[group].first_light + branch.first);
   const std::size_t children = add_children(node);
-  write_group(group, branch.first, children, node);
-  write_group(group, branch.first + 1, children + 1, node);
+  write_group(group, branch.first, children, children + 1);
+  write_group(group, branch.first + 1, children + 1, next);
 }
 
 void LightTreeWriter::write_top(const BoundedShape& top, std::uint32_t from, std::size_t node,
-                                std::size_t parent) {
+                                std::size_t next) {
   const LightBranch& branch = (*top.shape)[from];
   const std::size_t lights = lights_.lights.size();
   if (branch.is_leaf && branch.first >= lights)
-    return write_group(branch.first - lights, 0, node, parent);
-  write(node, parent, top.bounds[from]);
+    return write_group(branch.first - lights, 0, node, next);
+  write(node, next, top.bounds[from]);
   if (branch.is_leaf) return write_leaf(node, branch.first);
   const std::size_t children = add_children(node);
-  write_top(top, branch.first, children, node);
-  write_top(top, branch.first + 1, children + 1, node);
-  tree_.nodes[node].links |=
-      (tree_.nodes[children].links | tree_.nodes[children + 1].links) & gpu::LIGHT_NODE_VISIBLE;
+  write_top(top, branch.first, children, children + 1);
+  write_top(top, branch.first + 1, children + 1, next);
+  tree_.nodes[node].links |= (tree_.nodes[children].links | tree_.nodes[children + 1].links) &
+                             (gpu::LIGHT_NODE_VISIBLE | gpu::LIGHT_NODE_DIFFERS);
 }
 
 void add_leaf(std::vector<LampLeaf>& leaves, const LampBounds& bounds, std::size_t lamp) {
