@@ -218,6 +218,7 @@ TEST_F(FarmTask, ThatIsMissingIsNamedAndTriedAgain) {
   EXPECT_THAT(out_.str(), HasSubstr("2 frames are missing; `previz farm retry`"));
   const auto missing = nlohmann::json::parse(content_of(folder_.missing_file()));
   EXPECT_EQ(missing[0]["frames"], (std::vector<int>{6, 7}));
+  EXPECT_EQ(folder_.read_state(farm::finish_name).value().message, "frames are missing");
   const auto before = std::filesystem::last_write_time(directory_ / "out/0000.exr");
   EXPECT_EQ(run(1), task_status::done);
   EXPECT_EQ(finish(), task_status::done) << out_.str();
